@@ -29,6 +29,7 @@ from airmuscle.bench.identify.hysteresis import (
     agreement_of_run,
     data_limits,
     force_amplitude,
+    loop_chapter,
     parameters_on_bounds,
 )
 from airmuscle.bench.identify.hysteresis.creep import _drifts, _fit_elements
@@ -84,6 +85,18 @@ def test_evidence_of_a_friction_counts_its_parameters_and_those_of_the_curve_ove
         return n * np.log(mean_square) + 2 * k + 2 * k * (k + 1) / (n - k - 1)
 
     assert fit.aicc_reduction == pytest.approx(criterion(plain, 4) - criterion(square, 6))
+
+
+def test_too_few_independent_residuals_leave_aicc_undefined_and_are_no_nan():
+    """The residuals change so slowly that fewer of them are independent than the model has parameters."""
+    fit = fitted(loop(60.0, memory=0.999).rows(slice(None, None, 15)))
+    assert fit.effective_sample_size < 7
+    assert fit.aicc_reduction == -np.inf
+    assert not fit.justified
+    assert "AICc is not defined for so few independent residuals" in fit.verdict
+    (found,) = find_loops([loop()])
+    table = loop_chapter(LoopFit(found, (fit,), {})).tables[0]
+    assert list(table.columns["reduction of AICc"].values) == [None]
 
 
 def test_the_repeatability_is_the_standard_deviation_of_two_runs():

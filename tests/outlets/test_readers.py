@@ -704,3 +704,18 @@ def test_a_value_that_no_measurement_has(tmp_path: Path):
     assert "line 3: pressure is 1e+305 in SI units; no measurement exceeds 1e+15" in refusal(
         ColumnError, tmp_path / "run.csv"
     )
+
+
+@pytest.mark.parametrize("cell", ["x" * 3000, "ab " * 1000, "pressure [" + "k" * 3000 + "]"])
+@pytest.mark.parametrize("place", ["cell", "column", "headings"])
+def test_a_message_quotes_little_of_hostile_text(tmp_path, cell, place):
+    rows = [["time [s]", "pressure [kPa]", "force [N]"], *([f"{i}", "100", f"{100 + i}"] for i in range(30))]
+    for row in {"cell": [5], "column": range(3, 25), "headings": []}[place]:
+        rows[row][1] = cell
+    if place == "headings":
+        rows[0] = [f"{cell}{i}" for i in range(3)]
+    path = tmp_path / "hostile.csv"
+    path.write_text("\n".join(map(",".join, rows)), encoding="utf-8")
+    with pytest.raises(ColumnError) as caught:
+        read(path)
+    assert len(str(caught.value)) <= 700

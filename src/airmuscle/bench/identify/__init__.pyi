@@ -45,6 +45,7 @@ from .model_evidence import batch_sample_size as batch_sample_size
 from .model_evidence import effective_sample_size as effective_sample_size
 from .model_evidence import f_test_p_value as f_test_p_value
 from .model_evidence import format_p_value as format_p_value
+from .model_evidence import reduction_of_aicc as reduction_of_aicc
 from .model_selection import Comparison as Comparison
 from .model_selection import compare as compare
 from .model_selection import eligible_models as eligible_models

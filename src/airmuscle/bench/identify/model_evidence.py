@@ -42,6 +42,17 @@ def aicc(mean_square: float, sample_size: float, parameters: int) -> float:
     return sample_size * logarithm + 2.0 * k + 2.0 * k * (k + 1) / (sample_size - k - 1)
 
 
+def reduction_of_aicc(before: float, after: float) -> float:
+    """AICc of a model minus that of a larger one; -inf where the sample is too small for the AICc of the larger one."""
+    return before - after if np.isfinite(after) else -np.inf
+
+
+def describe_reduction(reduction: float) -> str:
+    """The difference in AICc of a larger model as a phrase."""
+    known = np.isfinite(reduction)
+    return f"Difference in AICc {-reduction:.4g}" if known else "AICc is not defined for so few independent residuals"
+
+
 def f_test_p_value(mean_square: float, reduced: float, sample_size: float, parameters: int, added: int) -> float:
     """p-value of the F test for `added` parameters that lower the mean square residual from `mean_square` to `reduced`.
 

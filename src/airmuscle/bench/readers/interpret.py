@@ -23,6 +23,8 @@ from .mapping import ColumnMapping
 from .plausibility import check_plausible, check_unique, check_width, without_repeated_columns
 from .time_base import TimeBase, seconds_from_clock
 
+MAX_QUOTED = 180
+"""Maximum number of characters of headings in a message (chosen)."""
 MAX_LABELS = 8
 """Maximum number of different texts of a column that is kept (chosen), such as the names of specimens."""
 MIN_LABEL_ROWS = 3
@@ -175,8 +177,10 @@ def _no_known_column(table: RawTable, headings: list[Heading]) -> ColumnError:
     names = [heading.text for heading in headings]
     near = [n for name in names for n in difflib.get_close_matches(name.lower(), QUANTITIES, n=1)]
     hint = f" Did you mean '{near[0]}'?" if near else ""
+    quoted = listed(names)
+    quoted = quoted if len(quoted) <= MAX_QUOTED else f"{quoted[: MAX_QUOTED - 1]}…"
     return ColumnError(
-        f"{table.origin}: no column is a known quantity ({listed(names)}); known quantities are "
+        f"{table.origin}: no column is a known quantity ({quoted}); known quantities are "
         f"{', '.join(QUANTITIES)}.{hint}",
         hint=Hint("To state the number of lines above the headings", "skip_rows", 1, "ColumnMapping"),
     )

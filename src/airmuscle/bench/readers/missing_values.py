@@ -11,7 +11,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from ...core.annotation import check_field_types
+from ...core.annotation import check_field_types, one_line
 from ...core.arrays import Array
 from ...core.errors import ColumnError, Hint, HintedText
 from ...recording.heading import Heading
@@ -20,6 +20,8 @@ from .channels import Cells, RawTable
 from .constants import parse_constant_name
 from .time_base import seconds_from_clock
 
+MAX_QUOTED = 40
+"""Maximum number of characters of a cell among several (chosen)."""
 MAX_LISTED = 8
 """Maximum number of cells or rows that a message lists (chosen)."""
 _MARKERS = re.compile(r"[-–—.?*/]*|nan|n/?a|null|none|missing|k\.?\s?a\.?|#[\w/]+[!?]?", re.IGNORECASE)
@@ -41,7 +43,7 @@ class ExaminedColumn:
         cell = self.cells[row]
         if isinstance(cell, str):
             clock = " or a clock time" if self.heading.name == "time" else ""
-            number = f"{self.heading.name} '{cell}' is not a number{clock}"
+            number = f"{self.heading.name} '{one_line(cell)}' is not a number{clock}"
             return number if cell else f"{self.heading.name} has an empty cell"
         reason = ", the code of a missing value" if math.isfinite(cell) else "; it must be finite"
         return f"{self.heading.name} is {cell:g}{reason}"
@@ -49,7 +51,7 @@ class ExaminedColumn:
     def brief(self, row: int) -> str:
         """Quantity and cell, for a list."""
         cell = self.cells[row]
-        text = f"{cell:g}" if not isinstance(cell, str) else f"'{cell}'" if cell else "empty"
+        text = f"{cell:g}" if not isinstance(cell, str) else f"'{one_line(cell)[:MAX_QUOTED]}'" if cell else "empty"
         return f"{self.heading.name} {text}"
 
 

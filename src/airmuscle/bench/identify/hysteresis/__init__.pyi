@@ -12,6 +12,7 @@ from .fit import fit_hysteresis as fit_hysteresis
 from .fit import initial_friction_laws as initial_friction_laws
 from .fit import make_loop_series as make_loop_series
 from .hysteresis_chapter import hysteresis_chapters as hysteresis_chapters
+from .hysteresis_chapter import loop_chapter as loop_chapter
 from .joint import fit_jointly as fit_jointly
 from .joint import identified_friction as identified_friction
 from .joint import loops_not_joined as loops_not_joined

@@ -138,12 +138,17 @@ def _law_table(loop_fit: LoopFit) -> Table:
     columns |= {
         "branch gap without friction": TableColumn([f.gap for f in fits], "N", brief=False),
         "remaining branch gap": TableColumn([f.residual_gap for f in fits], "N", digits=3),
-        "reduction of AICc": [f.aicc_reduction for f in fits],
+        "reduction of AICc": _reductions(fits),
         P_VALUE: TableColumn([f.p_value for f in fits], brief=False),
         "justified": [f.justified for f in fits],
         "not determined": TableColumn([", ".join(f.undetermined) for f in fits], brief=False),
     }
     return Table("laws", "Friction laws, best first", columns, brief=len(fits))
+
+
+def _reductions(fits: Sequence[HysteresisFit | JointFit]) -> list[float | None]:
+    """The reductions of AICc; None where it is not defined."""
+    return [fit.aicc_reduction if np.isfinite(fit.aicc_reduction) else None for fit in fits]
 
 
 def _all_parameters(loop_fit: LoopFit) -> Table:
@@ -189,7 +194,7 @@ def _joint_laws(fits: Sequence[JointFit]) -> Table:
             [fit.rmse_without_friction for fit in fits], "N", digits=3, brief=False
         ),
         "rms error": TableColumn([fit.rmse for fit in fits], "N", digits=3),
-        "reduction of AICc": [fit.aicc_reduction for fit in fits],
+        "reduction of AICc": _reductions(fits),
         P_VALUE: TableColumn([fit.p_value for fit in fits], brief=False),
         "runs that disagree": [sum(run.disagrees for run in fit.agreement) for fit in fits],
         "justified": [fit.justified for fit in fits],

@@ -14,7 +14,7 @@ from ....engine.processes import Workers, process_pool
 from ....physics.muscle.friction import Friction, IdentifiedFriction, PressureScaledFriction
 from ...segment.runs import RELATIVE_BAND
 from ..identifiability import UndeterminedCombination
-from ..model_evidence import aicc, effective_sample_size, f_test_p_value
+from ..model_evidence import aicc, effective_sample_size, f_test_p_value, reduction_of_aicc
 from .fit import make_loop_series
 from .joint_result import JointFit, agreement_of_run, force_amplitude, preferred_fit
 from .limits import combine_limits
@@ -172,7 +172,7 @@ def _assess(
         rmse=_rms(_residuals(friction, runs)),
         rmse_without_friction=_rms(_residuals(None, runs)),
         effective_sample_size=size,
-        aicc_reduction=_aicc(None, runs, size) - _aicc(friction, runs, size),
+        aicc_reduction=reduction_of_aicc(_aicc(None, runs, size), _aicc(friction, runs, size)),
         p_value=_f_test(None, friction, runs),
         scale_p_value=scale_p_value,
         repeat_rmse=_rms(_residuals(friction, repeats)) if repeats else float("nan"),

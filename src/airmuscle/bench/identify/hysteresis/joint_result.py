@@ -16,7 +16,7 @@ from ....report.chapter import Chapter, Plot
 from ....report.parameters import parameter_table
 from ...reported import Reported
 from ..identifiability import UndeterminedCombination
-from ..model_evidence import effective_sample_size, f_test_p_value, format_p_value
+from ..model_evidence import describe_reduction, effective_sample_size, f_test_p_value, format_p_value
 from .limits import MILLIMETRES, DataLimits, combine_limits, limit_reservations, undetermined_parameters
 from .result import SIGNIFICANCE_LEVEL, HysteresisFit
 from .search import LoopSeries, free_parameters
@@ -224,9 +224,9 @@ class JointFit(Reported):
         """Whether the runs justify one friction, as sentences with the numbers."""
         text = (
             f"{self.name} fitted to {len(self.series)} runs together reduces the rms error from "
-            f"{self.rmse_without_friction:.3g} to {self.rmse:.3g} N. {self.scale_text} Difference in AICc "
-            f"{-self.aicc_reduction:.4g}, effective sample size {self.effective_sample_size:.0f}; F test "
-            f"{format_p_value(self.p_value)}."
+            f"{self.rmse_without_friction:.3g} to {self.rmse:.3g} N. {self.scale_text} "
+            f"{describe_reduction(self.aicc_reduction)}, effective sample size {self.effective_sample_size:.0f}; "
+            f"F test {format_p_value(self.p_value)}."
         )
         if np.isfinite(self.repeat_rmse):
             text += (

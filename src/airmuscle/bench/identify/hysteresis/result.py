@@ -15,7 +15,14 @@ from ....physics.muscle.friction import Friction
 from ....report.chapter import BY_ROW, Chapter, Plot, Table, TableColumn
 from ...reported import Reported
 from ..identifiability import UndeterminedCombination
-from ..model_evidence import aicc, effective_sample_size, f_test_p_value, format_p_value
+from ..model_evidence import (
+    aicc,
+    describe_reduction,
+    effective_sample_size,
+    f_test_p_value,
+    format_p_value,
+    reduction_of_aicc,
+)
 from .limits import MILLIMETRES, Axis, limit_reservations, parameters_on_bounds, undetermined_parameters
 from .search import LoopSeries, branch_gap, repeat_difference
 
@@ -181,7 +188,7 @@ class HysteresisFit(Reported):
         """Whether the data justify this friction, as sentences with the numbers."""
         text = (
             f"{type(self.friction).__name__} reduces the rms error from {self.rmse_without_friction:.3g} to "
-            f"{self.rmse:.3g} N{self._gap_text}. Difference in AICc {-self.aicc_reduction:.4g}, effective sample size "
+            f"{self.rmse:.3g} N{self._gap_text}. {describe_reduction(self.aicc_reduction)}, effective sample size "
             f"{self.effective_sample_size:.0f}; F test {format_p_value(self.p_value)}."
         )
         if np.isfinite(self.repeat_rmse):
@@ -263,7 +270,7 @@ def assess_fit(
         gap=branch_gap(path, plain, direction).rms,
         residual_gap=branch_gap(path, residuals, direction).rms,
         effective_sample_size=sample_size,
-        aicc_reduction=aicc(plain_square, sample_size, base) - aicc(square, sample_size, base + free),
+        aicc_reduction=reduction_of_aicc(aicc(plain_square, sample_size, base), aicc(square, sample_size, base + free)),
         p_value=f_test_p_value(plain_square, square, sample_size, base + free, free),
         repeat_rmse=repeat_rmse,
         repeat_rmse_without_friction=plain_repeat_rmse,
