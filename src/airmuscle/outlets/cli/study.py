@@ -50,9 +50,9 @@ def study(
     loaded, writes = load_study(file), execution.writes(out)
     with contextlib.nullcontext(out) if writes else temporary_folder() as folder:
         result, shares = _run(loaded, folder, execution)
-    chapter = study_chapter(result, execution=shares)
-    page = write_study(result, out, chapter) if writes else out / REPORT_FILE
     if writes or json:
+        chapter = study_chapter(result, execution=shares)
+        page = write_study(result, out, chapter) if writes else out / REPORT_FILE
         print_result([chapter], {"results": out / RESULTS_FILE, "report": page}, json)
     if result.failed.size == len(result.study):
         raise SimulationError(f"all {len(result.study)} runs failed; reason of the first: {result.failure_reasons[0]}")
