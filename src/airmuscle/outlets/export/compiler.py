@@ -24,24 +24,21 @@ TIME_LIMIT = 600.0
 """Time [s] after which a compiler or a program is stopped (chosen)."""
 
 
-def compile_library(sources: Mapping[str, bytes], units: Sequence[str], name: str, more: Sequence[str] = ()) -> bytes:
+def compile_library(
+    sources: Mapping[str, bytes], units: Sequence[str], name: str, more: Sequence[str] = (),
+    command: Sequence[str] | None = None,
+) -> bytes:  # fmt: skip
     """The shared library `name` of the files `units` among `sources`, compiled in a fresh folder.
 
-    more  further arguments of the compiler
+    more     further arguments of the compiler
+    command  compiler with its first arguments; by default that of this machine
 
     Raises ParameterError where there is no compiler, FileError where it fails.
     """
-    return compile_with([find_compiler()], sources, units, name, more)
-
-
-def compile_with(
-    command: Sequence[str], sources: Mapping[str, bytes], units: Sequence[str], name: str, more: Sequence[str] = ()
-) -> bytes:
-    """The same with a compiler and its first arguments."""
     with temporary_folder() as folder:
         for file, text in sources.items():
             (folder / file).write_bytes(text)
-        run_command([*command, *OPTIONS, *units, "-o", name, *more, "-lm"], folder)
+        run_command([*(command or [find_compiler()]), *OPTIONS, *units, "-o", name, *more, "-lm"], folder)
         return (folder / name).read_bytes()
 
 
@@ -200,10 +197,8 @@ class Platform:
 
         Raises ParameterError where the compiler is missing, FileError where it fails.
         """
-        if not self.target:
-            return compile_with([find_compiler()], sources, units, name + self.suffix)
-        command = [*find_cross_compiler(), "-target", self.target]
-        return compile_with(command, sources, units, name + self.suffix)
+        command = [*find_cross_compiler(), "-target", self.target] if self.target else None
+        return compile_library(sources, units, name + self.suffix, command=command)
 
 
 PLATFORMS = {
