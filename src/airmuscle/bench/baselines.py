@@ -77,18 +77,17 @@ class TimedRecord(NamedTuple):
     def on_grid(self, step: float) -> TimedRecord:
         """The record at even times; missing values are interpolated."""
         time = self.time[0] + step * np.arange(int((self.time[-1] - self.time[0]) / step * (1 + 1e-9)) + 1)
-        outputs, inputs = (
-            np.column_stack([_interpolated(time, self.time, column) for column in part.T]).reshape(time.size, -1)
-            if part.shape[1]
-            else np.zeros((time.size, 0))
-            for part in (self.outputs, self.inputs)
-        )
+        outputs, inputs = (_interpolated(time, self.time, part) for part in (self.outputs, self.inputs))
         return TimedRecord(time, outputs, inputs, np.ones(outputs.shape, dtype=bool))
 
 
-def _interpolated(at: Array, time: Array, values: Array) -> Array:
-    known = np.isfinite(values)
-    return np.asarray(np.interp(at, time[known], values[known])) if known.any() else np.zeros(at.size)
+def _interpolated(at: Array, time: Array, columns: Array) -> Array:
+    """Columns (R, K) at other times (N, K); 0 where a column has no value."""
+    found = np.zeros((at.size, columns.shape[1]))
+    for k, known in enumerate(np.isfinite(columns).T):
+        if known.any():
+            found[:, k] = np.interp(at, time[known], columns[known, k])
+    return found
 
 
 def baseline_errors(records: Sequence[TimedRecord]) -> list[dict[str, Array]]:
@@ -105,20 +104,19 @@ def baseline_errors(records: Sequence[TimedRecord]) -> list[dict[str, Array]]:
     for i, record in enumerate(records):
         first = record.outputs[np.argmax(record.compared, axis=0), np.arange(record.outputs.shape[1])]
         errors = {PERSISTENCE: _rms(record, np.broadcast_to(first, record.outputs.shape))}
-        others = [each for k, each in enumerate(grids) if k != i and _alike(each, grids[i]) and _fits(each)]
+        others = [
+            each
+            for k, each in enumerate(grids)
+            if k != i and len(each.time) > DEPTH + 1 and _sizes(each) == _sizes(grids[i])
+        ]
         if (predicted := _predicted(grids[i], others)) is not None:
-            columns = [np.interp(record.time, grids[i].time, column) for column in predicted.T]
-            errors[ARX] = _rms(record, np.column_stack(columns))
+            errors[ARX] = _rms(record, _interpolated(record.time, grids[i].time, predicted))
         found.append(errors)
     return found
 
 
-def _alike(one: TimedRecord, other: TimedRecord) -> bool:
-    return bool(one.outputs.shape[1:] == other.outputs.shape[1:] and one.inputs.shape[1:] == other.inputs.shape[1:])
-
-
-def _fits(record: TimedRecord) -> bool:
-    return len(record.time) > DEPTH + 1
+def _sizes(record: TimedRecord) -> tuple[int, int]:
+    return int(record.outputs.shape[1]), int(record.inputs.shape[1])
 
 
 def _predicted(grid: TimedRecord, others: Sequence[TimedRecord]) -> Array | None:
@@ -126,8 +124,8 @@ def _predicted(grid: TimedRecord, others: Sequence[TimedRecord]) -> Array | None
     middle = len(grid.time) // 2
     halves = [TimedRecord(*(part[rows] for part in grid)) for rows in (slice(middle), slice(middle, None))]
     if others:
-        return _run(grid, others) if _fits(grid) else None
-    if not all(map(_fits, halves)):
+        return _run(grid, others) if len(grid.time) > DEPTH + 1 else None
+    if middle <= DEPTH + 1:
         return None
     return np.concatenate([_run(halves[0], halves[1:]), _run(halves[1], halves[:1])])
 

@@ -246,13 +246,10 @@ def fit_pressure(
 
 def fill_baselines(fit: DynamicFit) -> tuple[dict[str, float], ...]:
     """Rms errors [Pa] of the pressure of each record by persistence and by an ARX model of the others."""
-    records = []
+    records, values = [], fit.values
     for model in fit.problem.record_models:
-        driven = dataclasses.replace(
-            model.experiment, command=model.command(fit.values), start_time=model.start_time(fit.values)
-        )
-        inputs = commands_at(model.plant, driven)
-        records.append(TimedRecord(model.times, model.measured, inputs, model.valid))
+        commands = commands_at(model.plant, model.command(values), model.times - model.start_time(values))
+        records.append(TimedRecord(model.times, model.measured, commands, model.valid))
     return tuple({name: float(rms[0]) for name, rms in each.items()} for each in baseline_errors(records))
 
 

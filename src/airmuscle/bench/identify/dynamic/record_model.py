@@ -272,8 +272,7 @@ def count_readings(models: Sequence[RecordModel]) -> int:
     return sum(int(model.valid.sum()) for model in models)
 
 
-def commands_at(plant: System, experiment: Experiment) -> Array:
-    """The inputs of the plant at the rows of a record (N, m); 0 before its start."""
-    times = experiment.recording["time"] - experiment.start_time
-    segments = experiment.command.segments(plant.inputs, 0.0, max(float(times[-1]), 1e-9))
+def commands_at(plant: System, command: InputSignal, times: Array) -> Array:
+    """The inputs of the plant (N, m) at times [s] from the start of the run (N,); 0 before it."""
+    segments = command.segments(plant.inputs, 0.0, max(float(times[-1]), 1e-9))
     return np.where(times[:, None] < 0.0, 0.0, segments.inputs_at(np.maximum(times, 0.0), 0.0))

@@ -18,7 +18,7 @@ from ...reported import Reported
 from ..identifiability import UndeterminedCombination
 from ..model_evidence import describe_reduction, effective_sample_size, f_test_p_value, format_p_value
 from .limits import MILLIMETRES, DataLimits, combine_limits, limit_reservations, undetermined_parameters
-from .result import SIGNIFICANCE_LEVEL, HysteresisFit
+from .result import SIGNIFICANCE_LEVEL, HysteresisFit, judged
 from .search import LoopSeries, free_parameters
 
 MAX_DEVIATION = 0.2
@@ -233,11 +233,7 @@ class JointFit(Reported):
                 f" On the second runs the rms error changes from {self.repeat_rmse_without_friction:.3g} to "
                 f"{self.repeat_rmse:.3g} N."
             )
-        text = " ".join([text, *self.reservations])
-        if self.undetermined:
-            text += f" Not determined: {', '.join(self.undetermined)}."
-        text = " ".join([text, *(str(each) for each in self.weak_combinations)])
-        return f"{text} The data {'justify' if self.justified else 'do not justify'} this friction for all runs."
+        return judged(text, self, "this friction for all runs")
 
     def plot(self, *, ax: Any = None) -> Any:
         """Plot the amplitude of the friction over the pressure, of each run and of the joint fit.

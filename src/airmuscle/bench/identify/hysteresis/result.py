@@ -196,11 +196,7 @@ class HysteresisFit(Reported):
                 f" On the second run the rms error changes from {self.repeat_rmse_without_friction:.3g} to "
                 f"{self.repeat_rmse:.3g} N; the repeatability of the runs is {self.repeatability:.3g} N."
             )
-        text = " ".join([text, *self.reservations])
-        if self.undetermined:
-            text += f" Not determined: {', '.join(self.undetermined)}."
-        text = " ".join([text, *(str(each) for each in self.weak_combinations)])
-        return f"{text} The data {'justify' if self.justified else 'do not justify'} this friction."
+        return judged(text, self, "this friction")
 
     @property
     def _gap_text(self) -> str:
@@ -242,6 +238,14 @@ class HysteresisFit(Reported):
             plots=(Plot("friction", f"Loop and hysteresis described by {law}.", self.plot),),
             references=self.friction.references,
         )
+
+
+def judged(text: str, fit: Any, what: str) -> str:
+    """A text on a fit, with its reservations, what it does not determine, and whether the data justify it."""
+    undetermined = [f"Not determined: {', '.join(fit.undetermined)}."] if fit.undetermined else []
+    weak = [str(each) for each in fit.weak_combinations]
+    verdict = f"The data {'justify' if fit.justified else 'do not justify'} {what}."
+    return " ".join([text, *fit.reservations, *undetermined, *weak, verdict])
 
 
 def assess_fit(

@@ -141,7 +141,7 @@ def predict_dynamic(
     notes += [*range_notes(recording, ranges, NOISY_MARGIN), *faster]
     notes += [f"the band of {q.name} is {q.band}" for q in quantities if q.half_width is None and q.band]
     outside = rows_outside(recording, ranges, NOISY_MARGIN)
-    driving = commands_at(plant, experiment)
+    driving = commands_at(plant, experiment.command, recording["time"] - experiment.start_time)
     prediction = RecordPrediction(recording, tuple(quantities), tuple(notes), outside, driving)
     return with_band_notes(prediction, [*other_air, *(["faster changes"] if faster else [])], USUAL)
 

@@ -88,15 +88,13 @@ def _baseline_columns(predictions: Sequence[RecordPrediction]) -> dict[str, Any]
     found = [(quantity, errors) for each in _with_baselines(predictions) for quantity, errors in each]
     if not any(errors for _, errors in found):
         return {}
-    names = {PERSISTENCE: PERSISTENCE, ARX: "ARX"}
-    columns: dict[str, Any] = {
-        f"rms error of {name}" if name == PERSISTENCE else f"rms error of an {name}": TableColumn(
-            [errors.get(name) for _, errors in found], BY_ROW, short=short
-        )
-        for name, short in names.items()
-    }
+    persistence, arx = ([errors.get(name) for _, errors in found] for name in (PERSISTENCE, ARX))
     skills = [skill(quantity.rms, errors) for quantity, errors in found]
-    return {**columns, "skill": TableColumn(skills, "1", digits=2)}
+    return {
+        f"rms error of {PERSISTENCE}": TableColumn(persistence, BY_ROW, short=PERSISTENCE),
+        f"rms error of an {ARX}": TableColumn(arx, BY_ROW, short="ARX"),
+        "skill": TableColumn(skills, "1", digits=2),
+    }
 
 
 def _with_baselines(
