@@ -46,7 +46,7 @@ def undocumented(answer: Any) -> list[str]:
 def _listed(name: str) -> dict[str, set[str] | None] | None:
     """What the page lists for a chapter, whose name may have a prefix of a campaign, a number, or a group."""
     plain = re.sub(r"^(fill|release)_|(_\d+|_run|_specimen)$", "", name)
-    numbered = re.sub(r"_\d+$", "_N", name)
+    numbered = re.sub(r"_\d+$", "_N", re.sub("^(fill|release)_", "", name))
     return next((documented()[each] for each in (name, numbered, plain) if each in documented()), None)
 
 

@@ -41,6 +41,13 @@ def result(tmp_path_factory):
     return rig, out, json.loads(done.stdout)["campaign"]
 
 
+def test_two_processes_find_what_one_does(result, tmp_path):
+    rig, _, alone = result
+    done = run(rig, "--validate", rig / "later.csv", "--out", tmp_path / "out", "--json", "--workers", "2")
+    assert done.exit_code == 0, done.stderr
+    assert json.loads(done.stdout)["campaign"] == alone
+
+
 def test_a_file_that_cannot_be_read_is_named_and_left_out(result):
     _, out, data = result
     assert [file["file"] for file in data["unread"]] == ["notes.csv"]
