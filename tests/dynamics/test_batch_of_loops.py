@@ -28,6 +28,7 @@ from airmuscle.engine import (
     simulate_batch,
     solve,
 )
+from airmuscle.engine.compile.cache.kernel import loop_lanes
 from airmuscle.engine.run import BoundIntegrator
 from airmuscle.errors import ParameterError
 from airmuscle.physics import HangingMass, Plant
@@ -73,6 +74,14 @@ def test_plants_and_gains_differ(drivers, integrator):
         in_lanes = not drivers and isinstance(integrator, RungeKutta4)
         assert_rows_are(batch, row, alone(plant, own, integrator), names, LANES if in_lanes else 0.0)
     assert np.unique(batch["position"][:, -1]).size == 3
+
+
+def test_loops_in_lanes_are_machine_code_that_is_stored():
+    """Otherwise numba compiles them in each process."""
+    simulate_batch(LIFT, {"mechanism.mass": np.array([1.0, 2.0])}, ControlLoop(PI, 0.0125, STEPS), duration=0.1,
+                   integrator=RungeKutta4(1e-3))  # fmt: skip
+    assert loop_lanes._entries
+    assert all(loop_lanes._entries.values())
 
 
 def test_each_plant_may_have_its_own_loop():

@@ -35,6 +35,14 @@ def measure_lanes(y: Any, o: Any, measured_at: Any, measured: Any, k: Any, sampl
 
 
 @PART
+def copy_table(source: Any, target: Any) -> None:
+    """Copy a table of its size; an assignment of slices would need numba at run time."""
+    for i in range(target.shape[0]):
+        for lane in range(target.shape[1]):
+            target[i, lane] = source[i, lane]
+
+
+@PART
 def command_lanes(
     command: Any, low: Any, high: Any, commanded_at: Any, k: Any, first: Any, values: Any, commands: Any, status: Any
 ) -> None:
@@ -165,12 +173,12 @@ def loop_lanes(
         if needs_outputs:
             invoke(outputs, (pointer(y), pointer(u), pointer(c), pointer(o)))
         measure_lanes(y, o, measured_at, measured, k, samples, status)
-        setpoint[:, :] = setpoints[k]
+        copy_table(setpoints[k], setpoint)
         invoke(sample, (
             pointer(measured), pointer(setpoint), pointer(memory), pointer(low), pointer(high), pointer(period),
             pointer(parameters), pointer(command), pointer(later),
         ))  # fmt: skip
-        memory[:, :] = later
+        copy_table(later, memory)
         command_lanes(command, low, high, commanded_at, k, first, values, commands, status)
         for s in range(first[k], first[k + 1]):
             row = advance_segment(
