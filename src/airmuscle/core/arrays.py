@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -96,18 +96,19 @@ def make_program(function: Any, output: int, columns: Sequence[int]) -> ArrayPro
     return None if program is None else _without_unused(program)
 
 
+def instructions_of(function: Any) -> Iterator[tuple[int, list[int], list[int]]]:
+    """Operation, places of the results and places of the arguments of each instruction of a CasADi function."""
+    for k in range(function.n_instructions()):
+        yield function.instruction_id(k), function.instruction_output(k), function.instruction_input(k)
+
+
 def _read(function: Any, output: int, wanted: dict[int, int]) -> ArrayProgram | None:
     """All instructions, with a new register for every result."""
     import casadi
 
     operations, current = _operations(), dict[int, int]()
     constants, inputs, steps, outputs = [], [], [], []
-    for k in range(function.n_instructions()):
-        code, target, source = (
-            function.instruction_id(k),
-            function.instruction_output(k),
-            function.instruction_input(k),
-        )
+    for k, (code, target, source) in enumerate(instructions_of(function)):
         if code == casadi.OP_OUTPUT:
             if target[0] == output and target[1] in wanted:
                 outputs.append((wanted[target[1]], current[source[0]]))

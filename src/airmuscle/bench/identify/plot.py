@@ -52,10 +52,7 @@ def _groups(
 ) -> Iterator[tuple[npt.NDArray[np.bool_], str, dict[str, Any]]]:
     """Rows, label and marker of the uncensored and of the censored points, where there are any."""
     size = 3.5 if measured.size < MANY_POINTS else 1.8
-    for rows, colour, marker, label in (
-        (~censored, BLUE, "o", "measured"),
-        (censored, RED, "x", "censored (bound)"),
-    ):
+    for rows, colour, marker, label in ((~censored, BLUE, "o", "measured"), (censored, RED, "x", "censored (bound)")):
         if np.any(rows):
             yield rows, label, {"color": colour, "marker": marker, "linestyle": "none", "markersize": size}
 

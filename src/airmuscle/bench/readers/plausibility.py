@@ -33,12 +33,7 @@ MAX_MAGNITUDE = 1e15
 
 
 def check_plausible(
-    table: RawTable,
-    columns: Mapping[str, Array],
-    resting_length: float | None,
-    ambient: float,
-    *,
-    ordered: bool = True,
+    table: RawTable, columns: Mapping[str, Array], resting_length: float | None, ambient: float, *, ordered: bool = True
 ) -> None:
     """Raise ColumnError, with row and value, at the first value that cannot be a measurement."""
     for name, values in columns.items():

@@ -200,10 +200,7 @@ def read_large_csv(
 
 
 def read_text_stream(
-    stream: BinaryIO,
-    origin: str,
-    text_format: TextFormat = TextFormat(),
-    downsampling: Downsampling = Decimation(),
+    stream: BinaryIO, origin: str, text_format: TextFormat = TextFormat(), downsampling: Downsampling = Decimation()
 ) -> RawTable:
     """The table in a stream, such as a pipe, which is read once to its end and has an unknown length.
 

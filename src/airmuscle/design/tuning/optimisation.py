@@ -142,13 +142,7 @@ def tune(
     duration = _check_options(duration, index, objective, budget, seed, len(family))
     ranges = gain_ranges(family[0].controller, bounds)
     evaluator = Evaluator(
-        family,
-        group_cases(family, index),
-        tuple(each.path for each in ranges),
-        duration,
-        index,
-        integrator,
-        start_time,
+        family, group_cases(family, index), tuple(each.path for each in ranges), duration, index, integrator, start_time
     )
     search = _Search(evaluator, ranges, objective, budget, progress or (lambda done, total: None))
     given = search.given(start)

@@ -98,10 +98,7 @@ def _to_text(tables: Mapping[str, Any]) -> str:
 def model_table(thing: Any) -> dict[str, Any]:
     """A model as the table that `build` reads; fields that are None have this default and are left out."""
     fields = {f.name: getattr(thing, f.name) for f in dataclasses.fields(thing) if f.init}
-    return {
-        "model": type(thing).__name__,
-        **{name: value for name, value in fields.items() if value is not None},
-    }
+    return {"model": type(thing).__name__, **{name: value for name, value in fields.items() if value is not None}}
 
 
 def _plain(value: Any) -> Any:

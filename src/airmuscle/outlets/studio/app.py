@@ -34,13 +34,7 @@ from .security import (
     secured,
 )
 from .size_sheet import size_form, size_sheet
-from .tasks import (
-    MAX_TEXT,
-    sheet_of_law,
-    sheet_of_law_text,
-    sheet_of_library_plant,
-    sheet_of_scenario_text,
-)
+from .tasks import MAX_TEXT, sheet_of_law, sheet_of_law_text, sheet_of_library_plant, sheet_of_scenario_text
 from .worker import LimitError, WorkerPool
 
 WORKERS = 5

@@ -8,6 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from ...core import autodiff
+from ...core.arrays import instructions_of
 from .expression import FUNCTIONS, MAXIMUM, MINIMUM, POWER, Expressions, Node, in_order, is_number
 
 Bounds = tuple[float, float]
@@ -42,12 +43,7 @@ def _read(function: Any, new: Expressions, arguments: Sequence[Node], parameters
     import casadi
 
     kinds, current, result = _kinds(), dict[int, Node](), new.number(0.0)
-    for k in range(function.n_instructions()):
-        code, target, source = (
-            function.instruction_id(k),
-            function.instruction_output(k),
-            function.instruction_input(k),
-        )
+    for k, (code, target, source) in enumerate(instructions_of(function)):
         if code == casadi.OP_OUTPUT:
             result = current[source[0]]
         elif code == casadi.OP_CONST:

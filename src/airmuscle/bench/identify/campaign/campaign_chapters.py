@@ -44,9 +44,7 @@ def count_records(campaign: Campaign, stage: str) -> int:
     return sum(record.kind in _KINDS[stage] for record in campaign.records)
 
 
-def stage_result(
-    stage: CreepStage | FrictionStage | StaticStage | FillStage | ReleaseStage | LeftOutStage,
-) -> str:
+def stage_result(stage: CreepStage | FrictionStage | StaticStage | FillStage | ReleaseStage | LeftOutStage) -> str:
     """Return the result of a stage in one sentence."""
     if isinstance(stage, FrictionStage):
         return _friction_result(stage)

@@ -123,10 +123,7 @@ def plot_amplitudes(runs: Sequence[RunAgreement], friction: Friction, name: str,
     else:
         axes = given_axes(ax, 1, "plot of a friction")[0]
     axes.plot(
-        grid / 1e3,
-        [at_one * float(friction.pressure_factor(p)) for p in grid],
-        color=LINES[1],
-        label="joint fit",
+        grid / 1e3, [at_one * float(friction.pressure_factor(p)) for p in grid], color=LINES[1], label="joint fit"
     )
     axes.errorbar(
         pressure / 1e3, own, 2.0 * error, fmt="o", color=LINES[0], capsize=3, label="each run alone, 2 standard errors"

@@ -137,10 +137,7 @@ def entry_point(function: str, kinds: Sequence[str]) -> str:
 
 
 def _load(name: str, kind: str, slot: int) -> list[str]:
-    return [
-        f"{name}.at = getelementptr i8, ptr %slots, i64 {8 * slot}",
-        f"{name} = load {kind}, ptr {name}.at",
-    ]
+    return [f"{name}.at = getelementptr i8, ptr %slots, i64 {8 * slot}", f"{name} = load {kind}, ptr {name}.at"]
 
 
 def _load_array(x: str, dimensions: int, item: int, slot: int) -> list[str]:

@@ -8,6 +8,7 @@ import functools
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
+from ....core.arrays import instructions_of
 from ....core.errors import TraceError
 
 Operand = tuple[Any, ...]
@@ -124,9 +125,7 @@ def recorded(inputs: Sequence[Any], outputs: Sequence[Any]) -> Code:
     current: dict[int, Operand] = {}
     body: list[Instruction] = []
     results: list[tuple[int, int, Operand]] = []
-    for k in range(function.n_instructions()):
-        code = function.instruction_id(k)
-        target, source = function.instruction_output(k), function.instruction_input(k)
+    for k, (code, target, source) in enumerate(instructions_of(function)):
         if code == casadi.OP_CONST:
             current[target[0]] = ("c", function.instruction_constant(k))
         elif code == casadi.OP_INPUT:
