@@ -19,6 +19,7 @@ import batch
 import bootstrap
 import calls
 import components
+import control_tools
 import controllers
 import derivative
 import environments
@@ -59,6 +60,7 @@ SECTIONS: tuple[tuple[Callable[[int], Section], int], ...] = (
     (static_fit.section, 15),
     (live.section, 1),
     (controllers.section, 20),
+    (control_tools.section, 5),
     (environments.section, 9),
     (learning.section, 9),
     (bootstrap.section, 5),

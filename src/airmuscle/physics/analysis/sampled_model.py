@@ -111,16 +111,16 @@ class SampledModel:
 
 def responses_at(model: Any, points: npt.NDArray[np.complex128], frequencies: Array) -> npt.NDArray[np.complex128]:
     """C (s I - A)^-1 B + D (F, k, m) of a model at points s (F,), which belong to frequencies (F,) [Hz]."""
-    responses, unit = [], np.eye(len(model.A))
-    for point, f in zip(points, frequencies, strict=True):
-        try:
-            responses.append(model.C @ np.linalg.solve(point * unit - model.A, model.B) + model.D)
-        except np.linalg.LinAlgError:
-            raise ParameterError(
-                f"frequency_response: there is a pole at {f:g} Hz, and the response is infinite (for enclosed air at "
-                "0 Hz). Choose another frequency."
-            ) from None
-    return np.array(responses, dtype=complex).reshape(-1, *model.D.shape)
+    matrices = points[:, None, None] * np.eye(len(model.A)) - model.A
+    try:
+        states = np.linalg.solve(matrices, np.broadcast_to(model.B, (len(points), *model.B.shape)))
+    except np.linalg.LinAlgError:
+        f = frequencies[int(np.argmin(np.abs(np.linalg.det(matrices))))]
+        raise ParameterError(
+            f"frequency_response: there is a pole at {f:g} Hz, and the response is infinite (for enclosed air at "
+            "0 Hz). Choose another frequency."
+        ) from None
+    return np.asarray(model.C @ states + model.D, dtype=complex).reshape(-1, *model.D.shape)
 
 
 def checked_frequencies(frequencies: npt.ArrayLike) -> Array:

@@ -148,3 +148,17 @@ def solve_row(factor: Any, row: Any) -> None:
         for k in range(i + 1, p):
             row[i] -= factor[k, i] * row[k]
         row[i] /= factor[i, i]
+
+
+@PART
+def solve_factor(factor: Any, count: Any, x: Any) -> None:
+    """Replace the first `count` numbers of `x` by the solution of L L^T y = x with the factor L."""
+    for i in range(count):
+        for k in range(i):
+            x[i] -= factor[i, k] * x[k]
+        x[i] /= factor[i, i]
+    for j in range(count):
+        last = count - 1 - j
+        for k in range(last + 1, count):
+            x[last] -= factor[k, last] * x[k]
+        x[last] /= factor[last, last]

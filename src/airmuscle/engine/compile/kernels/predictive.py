@@ -8,7 +8,8 @@ from typing import Any
 import numba
 
 from ....core.diagnostics import Status
-from .calls import PART
+from .calls import CONTRACTED_PART, PART
+from .matrices import solve_factor
 
 DONE, SINGULAR, NOT_CONVERGED = Status.DONE.value, Status.SINGULAR.value, Status.NOT_CONVERGED.value
 ITERATIONS, FEASIBLE, ACCURATE, DEPENDENT = 10, 1e-9, 1e-6, 1e-12
@@ -17,7 +18,7 @@ a limit that is active, before the refinement; square of the distance of such a 
 from the space of the active ones up to which it depends on them (chosen)."""
 
 
-@PART
+@CONTRACTED_PART
 def add_product(row: Any, x: Any, count: Any, value: Any) -> Any:
     """`value` + the product of the first `count` numbers of `row` and `x`."""
     total = value
@@ -43,20 +44,6 @@ def extend_factor(m: Any, order: Any, count: Any, row: Any, factor: Any) -> Any:
 
 
 @PART
-def solve_factor(factor: Any, count: Any, x: Any) -> None:
-    """Replace the first `count` numbers of `x` by the solution of L L^T y = x with the factor L."""
-    for i in range(count):
-        for k in range(i):
-            x[i] -= factor[i, k] * x[k]
-        x[i] /= factor[i, i]
-    for j in range(count):
-        last = count - 1 - j
-        for k in range(last + 1, count):
-            x[last] -= factor[k, last] * x[k]
-        x[last] /= factor[last, last]
-
-
-@PART
 def release(m: Any, order: Any, count: Any, place: Any, factor: Any, multipliers: Any, active: Any) -> None:
     """Remove the active row at a place, of `count`."""
     active[order[place]] = 0.0
@@ -78,18 +65,20 @@ def vector_of(m: Any, order: Any, count: Any, multipliers: Any, w: Any) -> None:
 
 @PART
 def solve_active(
-    m: Any, lower: Any, upper: Any, active: Any, order: Any, count: Any, factor: Any, wanted: Any, rest: Any, w: Any
+    m: Any, lower: Any, upper: Any, active: Any, order: Any, count: Any, factor: Any, passes: Any, wanted: Any,
+    rest: Any, w: Any,
 ) -> Any:  # fmt: skip
-    """The multipliers with which the active rows have their limits, with one refinement; the error that was left."""
+    """The multipliers with which the active rows have their limits, in one or two passes; the error before the last."""
     error = 0.0
     for k in range(count):
         wanted[k] = 0.0
-    for _ in range(2):
-        vector_of(m, order, count, wanted, w)
+    for turn in range(passes):
+        if turn > 0:
+            vector_of(m, order, count, wanted, w)
         error = 0.0
         for k in range(count):
             limit = upper[order[k]] if active[order[k]] > 0.0 else lower[order[k]]
-            rest[k] = add_product(m[order[k]], w, w.shape[0], -limit)
+            rest[k] = add_product(m[order[k]], w, w.shape[0], -limit) if turn > 0 else -limit
             error = max(error, abs(rest[k]) / (1.0 + abs(limit)))
         solve_factor(factor, count, rest)
         for k in range(count):
@@ -157,17 +146,25 @@ def exchange(
 
 
 @PART
+def append_row(m: Any, row: Any, order: Any, count: Any, factor: Any, multipliers: Any) -> Any:
+    """Make a row the last active one, without a multiplier, if it is independent; whether it is."""
+    independent = False
+    if count < m.shape[1]:
+        independent = extend_factor(m, order, count, row, factor)
+    if independent:
+        order[count] = row
+        multipliers[count] = 0.0
+    return independent
+
+
+@PART
 def begin_active(m: Any, active: Any, order: Any, factor: Any, multipliers: Any) -> Any:
     """Take the rows that were active, without multipliers; how many are independent."""
     count = 0
     for i in range(m.shape[0]):
         if active[i] != 0.0:
-            independent = False
-            if count < m.shape[1]:
-                independent = extend_factor(m, order, count, i, factor)
+            independent = append_row(m, i, order, count, factor, multipliers)
             if independent:
-                order[count] = i
-                multipliers[count] = 0.0
                 count += 1
             else:
                 active[i] = 0.0
@@ -190,8 +187,9 @@ def shortest_vector(
     """
     count = begin_active(m, active, order, factor, multipliers)
     status = NOT_CONVERGED
+    passes = 1
     for _ in range(ITERATIONS * m.shape[0] + ITERATIONS):
-        error = solve_active(m, lower, upper, active, order, count, factor, change, rest, w)
+        error = solve_active(m, lower, upper, active, order, count, factor, passes, change, rest, w)
         for k in range(count):
             change[k] -= multipliers[k]
         place = blocking_place(order, count, active, multipliers, change)
@@ -204,17 +202,16 @@ def shortest_vector(
             continue
         vector_of(m, order, count, multipliers, w)
         row = worst_row(m, lower, upper, active, w)
+        if row < 0 and passes == 1:
+            passes = 2
+            continue
         if row < 0:
             status = DONE if error < ACCURATE else NOT_CONVERGED
             break
         value = add_product(m[row], w, m.shape[1], 0.0)
         active[row] = 1.0 if value > upper[row] else -1.0
-        possible = False
-        if count < m.shape[1]:
-            possible = extend_factor(m, order, count, row, factor)
+        possible = append_row(m, row, order, count, factor, multipliers)
         if possible:
-            order[count] = row
-            multipliers[count] = 0.0
             count += 1
         else:
             possible = exchange(m, row, order, count, active, factor, multipliers, change)
@@ -255,7 +252,7 @@ def find_limits(
             upper[i] += scale[i] * high[of_input[i]]
 
 
-@numba.njit(error_model="numpy", nogil=True)
+@numba.njit(error_model="numpy", fastmath={"contract", "reassoc"}, nogil=True)
 def predictive_sample(
     y: Any, r: Any, low: Any, high: Any, by_output: Any, gain: Any, transition: Any, by_input: Any, rest: Any, m: Any,
     of_input: Any, scale: Any, fixed_low: Any, fixed_high: Any, by_point: Any, plan_by_w: Any, plan_by_point: Any,
