@@ -240,7 +240,7 @@ class RepetitiveControl(EnclosingLaw):
 
         linear_loop  of the enclosed `law` at the working point, with the same sample time
 
-        Raises ParameterError where that loop is not stable, or does not have the column.
+        Raises ParameterError where that loop is not stable.
         """
         if not linear_loop.is_stable:
             raise ParameterError(
@@ -248,11 +248,6 @@ class RepetitiveControl(EnclosingLaw):
                 f"{linear_loop.poles[0]:.4g}. Stabilise it first; repetitive control needs a stable loop."
             )
         closed = linear_loop.closed
-        for kind, names in (("set points", closed.inputs), ("columns", closed.outputs)):
-            if self.column not in names:
-                raise ParameterError(
-                    f"RepetitiveControl: '{self.column}' is not among the {kind} of the loop, {', '.join(names)}."
-                )
         omega = np.linspace(0.0, math.pi, 4001)[1:]  # their number is chosen
         response = closed.frequency_response(omega / (2.0 * math.pi * linear_loop.sample_time))
         t = response[:, closed.outputs.index(self.column), closed.inputs.index(self.column)]

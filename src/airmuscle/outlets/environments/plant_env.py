@@ -73,7 +73,8 @@ class PlantEnv(gymnasium.Env):  # type: ignore[misc, unused-ignore]
         parameters, states = self._draw.begin(self.np_random.random((1, self._draw.dimension)))
         outputs = self._stepper.begin(parameters[0], states[0])
         self._elapsed = 0
-        self._show()
+        if self.render_mode == "human":
+            self.render()
         return outputs[: self._count].astype(np.float32), {}
 
     def step(self, action: Any) -> tuple[npt.NDArray[np.float32], float, bool, bool, dict[str, Any]]:
@@ -100,7 +101,8 @@ class PlantEnv(gymnasium.Env):  # type: ignore[misc, unused-ignore]
         reward, terminated = float(outputs[-2]), bool(outputs[-1] > 0.5)
         effort = self.task.effort_weight * sum(u * u for u in inputs[:-1]) / self._actions
         terms = {"closeness": reward + effort, "effort": effort}
-        self._show()
+        if self.render_mode == "human":
+            self.render()
         return outputs[: self._count].astype(np.float32), reward, terminated, False, terms
 
     def render(self) -> Any:
@@ -118,11 +120,6 @@ class PlantEnv(gymnasium.Env):  # type: ignore[misc, unused-ignore]
         self._window.set_data(self._picture())
         plt.pause(1e-3)
         return None
-
-    def _show(self) -> None:
-        """Show the state where a person looks at it."""
-        if self.render_mode == "human":
-            self.render()
 
     def close(self) -> None:
         """Close the window."""

@@ -46,7 +46,7 @@ class PrintedPredictive(PrintedController):
                 for name, array in arrays.items() if name not in {*FRAME, *law.constants}
             ).rstrip(),
             "arguments": ", ".join(f"{self.name}_{name}" if name in known else name for name in arrays),
-            **{f"{name}_at": str(at) for name, at in zip(law.init()._fields, _places(law), strict=True)},
+            **{f"{name}_at": str(list(law.initial_memory).index(f"{name}0")) for name in law.init()._fields},
             "measured": str(len(law.measured)), "controlled": str(len(law.controlled)),
         }  # fmt: skip
         return {
@@ -82,11 +82,6 @@ def print_predictive(prepared: SampledLoop, name: str, title: str) -> PrintedPre
     return PrintedPredictive(
         name, law, {}, {}, [prepared.ranges[n] for n in law.inputs], (), lines, tolerance=TOLERANCE
     )
-
-
-def _places(law: LinearModelPredictive) -> list[int]:
-    """Where the parts of the memory begin among its values."""
-    return [int(at) for at in np.cumsum([0, *(len(each) for each in law.init()[:-1])])]
 
 
 def _table(name: str, array: Array) -> str:
