@@ -48,6 +48,8 @@ def main() -> None:
     for row in (9, 19, 29, 39):
         errors = np.degrees(np.sqrt(np.mean(fit.errors[:, row] ** 2, axis=0)))
         print(f"after {fit.horizon[row]:.3f} s: {', '.join(f'{e:.2f}' for e in errors)} deg")
+    for each in fit.regulators:
+        print(each)
     judged = episodes[-given.left_out :]
     for any_pose in (False, True):
         print(f"from {'any pose' if any_pose else 'the poses in which episodes begin'}:")

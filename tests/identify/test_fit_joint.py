@@ -5,13 +5,15 @@ The reduced arm has not the form of the plant that made the record: gravity ente
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from arm_episodes import changed, made_episodes
 from command_line import airmuscle
 
 import airmuscle as am
-from airmuscle.bench import estimate_angles, fit_joint
+from airmuscle.bench import RegulatorLag, estimate_angles, fit_joint, fit_regulator_lags
 from airmuscle.errors import ParameterError
 
 EPISODES = made_episodes(30)
@@ -78,6 +80,34 @@ def test_a_joint_that_does_not_move_is_not_seen(fitted):
     assert estimate_angles(fit, at_rest, any_pose=True).unseen[0] > estimate_angles(fit, EPISODES[24:26]).unseen[0]
     with pytest.raises(ParameterError, match="the episodes have 2 joints and 4 pressures, the fit 1 and 2"):
         estimate_angles(fit, made_episodes(1, joints=2))
+
+
+@pytest.mark.parametrize("increments", [True, False])
+def test_a_regulator_is_found_from_commands_and_pressures(increments):
+    """Pressures of a known regulator: limited level, two lags, two rows of delay; the prediction sees commands alone."""
+    rng = np.random.default_rng(0)
+    truth = RegulatorLag((2e-1, 0.7, 0.4, 0.0, 0.0, 0.0, 3.0, 0.5), 2, increments)
+    runs = []
+    for run in made_episodes(12).runs:
+        command = rng.normal(size=run.pressure.shape) if increments else rng.uniform(-3.0, 10.0, run.pressure.shape)
+        pressure = np.full_like(command, 1e5)
+        settled = np.concatenate([np.zeros((10, 2)), command])
+        for i in range(2):
+            whole = np.full((1, len(settled)), 1e5)
+            pressure[:, i] = truth.pressures(whole, settled[None, :, i])[0, 10:]
+        runs.append(replace(run, pressure=pressure, command=command))
+    episodes = replace(EPISODES, runs=tuple(runs))
+    (found, _) = fit_regulator_lags(episodes, 40)
+    assert (found.increments, found.delay) == (increments, 2)
+    assert found.values[0] == pytest.approx(0.2, rel=0.1)
+    pressure, command = (np.array([getattr(run, name)[:, 0] for run in runs]) for name in ("pressure", "command"))
+    assert np.sqrt(np.mean((found.pressures(pressure, command) - pressure) ** 2)) < 5e3
+
+
+def test_commands_predict_the_angle_where_they_are_the_pressures(fitted):
+    fit, _ = fitted
+    assert np.degrees(np.sqrt(np.mean(fit.commanded**2))) < 2 * np.degrees(fit.rms[0])
+    assert "model, from commands" in str(fit)
 
 
 def test_impossible_arguments_are_refused():

@@ -108,8 +108,10 @@ from .joint import EpisodeInspection as EpisodeInspection
 from .joint import EpisodeMapping as EpisodeMapping
 from .joint import Episodes as Episodes
 from .joint import PressureAction as PressureAction
+from .joint import RegulatorLag as RegulatorLag
 from .joint import estimate_angles as estimate_angles
 from .joint import fit_joint as fit_joint
+from .joint import fit_regulator_lags as fit_regulator_lags
 from .joint import inspect_episodes as inspect_episodes
 from .joint import read_episode_mapping as read_episode_mapping
 from .joint import read_episodes as read_episodes

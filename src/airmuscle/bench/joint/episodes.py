@@ -103,7 +103,12 @@ def in_pairs(episodes: Episodes, pairs: Sequence[tuple[int, int]]) -> Episodes:
         raise ParameterError(
             f"fit_joint: pairs are {tuple(pairs)}; there are pressures 1 to {episodes.muscles}, each in one pair."
         )
-    runs = [dataclasses.replace(run, pressure=run.pressure[:, order]) for run in episodes.runs]
+    runs = [
+        dataclasses.replace(
+            run, pressure=run.pressure[:, order], command=None if run.command is None else run.command[:, order]
+        )
+        for run in episodes.runs
+    ]
     return dataclasses.replace(episodes, runs=tuple(runs))
 
 

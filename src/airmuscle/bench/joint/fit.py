@@ -24,6 +24,7 @@ from .descent import CLIP, Descent, SearchStage, gradients, typical_size
 from .episode_inspection import check_episodes, inspect_episodes
 from .episodes import HISTORY, ROWS, Episodes, Windows, cut, in_pairs
 from .free_run import band, baseline_errors, free_run, rms
+from .regulators import fit_regulator_lags, from_commands
 from .result import ArmFit, ArmParameter
 
 STRENGTHS = (1.0, 6.0)
@@ -59,7 +60,8 @@ def fit_joint(
 
     Forces are linear in pressure with polynomials of the angle (LinearInPressure), friction sticks and grows with the
     tensions (StickSlip), a lag of each muscle and a common delay of the sensors are found; zero and gain of a pressure
-    are absorbed. The objective is the robust error of the free run over windows of 40 rows, with exact gradients.
+    are absorbed. Where episodes have commands, a regulator of each muscle is identified, too. The objective is the
+    robust error of the free run over windows of 40 rows, with exact gradients.
     Raises IdentificationError for episodes that `inspect_episodes` refuses, ParameterError for impossible arguments.
     """
     if not 0.0 < left_out < 1.0 or len(episodes) < 4:
@@ -81,6 +83,8 @@ def fit_joint(
     arm, paths = _search(ordered[:split], train, tuple(axes), seed, progress)
     errors = free_run(arm, judge) - judge.angle[:, HISTORY + 1 :]
     others = baseline_errors(ordered[:split], ordered[split:], rows)
+    regulators = fit_regulator_lags(ordered[:split], rows)
+    commanded = from_commands(regulators, ordered[split:], inspection.delay, rows) if regulators else None
     separated = [separate(arm, joint, own, train) for joint, own in paths.items()]
     remarks = [
         *inspection.remarks,
@@ -91,6 +95,7 @@ def fit_joint(
     return ArmFit(
         arm, inspection, found, errors, judge.episode, others, band(errors),
         tuple({e.path: e for each, _ in separated for e in each}.values()), tuple(dict.fromkeys(remarks)), split,
+        regulators, None if commanded is None else free_run(arm, commanded) - judge.angle[:, HISTORY + 1 :],
     )  # fmt: skip
 
 

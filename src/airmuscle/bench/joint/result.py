@@ -18,6 +18,7 @@ from ..reported import Reported
 from .episode_inspection import EpisodeInspection
 from .episodes import Episode, Episodes, in_pairs
 from .free_run import COVERAGE, angles, coverage, rms
+from .regulators import RegulatorLag
 
 SUPPLY = 6e5
 """Gauge pressure [Pa] of the supply of the plant (chosen)."""
@@ -45,6 +46,8 @@ class ArmFit(Reported):
     estimates    parameters with their standard errors
     remarks      what the record does not separate, and what the fit left out
     fitted       number of the episodes, the first ones, to which the arm is fitted
+    regulators   of the muscles of `arm`, between command and pressure; empty where the episodes have no commands
+    commanded    errors as `errors`, of the free run from the commands alone, or None
     """
 
     arm: PressureDriven
@@ -57,6 +60,8 @@ class ArmFit(Reported):
     estimates: tuple[ArmParameter, ...]
     remarks: tuple[str, ...]
     fitted: int
+    regulators: tuple[RegulatorLag, ...] = ()
+    commanded: Array | None = None
 
     @property
     def rms(self) -> Array:
@@ -123,7 +128,8 @@ class ArmFit(Reported):
         )
 
     def _error_table(self) -> Table:
-        rows = {name: rms(errors) for name, errors in self.by_baseline.items()} | {"model": self.rms}
+        found = {"model": self.errors} | ({} if self.commanded is None else {"model, from commands": self.commanded})
+        rows = {name: rms(errors) for name, errors in {**self.by_baseline, **found}.items()}
         columns: dict[str, Any] = {"prediction by": list(rows)}
         for j in range(self.errors.shape[2]):
             columns[f"joint {j + 1}"] = TableColumn([values[j] for values in rows.values()], "rad", "deg", 3)
