@@ -8,8 +8,8 @@ from .episode_inspection import inspect_episodes as inspect_episodes
 from .episodes import Episode as Episode
 from .episodes import Episodes as Episodes
 from .fit import fit_joint as fit_joint
-from .regulators import RegulatorLag as RegulatorLag
-from .regulators import fit_regulator_lags as fit_regulator_lags
+from .free_run import RegulatorLag as RegulatorLag
+from .free_run import fit_regulator_lags as fit_regulator_lags
 from .result import AngleEstimate as AngleEstimate
 from .result import ArmFit as ArmFit
 from .result import ArmParameter as ArmParameter

@@ -23,8 +23,7 @@ from ...physics import (
 from .descent import CLIP, Descent, SearchStage, gradients, typical_size
 from .episode_inspection import check_episodes, inspect_episodes
 from .episodes import HISTORY, ROWS, Episodes, Windows, cut, in_pairs
-from .free_run import band, baseline_errors, free_run, rms
-from .regulators import fit_regulator_lags, from_commands
+from .free_run import band, baseline_errors, fit_regulator_lags, free_run, from_commands, rms
 from .result import ArmFit, ArmParameter
 
 STRENGTHS = (1.0, 6.0)
@@ -86,12 +85,8 @@ def fit_joint(
     regulators = fit_regulator_lags(ordered[:split], rows)
     commanded = from_commands(regulators, ordered[split:], inspection.delay, rows) if regulators else None
     separated = [separate(arm, joint, own, train) for joint, own in paths.items()]
-    remarks = [
-        *inspection.remarks,
-        SCALE,
-        *(text for _, texts in separated for text in texts),
-        *_contacts(ordered, errors, judge, split),
-    ]
+    remarks = [*inspection.remarks, SCALE, *(text for _, texts in separated for text in texts)]
+    remarks += _contacts(ordered, errors, judge, split)
     return ArmFit(
         arm, inspection, found, errors, judge.episode, others, band(errors),
         tuple({e.path: e for each, _ in separated for e in each}.values()), tuple(dict.fromkeys(remarks)), split,

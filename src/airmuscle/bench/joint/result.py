@@ -17,8 +17,7 @@ from ...report import Chapter, NamedValue, Plot, Table, TableColumn
 from ..reported import Reported
 from .episode_inspection import EpisodeInspection
 from .episodes import Episode, Episodes, in_pairs
-from .free_run import COVERAGE, angles, coverage, rms
-from .regulators import RegulatorLag
+from .free_run import COVERAGE, RegulatorLag, angles, coverage, rms
 
 SUPPLY = 6e5
 """Gauge pressure [Pa] of the supply of the plant (chosen)."""
