@@ -43,11 +43,6 @@ class LearningCurve(ShortRepr):
     signal: Array
     spread: float
 
-    @property
-    def is_monotone(self) -> bool:
-        """Whether no trial is worse than the one before by more than the noise explains."""
-        return bool((np.diff(self.errors) <= self.spread).all())
-
 
 def learn(
     joint: BenchmarkJoint, contender: ContenderResult, task: ControlTask, *, trials: int = 31, cutoff: float = 12.0,
