@@ -27,9 +27,11 @@ from airmuscle.control import (
     Multirate,
     OnOffController,
     ProportionalFeedback,
+    RepetitiveControl,
     SetpointCommand,
     SetpointLead,
     SlidingMode,
+    SmithPredictor,
     StateFeedback,
     StaticFeedForward,
     StaticInverse,
@@ -97,7 +99,8 @@ def laws(regulated: Scenario) -> dict[str, ControlLaw]:
         GainSchedule(pid, "gain", "angular_speed", (0.0, 1.0), (2e5, 3e5)),
         HysteresisCompensation(pid, first, HysteresisOperator((0.0, 1e4), (1.0, 0.5)).inverse),
         Multirate(pid, 4), WithCommandDelay(pid, 2, 1, 0.1, 3.0), WithRateLimit(pid, (1e6,)), WithManual(pid, 0.3),
-        WithFilter.notch(pid, "angle", 5.0),
+        WithFilter.notch(pid, "angle", 5.0), SmithPredictor(pid, "angle", first, 3, 2e-6, 0.1),
+        RepetitiveControl(pid, "angle", 20, 2),
     )  # fmt: skip
     return {type(law).__name__: law for law in found}
 
