@@ -31,7 +31,7 @@ _KINDS = (
 
 MAX_TOML, MAX_KEYS = 4_000_000, 50
 """Maximum size of a TOML file [bytes], and parts of a key (chosen): the parser takes the square of the latter."""
-_DEEP_KEY = re.compile(r"(?:[\w-]+[ \t]*\.[ \t]*)" + f"{{{MAX_KEYS}}}")
+_DEEP_KEY = re.compile(r"(?<![\w-])(?:[\w-]+[ \t]*\.[ \t]*)" + f"{{{MAX_KEYS}}}")
 
 
 def check_regular_file(path: Path) -> None:
