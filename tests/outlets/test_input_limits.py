@@ -88,9 +88,9 @@ def test_a_run_of_more_rows_than_a_command_writes_is_refused(tmp_path: Path):
 def test_a_message_lists_the_first_columns_of_a_wide_table(tmp_path: Path):
     head = ",".join(f"channel number {i} of the {'long ' * 20} test rig" for i in range(500))
     (tmp_path / "wide.csv").write_text(f"{head}\n" + ",".join(["1"] * 500) + "\n", encoding="utf-8")
-    with pytest.raises(ColumnError, match=r"channel number 39 .*…, and 460 more\)") as raised:
+    with pytest.raises(ColumnError, match=r"channel number 1 .*…, and 498 more\)") as raised:
         read(tmp_path / "wide.csv")
-    assert len(str(raised.value)) < 3500
+    assert len(str(raised.value)) < 700
 
 
 def test_a_text_of_a_page_is_not_proposed_as_the_code_of_a_missing_value(tmp_path: Path):

@@ -23,6 +23,8 @@ from __future__ import annotations
 
 import dataclasses
 import difflib
+import itertools
+import math
 import re
 import unicodedata
 from collections.abc import Callable, Iterable, Mapping
@@ -129,11 +131,13 @@ def quotable(text: str) -> str:
     return _LONG_WORD.sub(lambda word: f"{word[0][: MAX_WORD - 40]}…{word[0][-39:]}", printable(text))
 
 
-def listed(names: Iterable[str]) -> str:
-    """Names of a file, such as its headings, for a message: the first ones, and how many more there are."""
+def listed(names: Iterable[str], characters: float = math.inf) -> str:
+    """Names of a file, such as its headings, for a message: the first ones in so many characters, and how many more."""
     all_names = [name if len(name) <= MAX_LISTED_NAME else f"{name[: MAX_LISTED_NAME - 1]}…" for name in names]
-    rest = len(all_names) - MAX_LISTED
-    return ", ".join(all_names if rest <= 1 else [*all_names[:MAX_LISTED], f"and {rest} more"])
+    ends = itertools.accumulate(len(name) + 2 for name in all_names)
+    count = min(MAX_LISTED, max(sum(end <= characters for end in ends), 1))
+    rest = len(all_names) - count
+    return ", ".join(all_names if rest <= 1 else [*all_names[:count], f"and {rest} more"])
 
 
 def _is_printable(character: str) -> bool:

@@ -177,10 +177,8 @@ def _no_known_column(table: RawTable, headings: list[Heading]) -> ColumnError:
     names = [heading.text for heading in headings]
     near = [n for name in names for n in difflib.get_close_matches(name.lower(), QUANTITIES, n=1)]
     hint = f" Did you mean '{near[0]}'?" if near else ""
-    quoted = listed(names)
-    quoted = quoted if len(quoted) <= MAX_QUOTED else f"{quoted[: MAX_QUOTED - 1]}…"
     return ColumnError(
-        f"{table.origin}: no column is a known quantity ({quoted}); known quantities are "
+        f"{table.origin}: no column is a known quantity ({listed(names, MAX_QUOTED)}); known quantities are "
         f"{', '.join(QUANTITIES)}.{hint}",
         hint=Hint("To state the number of lines above the headings", "skip_rows", 1, "ColumnMapping"),
     )
