@@ -12,7 +12,8 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from collections.abc import Iterator, Mapping
+from collections import deque
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -203,12 +204,35 @@ def _join_ripple(recording: Recording, intervals: list[Interval], bands: dict[st
     pressure, i = recording["pressure"], 0
     band = RIPPLE_BAND * float(np.max(np.abs(pressure)))
     ranges = [(float(pressure[each.rows].min()), float(pressure[each.rows].max())) for each in intervals]
+    steps = np.sign(np.diff(pressure, prepend=pressure[:1]))
+    reversals = np.cumsum(np.concatenate(([0], np.diff(steps) != 0)))  # at least as many as there are crossings
+    ends = _ends_within(ranges, band)
     while i < len(intervals):
-        j, (low, high) = i, ranges[i]
-        while j + 1 < len(intervals) and max(high, ranges[j + 1][1]) - min(low, ranges[j + 1][0]) <= band:
-            j += 1
-            low, high = min(low, ranges[j][0]), max(high, ranges[j][1])
-        joined = Interval(intervals[i].start, intervals[j].stop)
-        last = j if j > i and _has_ripple(recording, joined, bands) else i
+        last, joined = i, Interval(intervals[i].start, intervals[ends[i]].stop)
+        turns = reversals[joined.stop - 1] - reversals[joined.start]
+        if ends[i] > i and turns >= MIN_RIPPLE_REVERSALS - 1 and _has_ripple(recording, joined, bands):
+            last = ends[i]
         yield Interval(intervals[i].start, intervals[last].stop)
         i = last + 1
+
+
+def _ends_within(ranges: Sequence[tuple[float, float]], band: float) -> list[int]:
+    """For each range (low, high) the last of those after it that lie with it within a band, in linear time."""
+    lowest, highest, ends, stop = deque[int](), deque[int](), list[int](), 0
+    for i in range(len(ranges)):
+        while stop < len(ranges):
+            low, high = ranges[stop]
+            if stop > i and max(high, ranges[highest[0]][1]) - min(low, ranges[lowest[0]][0]) > band:
+                break
+            while lowest and ranges[lowest[-1]][0] >= low:
+                lowest.pop()
+            while highest and ranges[highest[-1]][1] <= high:
+                highest.pop()
+            lowest.append(stop)
+            highest.append(stop)
+            stop += 1
+        ends.append(stop - 1)
+        for queue in (lowest, highest):
+            if queue and queue[0] == i:
+                queue.popleft()
+    return ends
