@@ -214,6 +214,23 @@ def test_the_process_that_does_not_write_names_the_files_of_the_other(folder: Pa
     assert not (folder / "out").exists()
 
 
+def test_the_output_of_a_process_that_has_ended_is_written_by_the_other(folder: Path, monkeypatch: pytest.MonkeyPatch):
+    """At the start another process holds the folder of the output; at the end it is free, and without a report."""
+    monkeypatch.setattr("airmuscle.outlets.cli.execution.Execution.writes", lambda self, out: False)
+    command = ("study", str(folder / "study.toml"), "--join", str(folder / "shared"), "--workers", "1")
+    done = airmuscle(*command, "--out", str(folder / "out"))
+    assert done.exit_code == 0, done.stderr
+    assert (folder / "out" / "report.html").is_file()
+    assert (folder / "out" / "results.csv").is_file()
+
+
+def test_a_shared_folder_stays_for_the_processes_that_start_at_once(tmp_path: Path):
+    check_writable(tmp_path / "shared", shared=True)
+    assert (tmp_path / "shared").is_dir()
+    check_writable(tmp_path / "own")
+    assert not (tmp_path / "own").exists()
+
+
 def test_invalid_folders_and_numbers_of_workers_are_errors(tmp_path: Path):
     (tmp_path / "file").touch()
     with pytest.raises(AirmuscleError, match="cannot be written to"), shared_folder(tmp_path / "file"):

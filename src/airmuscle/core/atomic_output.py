@@ -122,7 +122,7 @@ def check_writable(folder: Path | str, *, shared: bool = False) -> None:
     """Raise FileError before a long computation if `atomic_folder` cannot write to `folder`; leaves no files.
 
     Within `exclusive_folders`, no other process may check the same folder until the block ends, unless it is `shared`:
-    it raises FolderInUseError.
+    it raises FolderInUseError. A shared folder stays, because another process may have begun to use it.
     """
     target = Path(folder)
     with _raise_file_errors(target):
@@ -133,6 +133,7 @@ def check_writable(folder: Path | str, *, shared: bool = False) -> None:
         if _held is not None and not shared:
             _hold(target, created)
             created = []
+        created = [] if shared else created
     finally:
         _remove_empty_folders(created)
 

@@ -6,7 +6,7 @@ All internal values are SI. A pressure is gauge unless its unit states absolute,
 """
 
 from ..core.display import display
-from ..core.units import (  # fmt: skip
+from ..core.units import (
     AMBIENT_PRESSURE,
     J,
     K,
@@ -34,35 +34,10 @@ from ..core.units import (  # fmt: skip
     quantity,
     rad,
     s,
-)
+)  # fmt: skip
 
 __all__ = [
-    "AMBIENT_PRESSURE",
-    "J",
-    "K",
-    "MPa",
-    "N",
-    "Pa",
-    "UnitConversion",
-    "W",
-    "bar",
-    "cm",
-    "conversion",
-    "degree",
-    "display",
-    "g",
-    "kN",
-    "kPa",
-    "kg",
-    "km",
-    "m",
-    "mbar",
-    "minute",
-    "mm",
-    "ms",
-    "percent",
-    "psi",
-    "quantity",
-    "rad",
+    "AMBIENT_PRESSURE", "J", "K", "MPa", "N", "Pa", "UnitConversion", "W", "bar", "cm", "conversion", "degree",
+    "display", "g", "kN", "kPa", "kg", "km", "m", "mbar", "minute", "mm", "ms", "percent", "psi", "quantity", "rad",
     "s",
 ]  # fmt: skip

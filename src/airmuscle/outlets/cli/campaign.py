@@ -169,6 +169,7 @@ def campaign(
     chapters[0] = dataclasses.replace(chapters[0], notes=(*chapters[0].notes, *_not_written(result, entry, scenarios)))
     contents = {**_muscles(result, entry), **{f"{SCENARIOS}/{s.name}": s.text for s in scenarios if s.text}}
     chapters += reading_chapters(complete)
+    writes = writes or execution.takes_over(out)
     deliver("campaign", chapters, json=json, out=out, title="Bench campaign", files=contents, writes=writes)
 
 

@@ -10,6 +10,7 @@ from ...core.atomic_output import check_writable
 from ...core.errors import FolderInUseError
 from ...engine.executors import SharedFolder, dask_cluster, shared_folder
 from ...engine.processes import Workers, available_cores
+from ...report.write import REPORT_FILE
 from ..requests.declaration import RequestError, Where, option, request
 from .terminal import echo
 
@@ -72,6 +73,14 @@ class Execution:
                 echo(f"{out} is written by another process; this one computes for {self.join} only", err=True)
                 return False
         return True
+
+    def takes_over(self, out: Path) -> bool:
+        """Whether the process that was to write the output has ended without it, so that this one writes it."""
+        with contextlib.suppress(FolderInUseError):
+            if not (out / REPORT_FILE).exists():
+                check_writable(out)
+                return True
+        return False
 
 
 def contributions(folder: SharedFolder) -> str:

@@ -50,6 +50,7 @@ def study(
     loaded, writes = load_study(file), execution.writes(out)
     with contextlib.nullcontext(out) if writes else temporary_folder() as folder:
         result, shares = _run(loaded, folder, execution)
+    writes = writes or execution.takes_over(out)
     if writes or json:
         chapter = study_chapter(result, execution=shares)
         page = write_study(result, out, chapter) if writes else out / REPORT_FILE

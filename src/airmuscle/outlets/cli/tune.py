@@ -135,6 +135,7 @@ def tune(
     ranges = loaded.bounds(request.bounds)
     with execution.executor(alone=True) as workers:
         tuning, notes, rules = _search(loaded, ranges, request, objective, perturbations, workers)
+    writes = writes or execution.takes_over(out)
     if writes:
         loaded.save(tuning.gains, target)
     problem = loaded.scenario.problem
