@@ -93,14 +93,8 @@ def benchmark(
         )  # fmt: skip
     curves = _learned(result, trials, request.seed) if trials else []
     chapter = benchmark_chapter(result, curves)
-    deliver(
-        "benchmark",
-        [chapter],
-        json=json,
-        out=out,
-        title="Control benchmark",
-        writes=writes or execution.takes_over(out),
-    )
+    writes = writes or execution.takes_over(out)
+    deliver("benchmark", [chapter], json=json, out=out, title="Control benchmark", writes=writes)
     found = [run for each in result.results for run in each.runs.values()]
     if not any(run.metrics for run in found):
         raise SimulationError(f"all runs failed; reason of the first: {found[0].reason}")

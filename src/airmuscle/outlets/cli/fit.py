@@ -59,6 +59,5 @@ def fit(
     with execution.executor() as executor, progress as show:
         found = fit_requested(request, files, recordings, lambda _, fraction: show(fraction), executor)
     muscle = {"muscle.toml": to_toml(found.entry)}
-    deliver(
-        "fit", found.chapters, json=json, out=out, title="Fit", files=muscle, writes=writes or execution.takes_over(out)
-    )
+    writes = writes or execution.takes_over(out)
+    deliver("fit", found.chapters, json=json, out=out, title="Fit", files=muscle, writes=writes)

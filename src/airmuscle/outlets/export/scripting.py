@@ -41,14 +41,18 @@ JS_DRIVEN = (
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
-class JavaScriptModule:
-    """The ECMAScript module of one system and its run; `name` is the name of the files."""
+class ScriptText:
+    """What the program of a system, its run and its loop is printed from; `name` is that of the program."""
 
     name: str
     system: ExportedSystem
     run: RunData
     provenance: Sequence[str]
     loop: ExportedLoop | None = None
+
+
+class JavaScriptModule(ScriptText):
+    """The ECMAScript module of one system and its run; `name` is the name of the files."""
 
     def files(self, columns: Sequence[str]) -> dict[str, str]:
         """Contents of the module, and of a program that writes these columns, after time, as CSV, by file name."""
@@ -159,15 +163,8 @@ M_DRIVEN = (
 """The arrays of drivers, and the lines that pass commands through their drivers."""
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class OctaveFunctions:
+class OctaveFunctions(ScriptText):
     """The function file of one system and that of its run; `name` is the name of the function."""
-
-    name: str
-    system: ExportedSystem
-    run: RunData
-    provenance: Sequence[str]
-    loop: ExportedLoop | None = None
 
     def files(self, columns: Sequence[str]) -> dict[str, str]:
         """Contents of the function, and of a function that writes these columns, after time, as CSV, by file name."""
