@@ -18,10 +18,9 @@ except ImportError as error:
     print(f"no learning: {error}. Install the packages: pip install airmuscle[sim] stable-baselines3")
     sys.exit()
 
+import airmuscle.environments  # noqa: F401 - registers them
 from airmuscle.core import plotting
-from airmuscle.outlets import register_environments
 
-register_environments()
 PERIODS, PERIOD = 500, 0.01
 PLANTS, UPDATE = 128, 64
 """Plants that learn together, and periods between two updates."""

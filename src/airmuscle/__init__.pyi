@@ -3,6 +3,7 @@ from . import control as control
 from . import core as core
 from . import design as design
 from . import engine as engine
+from . import environments as environments
 from . import errors as errors
 from . import files as files
 from . import outlets as outlets

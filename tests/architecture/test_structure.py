@@ -267,7 +267,7 @@ def code_for_users() -> Iterator[tuple[str, str]]:
 def face_of(module: str) -> frozenset[str] | None:
     """The names in `__all__` of a package, or of the exceptions, and its subpackages; None for any other module."""
     folder = SOURCE.parent.joinpath(*module.split("."))
-    if not folder.is_dir() and module != "airmuscle.errors":
+    if not folder.is_dir() and module != "airmuscle.environments":
         return None
     names = getattr(importlib.import_module(module), "__all__", ())
     return frozenset(names) | {path.parent.name for path in folder.glob("*/__init__.py")}

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from control_plants import JOINT, LIFT
 
+import airmuscle as am
 from airmuscle.engine import Double, RungeKutta4, Single, Stepper
 from airmuscle.engine.run.batch import BatchStepper
 from airmuscle.errors import ParameterError
@@ -29,6 +30,7 @@ from airmuscle.outlets import (
     ValueRange,
     register_environments,
 )
+from airmuscle.outlets import environments as room
 from airmuscle.outlets.environments import PlantEnv, with_on_off_valves
 
 NAMES = ("Joint", "Lift", "Arm")
@@ -214,11 +216,17 @@ def test_a_copy_of_an_environment_goes_on_by_itself(make, copied):
         np.testing.assert_array_equal(first, second)
 
 
-def test_the_import_registers_the_environments():
-    """`module:identifier` of Gymnasium imports the module first."""
-    code = 'import gymnasium\nprint(gymnasium.make("airmuscle.outlets.environments:airmuscle/Lift-v0").spec.id)'
+@pytest.mark.parametrize(("line", "module"), [("import airmuscle.environments", ""), ("", "airmuscle.environments:")])
+def test_the_import_registers_the_environments(line, module):
+    """By hand, or by Gymnasium, which imports the module of `module:identifier` first."""
+    code = f'import gymnasium\n{line}\nprint(gymnasium.make("{module}airmuscle/Lift-v0").spec.id)'
     found = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert found.stdout.strip() == "airmuscle/Lift-v0"
+
+
+def test_the_short_name_has_the_names_of_the_room():
+    assert am.environments.__all__ == room.__all__
+    assert all(getattr(am.environments, name) is getattr(room, name) for name in room.__all__)
 
 
 def test_observations_pass_through_sensors():

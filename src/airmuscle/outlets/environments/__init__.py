@@ -1,7 +1,7 @@
 """Learning environments: plants with a task as Gymnasium environments, single and as vectors of thousands.
 
-Where Gymnasium is installed, the import registers them, also that of the identifier
-"airmuscle.outlets.environments:airmuscle/Joint-v0". Each name is imported when it is first used.
+Where Gymnasium is installed, `import airmuscle.environments` registers them, also that of the identifier
+"airmuscle.environments:airmuscle/Joint-v0". Each name is imported when it is first used.
 """
 
 import importlib.util

@@ -19,8 +19,7 @@ from ...recording.columns import display_scale
 from ..requests.declaration import RequestError
 from .fit_hints import in_page_words
 from .fit_reading import ReadSet, read_set
-from .fit_selection import used_rows
-from .fit_settings import FitSettings, Rule
+from .fit_settings import FitSettings, Rule, used_rows
 from .fit_uploads import FILES
 
 MAX_POINTS = 9000

@@ -7,6 +7,7 @@ their folder together at the end.
 from __future__ import annotations
 
 import itertools
+import math
 import warnings
 import zipfile
 from collections.abc import Callable, Sequence
@@ -17,9 +18,12 @@ import numpy as np
 
 import airmuscle as am
 
+from ...bench.identify.compare_chapter import LawSelection
+from ...bench.identify.curve_plots import band_curves
 from ...bench.identify.hysteresis import LoopFit, find_loops, fit_jointly, fit_loop, loops_not_joined
 from ...bench.identify.hysteresis.hysteresis_chapter import hysteresis_chapters, joint_friction_chapter, loop_chapter
 from ...bench.identify.hysteresis.joint import select_friction
+from ...bench.identify.static_fit_chapter import equation_section
 from ...bench.segment import check_contents, motion_direction
 from ...core.atomic_output import atomic_folder
 from ...core.errors import AirmuscleError, AirmuscleWarning
@@ -27,6 +31,7 @@ from ...files.library.fitted_entry import missing_geometry, resting_lengths
 from ...files.library.write import part_toml, save
 from ...report.chapter import Chapter
 from ...report.data import as_json, as_sheet, in_words
+from ...report.formula import to_display_mathml
 from ...report.write import write_into
 from ..requests.braid import problem_of_lengths
 from ..requests.declaration import RequestError
@@ -34,9 +39,7 @@ from ..requests.fit import FitRequest
 from ..requests.fitting import fit_requested
 from .fit_hints import as_field_error, in_page_words
 from .fit_reading import read_set
-from .fit_result import result_sheet
-from .fit_selection import selected
-from .fit_settings import SPLITS, FitSettings
+from .fit_settings import SPLITS, FitSettings, selected
 
 Report = Callable[[float, str], None]
 DOWNLOADS = ("report.html", "muscle.toml", "report.zip", "friction.html", "friction.toml")
@@ -53,6 +56,8 @@ FRICTION_LAWS = 4
 """Number of friction laws that are fitted to each loop and to all loops together, for the progress."""
 MAX_POINTS = 2000
 """Maximum number of points of a loop that the page draws (chosen)."""
+MAX_PARITY_POINTS = 4000
+"""Maximum number of points of the parity chart; of more rows every n-th one is shown (chosen)."""
 
 
 def run_fit(folder: str, out: str, settings: FitSettings, report: Report) -> None:
@@ -174,3 +179,72 @@ def _pack(folder: Path) -> list[str]:
         for path in files:
             archive.write(path, path.relative_to(folder).as_posix())
     return [name for name in DOWNLOADS if (folder / name).exists()]
+
+
+# The comparison for the page, all SI
+
+
+def result_sheet(selection: LawSelection, fit: am.Fit) -> dict[str, Any]:
+    """The selection and the recommended fit as plain data."""
+    best = selection.recommended
+    return {
+        "recommended": best.candidate.name,
+        "parameters": best.parameter_count,
+        "error": best.cross_validated_rmse,
+        "reason": selection.reason,
+        "comparisons": [
+            {"purpose": each.purpose, "group": each.leave_out.group_name, **_sheet(each.chapter())}
+            for each in selection.comparisons
+        ],
+        "fit": _sheet(fit.chapter()),
+        "equations": _equations(fit),
+        "parity": _parity(fit),
+        "bands": _bands(fit),
+    }
+
+
+def _equations(fit: am.Fit) -> list[dict[str, Any]]:
+    shown, _ = equation_section(fit)
+    return [
+        {
+            "title": each.title, "note": each.note, "lines": [to_display_mathml(line) for line in each.lines],
+            "sources": dict(each.sources),
+        }
+        for each in shown
+    ]  # fmt: skip
+
+
+def _parity(fit: am.Fit) -> dict[str, Any]:
+    quantity = fit.fitted_quantity
+    step = max(1, math.ceil(fit.rows_used / MAX_PARITY_POINTS))
+    rows = slice(None, None, step)
+    return {
+        "quantity": quantity.name,
+        "unit": quantity.unit,
+        "step": step,
+        "measured": fit.recording[quantity.name][rows],
+        "modelled": fit.modelled[rows],
+        "residual": fit.residuals[rows],
+        "censored": (fit.censoring != 0)[rows],
+        **{name: fit.recording[name][rows] for name in ("pressure", "contraction", "force")},
+    }
+
+
+def _bands(fit: am.Fit) -> dict[str, Any] | None:
+    computed = band_curves(fit)
+    if computed is None:
+        return None
+    axes, curves = computed
+    return {
+        "constant": axes.constant,
+        "varying": axes.varying,
+        "basis": fit.error_basis,
+        "curves": [
+            {
+                "level": each.level, "x": each.points, "value": each.confidence.value,
+                "low": each.confidence.low, "high": each.confidence.high,
+                "prediction_low": each.prediction.low, "prediction_high": each.prediction.high,
+            }
+            for each in curves
+        ],
+    }  # fmt: skip

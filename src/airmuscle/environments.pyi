@@ -1,0 +1,1 @@
+from .outlets.environments import *  # noqa: F403
