@@ -145,7 +145,9 @@ RECIPES = {
 
 
 def append(path: Path, text: str) -> None:
-    path.write_text((path.read_text(encoding="utf-8") if path.exists() else "") + text, encoding="utf-8")
+    """Add text at the end of a file, in a stub at its beginning, where the public names are."""
+    old = path.read_text(encoding="utf-8") if path.exists() else ""
+    path.write_text(text + old if path.suffix == ".pyi" else old + text, encoding="utf-8")
 
 
 def add(root: Path, kind: str, name: str, without: str = "") -> None:

@@ -9,8 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 
-from ..core.arrays import Array
-from ..core.short_repr import ShortRepr
+from ..core import Array, ShortRepr
 
 DEPTH, RIDGE = 4, 1e-6
 """Rows of outputs and inputs that the ARX model sees, and its regularisation (chosen)."""

@@ -9,11 +9,15 @@ import types
 def attach_stub(package, file):  # type: ignore[no-untyped-def]
     """`__getattr__`, `__dir__` and `__all__` of a package, from the lines `from .x import name as name` of its stub.
 
-    The functions of a room name the argument that is wrong where a call ends in an exception of Python. Nothing else is
-    imported: until `__main__.main` runs, an interruption cannot be handled.
+    Names after `# isort: split` are for the other rooms alone, and not in `__all__`. The functions of a room, except
+    `core`, name the argument that is wrong where a call ends in an exception of Python. Nothing else is imported: until
+    `__main__.main` runs, an interruption cannot be handled.
     """
     with open(f"{file}i", encoding="ascii") as stub:
-        modules = {words[3]: words[1] for words in map(str.split, stub) if words[:1] == ["from"]}
+        parts = stub.read().split("# isort: split")
+    found = [[words for words in map(str.split, part.splitlines()) if words[:1] == ["from"]] for part in parts]
+    modules = {words[3]: words[1] for part in found for words in part}
+    public = sorted(words[3] for words in found[0])
 
     def get(name):  # type: ignore[no-untyped-def]
         if name not in modules:
@@ -21,12 +25,12 @@ def attach_stub(package, file):  # type: ignore[no-untyped-def]
         if modules[name] == ".":
             return importlib.import_module(f".{name}", package)
         value = getattr(importlib.import_module(modules[name], package), name)
-        if isinstance(value, types.FunctionType) and package.count(".") == 1:
+        if isinstance(value, types.FunctionType) and package.count(".") == 1 and package != __package__:
             value = _naming_arguments(value, package)  # type: ignore[no-untyped-call]
         setattr(sys.modules[package], name, value)
         return value
 
-    return get, lambda: sorted(modules), sorted(modules)
+    return get, lambda: public, public
 
 
 def _naming_arguments(function, room):  # type: ignore[no-untyped-def]

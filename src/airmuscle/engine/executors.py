@@ -20,9 +20,7 @@ from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
 from pathlib import Path
 from typing import Any
 
-from ..core.atomic_output import atomic_file, check_writable
-from ..core.errors import FileError, InputError
-from ..core.fingerprint import program_fingerprint
+from ..core import FileError, InputError, atomic_file, check_writable, program_fingerprint
 from .distribution import Claims
 from .processes import available_cores, process_pool
 

@@ -19,8 +19,8 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from typing import IO, Any
 
-from ..core.display import current_units, display
-from ..core.errors import AirmuscleError, InputError
+from ..core import AirmuscleError, InputError, current_units
+from ..core.display import display
 
 Workers = int | Executor
 """Number of local processes, or an executor of `concurrent.futures`."""

@@ -6,11 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ..core.annotation import abridged, one_line
-from ..core.arrays import Array
-from ..core.declaration import as_float
-from ..core.errors import ParameterError, suggestion
-from ..core.system import System
+from ..core import Array, ParameterError, System, abridged, as_float, one_line, suggestion
 from ..recording.columns import quantity_of
 
 

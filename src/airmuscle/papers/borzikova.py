@@ -13,8 +13,7 @@ import airmuscle as am
 
 from ..bench.identify.surface.basis import Chebyshev, LoadRange, conditioning
 from ..bench.identify.surface.exponential import SurfaceFit, SurfaceProblem, fit_linearised, fit_nonlinear
-from ..core.arrays import Array
-from ..core.units import STANDARD_GRAVITY
+from ..core import STANDARD_GRAVITY, Array
 from ..physics.muscle.characteristic.borzikova import BORZIKOVA, SAM_30X290, PlaneCurves
 from ..report.chapter import Chapter
 from ..report.claims import AtLeast, Claim, ClaimRow, Equal, Kind

@@ -10,9 +10,7 @@ import numpy as np
 import airmuscle as am
 
 from ..bench.identify.surface.basis import LoadRange
-from ..core import autodiff
-from ..core.plotting import BLACK, BLUE, DASHES, LINES, MARKERS, ORANGE, RED, legend_outside, new_figure
-from ..core.units import bar
+from ..core import BLACK, BLUE, DASHES, LINES, MARKERS, ORANGE, RED, autodiff, bar, legend_outside, new_figure
 from ..physics.muscle.characteristic.borzikova import PlaneCurves
 from ..report.chapter import Plot
 from .borzikova_surfaces import CORRECTED, EXPONENTIAL, MISPRINT_CORRECTED, MONOTONE, sample

@@ -8,11 +8,9 @@ import numpy as np
 
 import airmuscle as am
 
-from ..core.plotting import BLACK, BLUE, LINES, RED, legend_outside, new_figure
-from ..core.reference import cite
+from ..core import BLACK, BLUE, LINES, RED, cite, legend_outside, new_figure
 from ..files.library import catalogue, load_law
-from ..physics.muscle.characteristic.contractile_surface import exponents
-from ..physics.muscle.characteristic.energy_defect import maxwell_defect
+from ..physics.muscle.characteristic import exponents, maxwell_defect
 from ..report.chapter import Chapter, Plot, Table
 from . import hosovsky_effects as causing
 from . import hosovsky_fill as filling

@@ -14,8 +14,7 @@ import numpy as np
 
 import airmuscle as am
 
-from ..core.arrays import Array
-from ..core.plotting import DASHES, LINES, new_figure
+from ..core import DASHES, LINES, Array, new_figure
 from ..report.chapter import Plot, Table
 from ..report.formula import to_mathtext
 from .hosovsky_plant import (

@@ -14,9 +14,8 @@ import numpy.typing as npt
 
 import airmuscle as am
 
-from ..core.arrays import Array
-from ..core.plotting import BLACK, DASHES, legend_outside, new_figure
-from ..core.plotting import LINES as COLOURS
+from ..core import BLACK, DASHES, Array, legend_outside, new_figure
+from ..core import LINES as COLOURS
 from ..report.chapter import Plot, Table
 from ..report.claims import AtMost, ClaimRow, Kind
 from .saga2007_muscle import (

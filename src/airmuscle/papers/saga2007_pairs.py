@@ -13,10 +13,7 @@ import numpy as np
 
 import airmuscle as am
 
-from ..core import autodiff
-from ..core.arrays import Array
-from ..core.declaration import model
-from ..core.ops import Value
+from ..core import Array, Value, autodiff, model
 from ..physics.muscle.characteristic.rubber import RubberIntegral
 from ..physics.muscle.geometry.meridian import Segment
 from ..physics.muscle.geometry.straight_fibre import FibreTube

@@ -10,8 +10,7 @@ import numpy as np
 
 import airmuscle as am
 
-from ..core.errors import ParameterError, SolveError
-from ..core.plotting import BLACK, DASHES, LINES, new_figure
+from ..core import BLACK, DASHES, LINES, ParameterError, SolveError, new_figure
 from ..report.chapter import Plot, Table
 from ..report.claims import AtLeast, ClaimRow
 from . import saga2007_pairs as pairs

@@ -6,8 +6,7 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
-from ..core.display import chosen_scale
-from ..core.errors import Hint, HintedText
+from ..core import Hint, HintedText, chosen_scale
 
 MOVED = ("contraction", "length", "shortening", "position")
 """Columns of the motion of the muscle end; the first one of a recording is used."""

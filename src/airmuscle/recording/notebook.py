@@ -9,9 +9,7 @@ import html
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from ..core.errors import AirmuscleError
-from ..core.plotting import rendered
-from ..core.short_repr import ShortRepr
+from ..core import AirmuscleError, ShortRepr, rendered
 
 MAX_ROWS = 14
 """Maximum number of rows of a table."""

@@ -9,9 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.arrays import Array
-from ..core.display import chosen_scale
-from ..core.plotting import BLACK, DASHES, LINES, given_axes, legend_outside, new_figure
+from ..core import BLACK, DASHES, LINES, Array, chosen_scale, given_axes, legend_outside, new_figure
 from .columns import QUANTITIES, display_scale, quantity_of
 
 ROLES = {"setpoint.": "set point", "measured.": "measured", "command.": "command"}

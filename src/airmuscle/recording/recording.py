@@ -9,11 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..core.annotation import check_field_types, one_line
-from ..core.arrays import Array
+from ..core import Array, Reference, check_field_types, conversion, one_line
 from ..core.errors import AirmuscleError, ColumnError, HintedText, ParameterError, listed, suggestion
-from ..core.reference import Reference
-from ..core.units import conversion
 from .columns import ZERO_NOT_STATED, display_scale, quantity_of
 from .heading import split_unit
 from .notebook import Card, NotebookDisplay

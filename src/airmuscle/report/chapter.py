@@ -11,8 +11,7 @@ import re
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from ..core.reference import Reference
-from ..core.short_repr import ShortRepr
+from ..core import Reference, ShortRepr
 from .claims import Claim
 
 DIGITS = 4

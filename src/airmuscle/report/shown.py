@@ -6,8 +6,7 @@ import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
-from ..core.display import chosen_scale, heading_scale, scaled_numbers
-from ..core.units import conversion, known_factor
+from ..core import chosen_scale, conversion, heading_scale, known_factor, scaled_numbers
 from .chapter import BY_ROW, NamedValue, Table, TableColumn
 from .formatting import P_VALUE, format_cell, format_number, format_p_value, format_unit, is_number_text
 

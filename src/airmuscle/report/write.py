@@ -13,9 +13,7 @@ from importlib import metadata, resources
 from pathlib import Path
 from typing import Any
 
-from ..core import plotting
-from ..core.atomic_output import atomic_folder
-from ..core.errors import FileError
+from ..core import FileError, atomic_folder, plotting
 from .chapter import Chapter, Plot, Table
 from .claims import Kind, statements
 from .data import as_json, csv_text

@@ -8,11 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from ...core.arrays import Array
-from ...core.display import contraction_text, quantity_text
-from ...core.errors import IdentificationError, SolveError
-from ...physics.muscle.characteristic.base import Characteristic
-from ...physics.muscle.characteristic.validity_range import ValidityRange
+from ...core import Array, IdentificationError, SolveError, contraction_text, quantity_text
+from ...physics.muscle.characteristic import Characteristic, ValidityRange
 from ...recording import Recording
 from ...report.chapter import Chapter, NamedValue, Table, TableColumn
 from ...report.parameters import parameter_table

@@ -9,11 +9,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from ...core import tree
-from ...core.annotation import check_whole
-from ...core.arrays import Array
-from ...core.errors import Hint, IdentificationError
-from ...core.short_repr import ShortRepr
+from ...core import Array, Hint, IdentificationError, ShortRepr, check_whole, tree
 from ...engine.distribution import DistributedCalls
 from ...engine.processes import Workers, check_running, process_pool
 from ...physics.muscle.characteristic.base import Characteristic

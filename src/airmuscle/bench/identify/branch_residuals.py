@@ -16,12 +16,10 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ...core.arrays import Array
-from ...core.errors import Hint, HintedText
+from ...core import Array, Hint, HintedText
 from ...recording import Recording
 from ...recording.columns import QUANTITIES
-from ..segment import Branch, branch_directions, estimate_sensors, find_branches
-from ..segment.branches import branch_name
+from ..segment import Branch, branch_directions, branch_name, estimate_sensors, find_branches
 from ..segment.interval import remembered, running_median
 
 MIN_LOOP_ROWS = 12

@@ -8,13 +8,10 @@ from collections.abc import Callable, Iterable, Sequence
 
 import numpy as np
 
-from ...core import tree
-from ...core.arrays import Array
-from ...core.errors import AirmuscleError
+from ...core import AirmuscleError, Array, tree
 from ...engine.distribution import DistributedCalls
 from ...engine.processes import Workers, process_pool
-from ...physics.muscle.characteristic import PooledLengthLaw
-from ...physics.muscle.characteristic.base import Characteristic
+from ...physics.muscle.characteristic import Characteristic, PooledLengthLaw
 from ...recording import Recording
 from .candidates import Candidate
 from .compared_points import ComparedPoints, cause_of, residuals_of_rows

@@ -10,9 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ...core.arrays import Array
-from ...core.errors import HintedText, IdentificationError, SolveError
-from ...core.short_repr import ShortRepr
+from ...core import Array, HintedText, IdentificationError, ShortRepr, SolveError
 from ...physics.muscle import characteristic
 from ...physics.muscle.characteristic import Characteristic, ContractileSurface, LogarithmicLength, PooledLengthLaw
 from ...physics.muscle.characteristic.base import ContractionLaw, ForceLaw

@@ -12,9 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.errors import IdentificationError
-from ...core.plotting import BLUE, LINES, MARKERS, legend_outside, new_figure
-from ...core.short_repr import ShortRepr
+from ...core import BLUE, LINES, MARKERS, IdentificationError, ShortRepr, legend_outside, new_figure
 from ...engine.processes import Workers
 from ...recording import Recording
 from ...report.chapter import Chapter, Plot, Table, TableColumn

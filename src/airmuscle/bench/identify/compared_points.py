@@ -10,11 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ...core import tree
-from ...core.arrays import Array
-from ...core.errors import AirmuscleError, HintedText, IdentificationError
-from ...physics.muscle.characteristic import PooledLengthLaw
-from ...physics.muscle.characteristic.base import Characteristic
+from ...core import AirmuscleError, Array, HintedText, IdentificationError, tree
+from ...physics.muscle.characteristic import Characteristic, PooledLengthLaw
 from ...recording import Recording
 from .candidates import Candidate, evaluate_force, slack_rows
 from .cross_validation import Labels, specimen_name

@@ -9,9 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core.arrays import Array
-from ...core.errors import Hint, HintedText
-from ...core.units import AMBIENT_PRESSURE
+from ...core import AMBIENT_PRESSURE, Array, Hint, HintedText
 from ...recording import Recording
 from ..checks.bench_rows import file_list
 from ..segment.interval import true_intervals

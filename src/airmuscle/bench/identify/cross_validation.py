@@ -14,10 +14,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ...core.annotation import check_field_types
-from ...core.arrays import Array
-from ...core.display import level_text
-from ...core.errors import Hint, HintedText, IdentificationError, ParameterError
+from ...core import Array, Hint, HintedText, IdentificationError, ParameterError, check_field_types, level_text
 from ...recording import Recording
 
 LEVEL_TOLERANCE = 0.005

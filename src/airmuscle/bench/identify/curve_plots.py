@@ -7,10 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core import plotting
-from ...core.arrays import Array
-from ...core.display import level_text
-from ...core.errors import IdentificationError
+from ...core import Array, IdentificationError, level_text, plotting
 from ...recording import Recording
 from ...report.chapter import Plot
 from . import Band, Fit, confidence_band

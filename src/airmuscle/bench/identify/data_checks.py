@@ -15,9 +15,7 @@ from ...core.errors import Hint, HintedText
 from ...recording import Recording
 from ...report.chapter import NamedValue
 from ..checks import find_suspicious, without_missing_codes
-from ..segment import Outlier, estimate_sensors, find_outliers
-from ..segment.interval import remembered
-from ..segment.sensor import estimate_noise
+from ..segment import Outlier, estimate_noise, estimate_sensors, find_outliers, remembered
 from .branch_residuals import SensorDelay, delay_notes, find_delay
 from .contradictions import contradiction_notes, repeatability
 from .matched_rows import match_rows

@@ -16,11 +16,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ...core.annotation import check_field_types
-from ...core.arrays import Array
-from ...core.errors import IdentificationError, ParameterError
-from ...physics.muscle.characteristic.base import Characteristic
-from ...physics.muscle.characteristic.validity_range import ValidityRange
+from ...core import Array, IdentificationError, ParameterError, check_field_types
+from ...physics.muscle.characteristic import Characteristic, ValidityRange
 from ...recording import Recording
 from ...report.chapter import Chapter, NamedValue, Table, TableColumn
 from ..reported import Reported

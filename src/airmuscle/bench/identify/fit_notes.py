@@ -6,8 +6,7 @@ import dataclasses
 
 import numpy as np
 
-from ...core.arrays import Array
-from ...core.errors import Hint, HintedText
+from ...core import Array, Hint, HintedText
 from .branch_residuals import branch_distance, branch_notes
 from .data_checks import Remarks, Scatter
 from .fit_points import FitPoints

@@ -10,13 +10,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ...core.arrays import Array
-from ...core.errors import IdentificationError
-from ...core.reference import cite
+from ...core import Array, IdentificationError, cite
 from ...physics.muscle.characteristic.base import Characteristic, ForceLaw
 from ...recording import Recording
-from ..segment import ISOBARIC, ISOMETRIC, find_runs
-from ..segment.runs import RELATIVE_BAND
+from ..segment import ISOBARIC, ISOMETRIC, RELATIVE_BAND, find_runs
 from .contradictions import RepeatedRows, find_repeated_rows
 from .cross_validation import specimen_name
 from .data_checks import DataChecks

@@ -7,8 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core.arrays import Array
-from ...core.errors import IdentificationError
+from ...core import Array, IdentificationError
 from ...recording import Recording
 from .model_evidence import student_quantile
 from .pooling import pooled_band

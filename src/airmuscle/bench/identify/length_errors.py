@@ -12,9 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core.arrays import Array
-from ...core.errors import IdentificationError, ParameterError
-from ...core.short_repr import ShortRepr
+from ...core import Array, IdentificationError, ParameterError, ShortRepr
 from ...physics.muscle.characteristic.base import Characteristic
 from ...recording import Recording
 from .candidates import blank_surface

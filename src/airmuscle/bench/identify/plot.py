@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ...core.arrays import Array
-from ...core.plotting import BLACK, BLUE, RED, given_axes, new_figure
+from ...core import BLACK, BLUE, RED, Array, given_axes, new_figure
 from ...recording.columns import display_scale
 
 MANY_POINTS = 1000

@@ -9,9 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ...core import tree
-from ...core.arrays import Array
-from ...core.errors import IdentificationError
+from ...core import Array, IdentificationError, tree
 from ...physics.muscle.characteristic import Characteristic, ContractileSurface, PooledLengthLaw
 from ...recording import Recording
 from .candidates import UNREACHED_FORCE

@@ -10,12 +10,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ...core import autodiff, tree
-from ...core.arrays import Array, as_slice
-from ...core.errors import Hint, IdentificationError, ParameterError, suggestion
-from ...core.tree import Leaf
-from ...physics.muscle.characteristic import PooledLengthLaw
-from ...physics.muscle.characteristic.base import Characteristic, ContractionLaw, ForceLaw, PressureLaw
+from ...core import Array, Hint, IdentificationError, Leaf, ParameterError, as_slice, autodiff, suggestion, tree
+from ...physics.muscle.characteristic import Characteristic, ContractionLaw, ForceLaw, PooledLengthLaw, PressureLaw
 from ...recording import Recording
 from ...recording.columns import QUANTITIES
 from .weighting import UNCENSORED, Censoring

@@ -15,12 +15,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core.annotation import abridged, check_field_types
-from ...core.arrays import Array
-from ...core.errors import IdentificationError, ParameterError
-from ...core.short_repr import ShortRepr
-from ...physics.muscle.characteristic import ContractileSurface
-from ...physics.muscle.characteristic.contractile_surface import exponents
+from ...core import Array, IdentificationError, ParameterError, ShortRepr, abridged, check_field_types
+from ...physics.muscle.characteristic import ContractileSurface, exponents
 from .experiment_design import LEVEL_COUNT, BenchLimits
 
 PRIOR = 1e-4

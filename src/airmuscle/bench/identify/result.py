@@ -10,11 +10,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ...core.arrays import Array
-from ...core.display import contraction_text, quantity_text
-from ...core.errors import ParameterError, suggestion
-from ...physics.muscle.characteristic.base import Characteristic
-from ...physics.muscle.characteristic.validity_range import ValidityRange
+from ...core import Array, ParameterError, contraction_text, quantity_text, suggestion
+from ...physics.muscle.characteristic import Characteristic, ValidityRange
 from ...recording import Recording
 from ...report.chapter import Chapter, NamedValue, Plot, Table
 from ...report.parameters import estimate_table

@@ -18,8 +18,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ...core.arrays import Array
-from ...core.display import contraction_text, quantity_text
+from ...core import Array, contraction_text, quantity_text
 from ...recording import Recording
 from .fit_points import FitPoints
 from .problem import FORCE, RESTING_LENGTH, FitProblem

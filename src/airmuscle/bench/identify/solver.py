@@ -7,9 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core.arrays import Array
-from ...core.errors import Hint, IdentificationError
-from ...core.tree import Leaf
+from ...core import Array, Hint, IdentificationError, Leaf
 from .gauss_newton import gauss_newton
 from .problem import FitProblem
 from .variable_projection import (

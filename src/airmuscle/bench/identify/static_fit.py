@@ -8,11 +8,8 @@ from collections.abc import Collection, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from ...core import tree
-from ...core.annotation import one_line
-from ...core.errors import HintedText, IdentificationError, ParameterError
-from ...physics.muscle.characteristic import PooledLengthLaw
-from ...physics.muscle.characteristic.base import Characteristic
+from ...core import HintedText, IdentificationError, ParameterError, one_line, tree
+from ...physics.muscle.characteristic import Characteristic, PooledLengthLaw
 from ...recording import Recording
 from ..checks import find_suspicious
 from ..checks.contractions import MAX_CONTRACTION

@@ -9,12 +9,9 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ...core import plotting
-from ...core.errors import AirmuscleError
-from ...core.reference import Reference, cite
-from ...physics.muscle.characteristic import Characteristic, PooledLengthLaw
+from ...core import AirmuscleError, Reference, cite, plotting
+from ...physics.muscle.characteristic import Characteristic, PooledLengthLaw, ValidityRange
 from ...physics.muscle.characteristic.energy_defect import EnergyDefect, maxwell_defect
-from ...physics.muscle.characteristic.validity_range import ValidityRange
 from ...physics.muscle.geometry import Geometry
 from ...physics.muscle.isobar_plot import isobar_plot
 from ...physics.muscle.isobars import compute_isobars

@@ -9,8 +9,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ...core.arrays import Array
-from ...core.errors import Hint, IdentificationError
+from ...core import Array, Hint, IdentificationError
 from ...physics.muscle.characteristic import ContractileSurface
 from ...recording import Recording
 from ..segment.runs import RELATIVE_BAND

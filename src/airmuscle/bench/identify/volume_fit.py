@@ -13,8 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core.arrays import Array
-from ...core.errors import ColumnError, IdentificationError, ParameterError
+from ...core import Array, ColumnError, IdentificationError, ParameterError
 from ...physics.muscle.geometry import Braid, ChebyshevGeometry, Geometry
 from ...physics.pneumatics.gas import GAS_CONSTANT
 from ...recording import Recording

@@ -12,9 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from ...core.annotation import check_field_types
-from ...core.arrays import Array
-from ...core.errors import ColumnError, ParameterError
+from ...core import Array, ColumnError, ParameterError, check_field_types
 from ...physics.muscle.characteristic.base import Characteristic, ForceLaw
 from ...recording import Recording
 from ..segment import estimate_sensors

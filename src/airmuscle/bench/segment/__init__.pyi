@@ -33,3 +33,13 @@ from .sensor import estimate_noise as estimate_noise
 from .sensor import estimate_resolution as estimate_resolution
 from .sensor import estimate_sensors as estimate_sensors
 from .static_points import find_static_points as find_static_points
+
+# isort: split
+# For the other rooms, not in __all__
+from .branches import branch_name as branch_name
+from .inspection_chapter import inspection_chapters as inspection_chapters
+from .interval import level_intervals as level_intervals
+from .interval import remembered as remembered
+from .interval import running_median as running_median
+from .runs import CONTRACTION_BAND as CONTRACTION_BAND
+from .runs import RELATIVE_BAND as RELATIVE_BAND

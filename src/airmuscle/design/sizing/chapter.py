@@ -8,11 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from ...core import plotting
-from ...core.errors import AirmuscleWarning
-from ...core.reference import cite
-from ...files.library import load
-from ...files.library.files import list_valves, products_of_laws
+from ...core import AirmuscleWarning, cite, plotting
+from ...files.library import list_valves, load, products_of_laws
 from ...physics.muscle.characteristic.validity_range import validity_range_of
 from ...physics.muscle.isobar_plot import isobar_figure
 from ...physics.muscle.isobars import compute_isobars

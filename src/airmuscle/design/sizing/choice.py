@@ -7,8 +7,7 @@ import math
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
-from ...core.errors import ParameterError
-from ...core.short_repr import ShortRepr
+from ...core import ParameterError, ShortRepr
 from ...files.library.entry import Entry
 from ...physics.pneumatics.gas import GAS_CONSTANT, REFERENCE_DENSITY, Ambient, Isothermal, absolute_pressure
 from .requirement import JointRequirement, LiftRequirement, SizingConditions

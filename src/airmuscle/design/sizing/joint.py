@@ -7,8 +7,7 @@ import math
 
 import numpy as np
 
-from ...core.arrays import Array
-from ...core.errors import SolveError
+from ...core import Array, SolveError
 from .choice import MuscleDesign
 from .requirement import JointRequirement, SizingConditions
 from .static_muscle import EndPoint, StaticMuscle

@@ -9,8 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core.arrays import Array
-from ...core.errors import SolveError
+from ...core import Array, SolveError
 from .choice import MuscleDesign
 from .requirement import LiftRequirement, SizingConditions
 from .static_muscle import StaticMuscle

@@ -6,10 +6,7 @@ import dataclasses
 import math
 from typing import Any, ClassVar
 
-from ...core.arrays import Array
-from ...core.declaration import model, parameter
-from ...core.errors import ParameterError
-from ...core.units import STANDARD_GRAVITY
+from ...core import STANDARD_GRAVITY, Array, ParameterError, model, parameter
 from ...physics.pneumatics.gas import Ambient
 
 MAX_COUNT = 20

@@ -9,9 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.arrays import Array
-from ...core.errors import AirmuscleError, SolveError
-from ...core.units import STANDARD_GRAVITY
+from ...core import STANDARD_GRAVITY, AirmuscleError, Array, SolveError
 from ...files.library.write import scenario_toml
 from ...physics.mechanism import AntagonisticJoint, HangingMass, Isotonic, Mechanism, SpringLoad
 from ...physics.muscle import LinearDamper, Muscle

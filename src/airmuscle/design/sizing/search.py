@@ -10,11 +10,8 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 
-from ...core.errors import AirmuscleError, AirmuscleWarning, ParameterError, SolveError
-from ...core.short_repr import ShortRepr
-from ...files.library.entry import Entry
-from ...files.library.entry_file import load_law
-from ...files.library.files import LAWS, list_laws, list_products, read_toml
+from ...core import AirmuscleError, AirmuscleWarning, ParameterError, ShortRepr, SolveError
+from ...files.library import LAWS, Entry, list_laws, list_products, load_law, read_toml
 from .choice import MuscleChoice, Requirement, SortKey, UnsuitableMuscle, by_air, rank
 from .joint import JointSearch
 from .lift import LiftSearch

@@ -9,16 +9,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core import leaves
-from ...core.arrays import Array
-from ...core.errors import ParameterError, SolveError
-from ...core.short_repr import ShortRepr
-from ...files.library.entry import Entry
-from ...files.library.scaling import scale_entry
+from ...core import Array, ParameterError, ShortRepr, SolveError, leaves
+from ...files.library import Entry, scale_entry
 from ...physics.muscle import ElasticSeriesElement, Muscle
-from ...physics.muscle.characteristic import Characteristic, ForceLaw
-from ...physics.muscle.characteristic.base import ContractionLaw, PressureLaw
-from ...physics.muscle.characteristic.validity_range import validity_range_of
+from ...physics.muscle.characteristic import Characteristic, ContractionLaw, ForceLaw, PressureLaw, validity_range_of
 from ...physics.muscle.ratings import LENGTH_BOUNDS
 from .requirement import SizingConditions
 

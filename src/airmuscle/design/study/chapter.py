@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.atomic_output import atomic_folder
-from ...core.reference import cite
+from ...core import atomic_folder, cite
 from ...report.chapter import BY_ROW, Chapter, NamedValue, Table, TableColumn
 from ...report.write import save_table, write_into
 from .distributions import LevelSet, Variation

@@ -16,10 +16,9 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from ...core.arrays import Array
-from ...core.atomic_output import atomic_file, check_writable
+from ...core import Array, atomic_file, check_writable, program_fingerprint
 from ...core.errors import AirmuscleError, FileError, SimulationError
-from ...core.fingerprint import fingerprint, program_fingerprint
+from ...core.fingerprint import fingerprint
 from ...engine.distribution import DistributedCalls
 from ...engine.processes import check_running
 from ...engine.run import Problem, solve

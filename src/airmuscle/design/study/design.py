@@ -13,8 +13,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...core.arrays import Array
-from ...core.errors import ParameterError
+from ...core import Array, ParameterError
 from ...files.library.fields import custom_field
 from .distributions import LevelSet, Variation
 from .paths import read_count

@@ -10,12 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from ...core.annotation import abridged
-from ...core.arrays import Array
-from ...core.errors import ParameterError
-from ...files.library.build import TableReader
-from ...files.library.fields import custom_field
-from ...files.library.location import Location, read_finite_number
+from ...core import Array, ParameterError, abridged
+from ...files.library import Location, TableReader, custom_field, read_finite_number
 from .paths import read_count, read_difference, read_quantity, read_ratio
 
 MIN_PROBABILITY = 1e-6

@@ -14,8 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core.arrays import Array
-from ...core.errors import ParameterError
+from ...core import Array, ParameterError
 from ...files.library.fields import custom_field
 from .paths import read_name, read_quantity, read_ratio, read_time
 

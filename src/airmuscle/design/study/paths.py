@@ -20,16 +20,11 @@ from typing import Any
 
 import numpy as np
 
+from ...core import ABSOLUTE, Array, ParameterError, abridged, parameters, quantity, suggestion
 from ...core.absolute_pressure import AbsolutePressure, ambient_pressure
-from ...core.annotation import abridged
-from ...core.arrays import Array
-from ...core.declaration import parameters
-from ...core.errors import ParameterError, suggestion
 from ...core.tree import absolute_pressures, flatten, leaves, with_parameters
-from ...core.units import ABSOLUTE, quantity
 from ...engine.loop.control_loop import ControlLoop
-from ...files.library.location import Location, read_finite_number
-from ...files.library.models import model_class
+from ...files.library import Location, model_class, read_finite_number
 from ...files.scenario.controller import controller_number_paths
 from ...files.scenario.scenario import Scenario, build_scenario, initial_pressure, run_column_units, scenario_tables
 from ...physics.equilibrium import find_equilibrium_of_each

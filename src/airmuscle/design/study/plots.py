@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.arrays import Array
-from ...core.plotting import BLACK, BLUE, ORANGE, RED, SKY, legend_below, new_figure
+from ...core import BLACK, BLUE, ORANGE, RED, SKY, Array, legend_below, new_figure
 from ...report.chapter import Plot
 from .result import SobolIndices, StudyResult
 

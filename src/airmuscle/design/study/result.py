@@ -21,9 +21,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ...core.arrays import Array
-from ...core.errors import ColumnError, suggestion
-from ...core.short_repr import ShortRepr
+from ...core import Array, ColumnError, ShortRepr, suggestion
 from ...report.chapter import BY_ROW, Table, TableColumn
 from .design import Saltelli
 from .study import Study

@@ -27,14 +27,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ...core.absolute_pressure import ambient_pressure
-from ...core.annotation import abridged
-from ...core.errors import ParameterError, suggestion
+from ...core import ParameterError, ShortRepr, abridged, ambient_pressure, suggestion
 from ...core.fingerprint import fingerprint
-from ...core.short_repr import ShortRepr
-from ...files.library.build import TableReader
-from ...files.library.files import read_toml
-from ...files.library.location import Location, check_keys, located_errors, read_text
+from ...files.library import Location, TableReader, check_keys, located_errors, read_text, read_toml
 from ...files.scenario.scenario import Scenario, build_scenario, load_scenario, run_column_units
 from .design import DESIGNS, Design
 from .distributions import Variation, read_variation

@@ -7,9 +7,7 @@ import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from ...core import autodiff
-from ...core.errors import TraceError
-from ...core.system import System
+from ...core import System, TraceError, autodiff
 from .ir import emission
 from .ir.emission import FunctionBlock, TargetLanguage
 from .ir.instructions import Code, Operand, finished, hoisted, instructions, recorded

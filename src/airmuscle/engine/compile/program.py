@@ -13,9 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core import tree
-from ...core.arrays import Array
-from ...core.system import SensitivitySystem, System
+from ...core import Array, SensitivitySystem, System, tree
 from . import functions, sensitivities, sensitivities_explicit
 from .cache.kernel import address_of
 from .cache.store import load_module

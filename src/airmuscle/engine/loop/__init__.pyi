@@ -26,3 +26,19 @@ from .sampled_signal import Trajectory as Trajectory
 from .sampled_signal import spline_trajectory as spline_trajectory
 from .sensors import ColumnSensor as ColumnSensor
 from .sensors import WithSensors as WithSensors
+
+# isort: split
+# For the other rooms, not in __all__
+from .control_law import EnclosingLaw as EnclosingLaw
+from .control_law import Memory as Memory
+from .control_law import Sampled as Sampled
+from .control_law import without_simulated as without_simulated
+from .control_loop import COMMAND as COMMAND
+from .control_loop import MEASURED as MEASURED
+from .control_loop import SETPOINT as SETPOINT
+from .control_loop import check_present as check_present
+from .controller import RELATIVE as RELATIVE
+from .controller import named_signal_units as named_signal_units
+from .inputs import check_input_names as check_input_names
+from .inputs import check_input_signal as check_input_signal
+from .piecewise_linear import FEW_SEGMENTS as FEW_SEGMENTS

@@ -10,12 +10,7 @@ import dataclasses
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from ...core import ops
-from ...core.declaration import model, parameter
-from ...core.errors import ParameterError
-from ...core.ops import Value
-from ...core.reference import Reference
-from ...core.system import select_prefix, with_prefix
+from ...core import ParameterError, Reference, Value, model, ops, parameter, select_prefix, with_prefix
 from .controller import Controller, Measurement
 
 Memory = Mapping[str, Value]

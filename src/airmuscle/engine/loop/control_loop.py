@@ -15,13 +15,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core.annotation import abridged
-from ...core.errors import ParameterError, suggestion
-from ...core.ops import Value
-from ...core.short_repr import ShortRepr, describe_model
-from ...core.system import System
+from ...core import ParameterError, ShortRepr, System, Value, abridged, describe_model, quantity, suggestion
 from ...core.tree import Structure, structure, with_ambient
-from ...core.units import quantity
 from ...recording.recording import Recording
 from .control_law import ControlLaw, EnclosingLaw, Memory, Sampled, rebuilt
 from .controller import Controller, Measurement, named_signal_units

@@ -7,8 +7,7 @@ import dataclasses
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
-from ...core.declaration import Parameter, parameters
-from ...core.ops import Value
+from ...core import Parameter, Value, parameters
 
 RELATIVE = ("u", "y", "u/y", "u/s")
 """Units of a controller's parameters that follow from the loop: u is the unit of the commanded input, y that of the

@@ -15,10 +15,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core.annotation import abridged
-from ...core.declaration import INFINITY, model, parameter
-from ...core.errors import ParameterError
-from ...core.short_repr import ShortRepr
+from ...core import INFINITY, ParameterError, ShortRepr, abridged, model, parameter
 from ..compile.kernel_text.source import plain_kernels
 from .inputs import InputSignal, check_input_names, check_input_signal
 from .piecewise_linear import PiecewiseLinear, Segment, merge_columns

@@ -11,9 +11,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ...core.annotation import abridged, one_line
-from ...core.declaration import as_float
-from ...core.errors import ParameterError, suggestion
+from ...core import ParameterError, abridged, as_float, one_line, suggestion
 from .piecewise_linear import PiecewiseLinear
 
 MAX_INSTANTS = 10_000_000

@@ -9,9 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...core.arrays import FEW, Array, all_finite
-from ...core.errors import ParameterError
-from ...core.short_repr import ShortRepr
+from ...core import FEW, Array, ParameterError, ShortRepr, all_finite
 
 FEW_SEGMENTS = 16
 """Segments up to which they are gone through one by one, which is faster (measured)."""

@@ -10,10 +10,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ...core.annotation import one_line
-from ...core.arrays import Array
-from ...core.declaration import as_float
-from ...core.errors import AirmuscleWarning, ParameterError
+from ...core import AirmuscleWarning, Array, ParameterError, as_float, one_line
 from ...recording.recording import Recording
 from .inputs import InputSignal, as_pairs, check_input_names, check_mapping, check_points
 from .piecewise_linear import PiecewiseLinear

@@ -7,13 +7,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from ...core import ops
-from ...core.arrays import Array
+from ...core import Array, ParameterError, Reference, Value, ops, select_prefix, with_prefix
 from ...core.declaration import Parameter, model, parameter
-from ...core.errors import ParameterError
-from ...core.ops import Value
-from ...core.reference import Reference
-from ...core.system import select_prefix, with_prefix
 from .control_law import ControlLaw, EnclosingLaw, Memory, Sampled
 from .controller import Measurement, SignalRelated
 

@@ -7,8 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core.arrays import Array, flat_view
-from ...core.diagnostics import Status
+from ...core import Array, Status, flat_view
 from ..compile.cache.kernel import Kernel
 from ..compile.functions import ArraySizes
 from ..loop.piecewise_linear import PiecewiseLinear

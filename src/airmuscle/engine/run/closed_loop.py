@@ -12,13 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from ...core import tree
-from ...core.arrays import Array
-from ...core.diagnostics import Diagnostic, DiagnosticCode, Status
-from ..loop.control_law import ControlLaw
-from ..loop.control_loop import COMMAND, MEASURED, SETPOINT, ControlLoop, ControlLoopState
-from ..loop.inputs import Schedule
-from ..loop.piecewise_linear import PiecewiseLinear
+from ...core import Array, Diagnostic, DiagnosticCode, Status, tree
+from ..loop import COMMAND, MEASURED, SETPOINT, ControlLaw, ControlLoop, ControlLoopState, PiecewiseLinear, Schedule
 from ..state import column_units
 from .bound_integrator import RawSolution
 from .compiled_law import parameters_of

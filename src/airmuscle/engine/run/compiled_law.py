@@ -11,12 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from ...core import autodiff, tree
-from ...core.arrays import Array
-from ...core.errors import TraceError
+from ...core import Array, TraceError, autodiff, tree
 from ..compile.function import Function, LanesFunction
-from ..loop.control_law import ControlLaw
-from ..loop.controller import Measurement
+from ..loop import ControlLaw, Measurement
 
 _ARGUMENTS = ("measured", "setpoints", "memory", "minimum", "maximum", "sample_time", "parameters")
 UNLIMITED = (-math.inf, math.inf)

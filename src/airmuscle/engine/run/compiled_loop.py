@@ -10,14 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from ...core.arrays import Array, flat_view
-from ...core.diagnostics import Status
+from ...core import Array, Status, flat_view
 from ..compile.cache import kernel
 from ..compile.kernel_layout import Progress, Waiting
 from ..compile.program import CompiledSystem
-from ..loop.control_law import ControlLaw
-from ..loop.control_loop import ControlLoopState
-from ..loop.piecewise_linear import PiecewiseLinear
+from ..loop import ControlLaw, ControlLoopState, PiecewiseLinear
 from .bound_integrator import INTERRUPT_CHECK_STEPS, MAX_STEPS
 from .compiled_law import compiled_sample, parameters_of
 from .driver_table import DriverTable, are_called, greatest_capacity

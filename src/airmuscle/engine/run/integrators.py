@@ -6,11 +6,7 @@ import abc
 import functools
 from typing import ClassVar
 
-from ...core.annotation import abridged
-from ...core.arrays import Array
-from ...core.declaration import model, parameter
-from ...core.errors import ParameterError
-from ...core.reference import Reference
+from ...core import Array, ParameterError, Reference, abridged, model, parameter
 from ..compile.cache.kernel import fixed_step, rodas4
 from ..compile.program import CompiledSystem, Tableau
 from ..loop.piecewise_linear import PiecewiseLinear

@@ -9,12 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ...core import ops, tree
-from ...core.errors import AirmuscleError, ParameterError
-from ...core.system import System
-from ..loop.control_law import ControlLaw
-from ..loop.control_loop import COMMAND, ControlLoop
-from ..loop.controller import Measurement
+from ...core import AirmuscleError, ParameterError, System, ops, tree
+from ..loop import COMMAND, ControlLaw, ControlLoop, Measurement
 from .problem import Problem
 from .sampled_loop import SampledLoop, prepare_loop
 

@@ -10,16 +10,9 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from ...core import autodiff, ops, tree
-from ...core.arrays import Array
-from ...core.declaration import model
-from ...core.errors import ParameterError, suggestion
-from ...core.ops import Value
-from ...core.system import System
+from ...core import Array, ParameterError, System, Value, autodiff, model, ops, suggestion, tree
 from ...recording.recording import Recording
-from ..loop.control_law import ControlLaw, Memory, Sampled
-from ..loop.control_loop import SETPOINT, ControlLoop
-from ..loop.controller import Measurement
+from ..loop import SETPOINT, ControlLaw, ControlLoop, Measurement, Memory, Sampled
 from .compiled_law import TracedSample, trace_sample
 from .with_sensitivities import WithSensitivities, sensitivity
 

@@ -7,10 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ...core.annotation import one_line
-from ...core.arrays import Array
-from ...core.declaration import as_float
-from ...core.errors import ParameterError
+from ...core import Array, ParameterError, as_float, one_line
 
 MAX_OUTPUT_STEP = 0.01
 """The default grid is at least this fine [s]."""

@@ -11,17 +11,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ...core.arrays import FEW, NUMBERS, Array
-from ...core.declaration import as_float
-from ...core.errors import ParameterError
-from ...core.reference import Reference, cite
-from ...core.short_repr import ShortRepr
-from ...core.system import System
+from ...core import FEW, NUMBERS, Array, ParameterError, Reference, ShortRepr, System, as_float, cite
 from ..compile.program import CompiledSystem, compile_system
+from ..loop import InputSignal, PiecewiseLinear, Schedule, WithDrivers, check_input_signal
 from ..loop.control_loop import ControlLoop, ControlLoopState, designed_loop
-from ..loop.driver import WithDrivers
-from ..loop.inputs import InputSignal, Schedule, check_input_signal
-from ..loop.piecewise_linear import PiecewiseLinear
 from ..state import check_system, state_vector
 from .integrators import Integrator, default_integrator
 from .output_times import output_times

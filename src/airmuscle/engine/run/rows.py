@@ -8,9 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core.arrays import Array
-from ...core.diagnostics import Columns, Diagnostic, DiagnosticCode, Status
-from ...core.reference import Reference
+from ...core import Array, Columns, Diagnostic, DiagnosticCode, Reference, Status
 from ...recording import Recording
 from ..compile.cache.kernel import record
 from ..compile.program import CompiledSystem

@@ -9,17 +9,10 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
-from ...core.annotation import one_line
-from ...core.arrays import NUMBERS
-from ...core.declaration import as_float
-from ...core.diagnostics import Status
-from ...core.errors import ParameterError, SimulationError
-from ...core.system import System
+from ...core import NUMBERS, ParameterError, SimulationError, Status, System, as_float, one_line
 from ...recording import Recording
 from ..compile.program import CompiledSystem, compile_system
-from ..loop.control_loop import ControlLoop
-from ..loop.inputs import InputSignal, Schedule
-from ..loop.piecewise_linear import PiecewiseLinear
+from ..loop import ControlLoop, InputSignal, PiecewiseLinear, Schedule
 from ..state import check_system, state_vector
 from .bound_integrator import INTERRUPT_CHECK_STEPS, BoundIntegrator, RawSolution
 from .closed_loop import solve_closed_loop

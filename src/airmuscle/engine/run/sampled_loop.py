@@ -11,13 +11,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ...core.arrays import Array
-from ...core.errors import ParameterError
+from ...core import Array, ParameterError
 from ..compile.program import CompiledSystem
-from ..loop.control_loop import ControlLoop, ControlLoopState
-from ..loop.controller import Measurement
-from ..loop.inputs import InputSignal
-from ..loop.piecewise_linear import FEW_SEGMENTS, PiecewiseLinear
+from ..loop import FEW_SEGMENTS, ControlLoop, ControlLoopState, InputSignal, Measurement, PiecewiseLinear
 from .output_times import output_times
 from .problem import Problem
 

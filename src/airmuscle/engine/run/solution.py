@@ -6,9 +6,7 @@ import dataclasses
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ...core.diagnostics import Diagnostic, Status
-from ...core.errors import SimulationError
-from ...core.reference import Reference
+from ...core import Diagnostic, Reference, SimulationError, Status
 from ...recording import Recording
 from ...recording.notebook import Card, NotebookDisplay
 from ...recording.plot import plot_columns

@@ -10,12 +10,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ...core import tree
-from ...core.annotation import one_line
-from ...core.arrays import Array
-from ...core.diagnostics import ColumnLimit, DiagnosticCode, Status
+from ...core import Array, ColumnLimit, DiagnosticCode, Status, System, one_line, tree
 from ...core.errors import ParameterError, SimulationError, suggestion
-from ...core.system import System
 from ..compile.cache.kernel import begin_step, end_step
 from ..compile.program import CompiledSystem, compile_system
 from ..state import check_system, state_vector

@@ -5,10 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
-from ...core import autodiff, ops, tree
-from ...core.declaration import model, parameter
-from ...core.errors import ParameterError, suggestion
-from ...core.ops import Value
+from ...core import ParameterError, Value, autodiff, model, ops, parameter, suggestion, tree
 from ...core.system import Input, SensitivitySystem, StateVariable, System
 
 TOLERANCE_FACTOR = 10.0

@@ -40,3 +40,30 @@ from .uncertainty import without_parts as without_parts
 from .write import save as save
 from .write import to_toml as to_toml
 from .write import write_text as write_text
+
+# isort: split
+# For the other rooms, not in __all__
+from . import plant_file as plant_file
+from .build import TableReader as TableReader
+from .build import only_class as only_class
+from .entry_display import PARTS as PARTS
+from .entry_file import kind_of as kind_of
+from .evaluation import UNITS as UNITS
+from .evaluation import evaluate as evaluate
+from .fields import custom_field as custom_field
+from .fields import origin as origin
+from .fields import read_parameter as read_parameter
+from .files import is_path as is_path
+from .files import products_of_laws as products_of_laws
+from .fitted_entry import campaign_entry as campaign_entry
+from .fitted_entry import find_initial_law as find_initial_law
+from .fitted_entry import resting_lengths as resting_lengths
+from .location import check_keys as check_keys
+from .location import read_finite_number as read_finite_number
+from .location import read_text as read_text
+from .plant_file import SCENARIO_TABLES as SCENARIO_TABLES
+from .uncertainty import PREDICTED as PREDICTED
+from .write import model_table as model_table
+from .write import part_toml as part_toml
+from .write import scenario_toml as scenario_toml
+from .write import tables_toml as tables_toml

@@ -14,9 +14,7 @@ import typing
 from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
-from ...core.annotation import abridged
-from ...core.declaration import Parameter, check_field, parameters
-from ...core.errors import ParameterError
+from ...core import Parameter, ParameterError, abridged, check_field, parameters
 from .fields import (
     accepts,
     check_required,

@@ -10,8 +10,7 @@ import dataclasses
 from pathlib import Path
 
 from ...bench.readers import read_csv
-from ...core.errors import FileError
-from ...core.reference import Reference
+from ...core import FileError, Reference
 from ...recording import Recording
 from .entry import AnyEntry, PlantEntry, issue_warning
 from .entry_file import build_entry, kind_of

@@ -19,19 +19,14 @@ import warnings
 from collections.abc import Iterator, Mapping
 from typing import Any, ClassVar
 
-from ...core.annotation import check_field_types, one_line
-from ...core.declaration import model, parameter
+from ...core import ABSOLUTE, Reference, check_field_types, model, one_line, parameter
 from ...core.errors import AirmuscleWarning, ParameterError, UnknownNameError, suggestion
-from ...core.reference import Reference
-from ...core.units import ABSOLUTE
 from ...physics.muscle import CreepElements, Damper, Muscle, Ratings, SeriesElement, Spring, Stop, Wall
-from ...physics.muscle.characteristic.base import Characteristic, ForceLaw
-from ...physics.muscle.characteristic.validity_range import ValidityRange
+from ...physics.muscle.characteristic import Characteristic, ForceLaw, ValidityRange
 from ...physics.muscle.friction.base import Friction
 from ...physics.muscle.geometry.base import Geometry
 from ...physics.plant.plant import Plant
-from ...physics.pneumatics.gas import REFERENCE_DENSITY, REFERENCE_TEMPERATURE
-from ...physics.pneumatics.valve import Orifice
+from ...physics.pneumatics import REFERENCE_DENSITY, REFERENCE_TEMPERATURE, Orifice
 from ...report.chapter import Table
 from .entry_display import EntryDisplay
 from .fields import under

@@ -9,11 +9,8 @@ from typing import Any
 import numpy as np
 
 from ...bench.reported import Reported
-from ...core.annotation import check_field_types, one_line
-from ...core.errors import ParameterError, suggestion
+from ...core import ParameterError, check_field_types, cite, leaves, one_line, suggestion
 from ...core.plotting import LINES, new_figure, relabel_in_display_units
-from ...core.reference import cite
-from ...core.tree import leaves
 from ...physics.muscle import Ratings
 from ...physics.muscle.isobar_plot import plot_isobars
 from ...report.chapter import BY_ROW, Chapter, NamedValue, Plot, Table, TableColumn

@@ -7,8 +7,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ...core.errors import ParameterError, UnknownNameError
-from ...core.reference import Reference
+from ...core import ParameterError, Reference, UnknownNameError
 from ...physics.muscle.geometry.base import Geometry
 from .build import build
 from .entry import Entry, PlantEntry, ProductEntry, ValveEntry, issue_warning

@@ -9,13 +9,9 @@ from collections.abc import Mapping
 from typing import Any
 
 from ...bench.reported import Reported
-from ...core import leaves
-from ...core.absolute_pressure import check_above_vacuum
-from ...core.display import contraction_text, quantity_text
+from ...core import check_above_vacuum, contraction_text, leaves, quantity, quantity_text
 from ...core.errors import AirmuscleWarning, GeometryLimitError, ParameterError, PhysicsError, RatingError, SolveError
-from ...core.units import quantity
-from ...physics.muscle.characteristic import Characteristic, ForceLaw, ValidityRange
-from ...physics.muscle.characteristic.validity_range import validity_range_of
+from ...physics.muscle.characteristic import Characteristic, ForceLaw, ValidityRange, validity_range_of
 from ...physics.muscle.isobar_plot import describe_point, isobar_plot
 from ...physics.muscle.isobars import Isobars, WorkingPoint, compute_isobars
 from ...report.chapter import Chapter, NamedValue

@@ -9,9 +9,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from ...bench.readers import read_csv
-from ...core.annotation import abridged
-from ...core.declaration import Parameter
-from ...core.errors import ParameterError
+from ...core import Parameter, ParameterError, abridged
 from .location import Location, located_errors, read_number, with_article
 
 Reader = Callable[[Any, Any, Location], Any]

@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ...bench.readers.file_kind import read_toml as read_toml_file
-from ...core.annotation import one_line
-from ...core.errors import FileError, UnknownNameError, suggestion
+from ...core import FileError, UnknownNameError, one_line, suggestion
 
 LAWS = Path(__file__).parent
 """Folder of the muscles and laws."""

@@ -15,8 +15,7 @@ from ...bench.identify.candidate_scores import RankedModel
 from ...bench.identify.group_refits import LEVEL
 from ...bench.identify.specimen_errors import SpecimenErrors, ranked_specimen_errors, resting_lengths_of, specimens_of
 from ...bench.segment import maximum_rate
-from ...core.errors import HintedText, IdentificationError, ParameterError, UnknownNameError, printable, suggestion
-from ...core.reference import cite
+from ...core import HintedText, IdentificationError, ParameterError, UnknownNameError, cite, printable, suggestion
 from ...physics.muscle.characteristic import Characteristic, ContractileSurface
 from ...physics.muscle.friction import NoFriction
 from ...physics.muscle.geometry import Geometry

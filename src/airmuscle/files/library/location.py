@@ -9,9 +9,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ...core import units
-from ...core.annotation import abridged, one_line
-from ...core.errors import AirmuscleError, ParameterError, suggestion
+from ...core import AirmuscleError, ParameterError, abridged, one_line, suggestion, units
 
 
 @dataclasses.dataclass(frozen=True)

@@ -18,8 +18,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from ...control import laws
-from ...core.annotation import abridged, one_line
-from ...core.errors import Hint, HintedText, UnknownNameError, suggestion
+from ...core import Hint, HintedText, UnknownNameError, abridged, one_line, suggestion
 from ...engine import loop, run
 from ...physics import mechanism, muscle, plant, pneumatics
 from ...physics.muscle import characteristic, friction, geometry

@@ -22,8 +22,7 @@ from pathlib import Path
 from types import NoneType
 from typing import Any
 
-from ...core.annotation import abridged
-from ...core.errors import ParameterError
+from ...core import ParameterError, abridged
 from ...engine.loop.driver import Driver, SolenoidDriver
 from ...physics.muscle import Muscle
 from ...physics.muscle.characteristic.base import ForceLaw

@@ -5,9 +5,7 @@ from __future__ import annotations
 import dataclasses
 from typing import Any, TypeVar
 
-from ...core import leaves
-from ...core.errors import ParameterError
-from ...core.units import quantity
+from ...core import ParameterError, leaves, quantity
 from ...physics.muscle.characteristic import (
     ChouHannaford1996,
     MartensBoblan2017,

@@ -9,10 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.annotation import check_field_types
-from ...core.arrays import Array
-from ...core.declaration import parameter
-from ...core.errors import ParameterError, suggestion
+from ...core import Array, ParameterError, check_field_types, parameter, suggestion
 from ...recording.columns import QUANTITIES
 
 PREDICTED = ("force", "contraction", "pressure")

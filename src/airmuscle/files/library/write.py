@@ -8,13 +8,9 @@ from pathlib import Path
 from typing import Any
 
 from ...bench.identify import Fit
-from ...core.annotation import abridged, one_line
-from ...core.atomic_output import atomic_file
-from ...core.errors import FileError, ParameterError
-from ...core.reference import Reference
+from ...core import FileError, ParameterError, Reference, abridged, atomic_file, one_line
 from ...physics.muscle import Muscle, Ratings
-from ...physics.muscle.characteristic.base import Characteristic
-from ...physics.muscle.characteristic.validity_range import ValidityRange
+from ...physics.muscle.characteristic import Characteristic, ValidityRange
 from ...physics.plant.plant import Plant
 from .entry import OPTIONAL_PARTS, Check, Entry
 from .fitted_entry import fitted_entry

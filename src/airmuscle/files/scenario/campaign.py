@@ -11,11 +11,8 @@ import numpy as np
 
 from ...bench.identify.campaign import Campaign, CampaignRecord, FillStage, RecordKind, ReleaseStage
 from ...bench.identify.dynamic import stated_ambient
-from ...bench.segment.interval import running_median
-from ...bench.segment.runs import CONTRACTION_BAND
-from ...core import tree
-from ...core.arrays import Array
-from ...core.errors import AirmuscleError
+from ...bench.segment import CONTRACTION_BAND, running_median
+from ...core import AirmuscleError, Array, tree
 from ...engine.loop.sampled_signal import ACCELERATION, spline_trajectory
 from ...physics.mechanism import Isometric, PrescribedMotion
 from ...physics.muscle import Muscle

@@ -37,22 +37,15 @@ import typing
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from ...core.annotation import abridged
-from ...core.declaration import Parameter, parameters
-from ...core.errors import ParameterError
-from ...core.system import Input
-from ...core.units import is_known_unit
-from ...engine.loop.control_loop import ControlLoop, check_present
+from ...core import Input, Parameter, ParameterError, abridged, is_known_unit, parameters
+from ...engine.loop import ControlLoop, InputSignal, check_input_names, check_present
 from ...engine.loop.controller import RELATIVE, Controller, SignalRelated, named_signal_units, parameter_units, unit_of
-from ...engine.loop.inputs import InputSignal, check_input_names
 from ...engine.state import column_units
 from ...physics.mechanism.base import Mechanism
 from ...physics.muscle import Muscle
 from ...physics.plant.plant import Plant
+from ..library import PLANT_READER, Location, custom_field, located_errors, origin, read_parameter
 from ..library.build import build
-from ..library.fields import custom_field, origin, read_parameter
-from ..library.location import Location, located_errors
-from ..library.plant_file import PLANT_READER
 from .inputs import build_input_signal, read_drivers
 from .values import Number
 

@@ -50,19 +50,13 @@ from ...bench.identify.dynamic import (
 from ...bench.identify.dynamic.experiment import ParameterPaths, RecordUnknown
 from ...bench.readers import ColumnMapping, read, read_mapping
 from ...bench.readers.mapping import mapping_of_tables
-from ...core.absolute_pressure import ambient_pressure
-from ...core.annotation import abridged
-from ...core.errors import ParameterError
-from ...core.short_repr import ShortRepr
+from ...core import ParameterError, ShortRepr, abridged, ambient_pressure
 from ...engine.run import Integrator
 from ...engine.run.problem import check_signal
 from ...physics.plant.plant import Plant
 from ...recording import Recording
-from ..library.fields import custom_field
-from ..library.files import read_toml
+from ..library import build_plant, custom_field, read_toml, scenario_toml
 from ..library.location import Location, check_keys, located_errors, read_text
-from ..library.plant_file import build_plant
-from ..library.write import scenario_toml
 from .initial_state import build_initial_conditions, pressure_names
 from .inputs import build_input_signal
 from .plant_uncertainty import fit_uncertainty

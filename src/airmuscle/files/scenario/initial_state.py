@@ -13,8 +13,7 @@ from typing import Any
 import numpy as np
 
 from ...bench.identify.dynamic import InitialConditions
-from ...core.annotation import abridged
-from ...core.errors import EquilibriumError, HintedText, ParameterError
+from ...core import EquilibriumError, HintedText, ParameterError, abridged
 from ...physics.equilibrium import find_equilibrium
 from ...physics.plant.plant import Plant
 from ...recording import Recording

@@ -17,17 +17,11 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ...bench.readers import read_csv
-from ...core.annotation import abridged
-from ...core.errors import ColumnError, ParameterError
-from ...core.system import Input
-from ...engine.loop.driver import Driver, WithDrivers
+from ...core import ColumnError, Input, ParameterError, abridged
+from ...engine.loop import Driver, SampledSignal, WithDrivers
 from ...engine.loop.inputs import NO_INPUT, InputSignal, Periodic, Schedule, check_input_names
-from ...engine.loop.sampled_signal import SampledSignal
 from ...recording.heading import split_unit
-from ..library.fields import custom_field
-from ..library.location import Location, located_errors, read_finite_number
-from ..library.models import model_class
-from ..library.plant_file import PLANT_READER
+from ..library import PLANT_READER, Location, custom_field, located_errors, model_class, read_finite_number
 from .values import Number
 
 Points = tuple[tuple[float, float], ...]

@@ -25,15 +25,10 @@ from ...bench.identify.dynamic.fit import OF_RECORD
 from ...bench.identify.group_refits import LEVEL, degrees_of_freedom, root_mean_square, t_quantile
 from ...bench.identify.prediction import PlantUncertainty
 from ...bench.identify.prediction.dynamic import NORMAL_QUANTILE
-from ...bench.segment import maximum_rate
-from ...bench.segment.sensor import estimate_noise
-from ...core import tree
-from ...core.arrays import Array
-from ...core.errors import ParameterError
+from ...bench.segment import estimate_noise, maximum_rate
+from ...core import Array, ParameterError, tree
 from ...physics.plant.plant import Plant
-from ..library.fields import custom_field
-from ..library.location import Location, located_errors
-from ..library.uncertainty import ParameterUncertainty
+from ..library import Location, ParameterUncertainty, custom_field, located_errors
 from .values import BySignal, table_reader
 
 COVARIANCE_KEYS = ("parameters", "standard_errors", "correlations")

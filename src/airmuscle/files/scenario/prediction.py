@@ -37,11 +37,8 @@ from ...physics.muscle.characteristic.base import ForceLaw
 from ...physics.muscle.muscle import LENGTH_TOLERANCE
 from ...recording import Recording
 from ...recording.heading import split_unit
-from ..library.entry import Entry
-from ..library.files import is_path, list_plants, read_toml
+from ..library import Entry, is_path, list_plants, plant_tables, read_toml, scale_to_length
 from ..library.location import Location, check_keys, located_errors
-from ..library.plant_file import plant_tables
-from ..library.scaling import scale_to_length
 from .identification import Record, build_records, with_observed
 from .initial_state import first_value, pressure_names, recorded_pressures
 from .scenario import TABLES, Scenario, build_scenario

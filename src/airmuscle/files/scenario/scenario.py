@@ -31,18 +31,13 @@ from types import MappingProxyType
 from typing import Any
 
 from ...bench.identify.prediction import PlantUncertainty
-from ...core.absolute_pressure import ambient_pressure
-from ...core.errors import FileError, ParameterError, suggestion
-from ...core.short_repr import ShortRepr
-from ...engine.loop.control_loop import ControlLoop
-from ...engine.loop.inputs import InputSignal
+from ...core import FileError, ParameterError, ShortRepr, ambient_pressure, suggestion
+from ...engine.loop import ControlLoop, InputSignal
 from ...engine.run import Integrator, Problem, solve
 from ...physics.plant.plant import Plant
 from ...recording import Recording
-from ..library.fields import custom_field
-from ..library.files import is_path, list_plants, read_toml
+from ..library import SCENARIO_TABLES, build_plant, custom_field, is_path, list_plants, plant_tables, read_toml
 from ..library.location import Location, check_keys, located_errors, read_finite_number
-from ..library.plant_file import SCENARIO_TABLES, build_plant, plant_tables
 from .controller import build_control_loop, signal_units
 from .initial_state import build_initial_state, read_initial_table
 from .inputs import build_input_signal

@@ -16,17 +16,13 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ...core.declaration import Parameter, parameters
-from ...engine.loop.controller import RELATIVE, Controller
-from ...engine.loop.driver import Driver
+from ...engine.loop import RELATIVE, Controller, Driver
 from ...physics.muscle import Muscle
 from ...physics.plant.plant import Plant
 from ...physics.pneumatics.valve import Orifice
-from ..library import plant_file
-from ..library.build import only_class
+from ..library import PREDICTED, StatedBand, model_class, model_names, only_class, plant_file
 from ..library.entry import CONDITIONS, PATHS, Check, Entry
 from ..library.fields import is_required, options, origin
-from ..library.models import model_class, model_names
-from ..library.uncertainty import PREDICTED, StatedBand
 from . import controller, initial_state, inputs, plant_uncertainty, scenario, values
 from .controller import plant_fields
 

@@ -9,13 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from ...core.plotting import BLACK, BLUE, legend_below, new_figure
-from ...core.reference import cite
-from ...engine.loop import InputSignal, Periodic, SampledSignal, Schedule
+from ...core import BLACK, BLUE, cite, legend_below, new_figure
+from ...engine.loop import InputSignal, Periodic, PiecewiseLinear, SampledSignal, Schedule, WithDrivers, relative_unit
 from ...engine.loop.control_loop import COMMAND, MEASURED, SETPOINT, ControlLoop
-from ...engine.loop.controller import relative_unit
-from ...engine.loop.driver import WithDrivers
-from ...engine.loop.piecewise_linear import PiecewiseLinear
 from ...recording import Recording
 from ...recording.columns import display_scale, quantity_of
 from ...report.chapter import BY_ROW, Chapter, Plot, Table, TableColumn

@@ -12,16 +12,11 @@ from typing import Any
 
 from ...bench.identify.dynamic import InitialValue, StartTime
 from ...bench.identify.dynamic.experiment import ParameterPaths, RecordUnknown
-from ...core import tree
-from ...core.annotation import abridged
-from ...core.errors import ParameterError, suggestion
+from ...core import ParameterError, abridged, suggestion, tree
 from ...engine.run import Integrator
 from ...physics.plant.plant import Plant
 from ...recording.columns import quantity_of
-from ..library.build import TableReader
-from ..library.fields import custom_field
-from ..library.location import Location, check_keys, read_finite_number, read_text
-from ..library.plant_file import PLANT_READER
+from ..library import PLANT_READER, Location, TableReader, check_keys, custom_field, read_finite_number, read_text
 from .initial_state import PRESSURE, pressure_names
 
 MAX_STARTS, MAX_SEED = 10_000, 2**32 - 1

@@ -8,12 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from ...core.errors import ParameterError
-from ...engine.loop import InputSignal, Periodic, SampledSignal, Schedule
-from ...engine.loop.control_law import ControlLaw
-from ...engine.loop.control_loop import ControlLoop
-from ...engine.loop.driver import WithDrivers
-from ..library.location import Location
-from ..library.write import model_table, tables_toml, write_text
+from ...engine.loop import ControlLaw, ControlLoop, InputSignal, Periodic, SampledSignal, Schedule, WithDrivers
+from ..library import Location, model_table, tables_toml, write_text
 from .scenario import Scenario, build_scenario
 
 

@@ -12,12 +12,8 @@ from ...bench.identify import ModelApproximation
 from ...bench.identify import approximate as approximate_law
 from ...bench.identify.approximation import GRID_POINTS, sample_on_grid
 from ...core.errors import ParameterError
-from ...files.library.entry import Entry
-from ...files.library.entry_file import load_law
-from ...files.library.fitted_entry import find_initial_law
-from ...files.library.write import save
-from ...physics.muscle.characteristic import ValidityRange
-from ...physics.muscle.characteristic.validity_range import validity_range_of
+from ...files.library import Entry, find_initial_law, load_law, save
+from ...physics.muscle.characteristic import ValidityRange, validity_range_of
 from ..requests.declaration import option, request
 from .delivery import print_result
 from .options import Json, Name, complete_law

@@ -22,20 +22,16 @@ from ...bench.identify.campaign import STAGES, Campaign, LeftOutStage, StaticSta
 from ...bench.identify.campaign.campaign_chapters import UnreadFile, ValidationRow, campaign_chapters, stage_data
 from ...bench.readers import ColumnMapping
 from ...bench.readers.reader import complete_bench, find_files, read_file
-from ...core.atomic_output import atomic_file, atomic_folder, check_writable
+from ...core import atomic_file, atomic_folder, check_writable, program_fingerprint
 from ...core.errors import AirmuscleError, ColumnError, FileError, IdentificationError
-from ...core.fingerprint import fingerprint, program_fingerprint
+from ...core.fingerprint import fingerprint
 from ...engine.compile.cache.store import cache_folder, read_private
-from ...files.library.entry import Entry
-from ...files.library.fitted_entry import campaign_entry, resting_lengths
-from ...files.library.write import to_toml
+from ...files.library import Entry, campaign_entry, resting_lengths, to_toml
 from ...files.scenario.campaign import RecordScenario, campaign_scenarios
 from ...physics.muscle.geometry import Geometry
 from ...recording import Recording
 from ...report.data import as_json
-from ..requests.braid import BraidSize, braid_of_length, check_one_length, read_braid
-from ..requests.declaration import option, request
-from ..requests.reading import ReadingRequest
+from ..requests import BraidSize, ReadingRequest, braid_of_length, check_one_length, option, read_braid, request
 from .bench_files import print_row_notes, reading_chapters
 from .delivery import deliver
 from .execution import Execution

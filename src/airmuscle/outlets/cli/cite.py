@@ -8,8 +8,7 @@ from typing import Annotated
 
 import typer
 
-from ...core import reference
-from ...core.reference import Reference
+from ...core import Reference, reference
 from ...files.library.catalogue import load
 from .options import Json, Name
 from .terminal import echo, print_json

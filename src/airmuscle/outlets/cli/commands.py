@@ -15,8 +15,7 @@ from typing import Annotated, Any, NamedTuple
 import typer
 from typer.core import TyperGroup
 
-from ...core.atomic_output import exclusive_folders
-from ...core.errors import AirmuscleError, AirmuscleWarning, quotable, suggestion
+from ...core import AirmuscleError, AirmuscleWarning, exclusive_folders, quotable, suggestion
 from .interruption import INTERRUPTED, check_interrupted, deferred_sigint
 from .option_hints import in_options
 from .options import install_completion_classes, print_completion_script

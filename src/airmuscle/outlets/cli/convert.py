@@ -12,8 +12,7 @@ from ...bench.readers import Decimation, read, write
 from ...bench.readers.reader import find_files
 from ...bench.readers.writer import EXTENSIONS
 from ...core.errors import FileError
-from ..requests.declaration import option, request
-from ..requests.reading import ReadingRequest
+from ..requests import ReadingRequest, option, request
 from .bench_files import print_row_notes
 from .options import Json
 from .request_options import with_requests

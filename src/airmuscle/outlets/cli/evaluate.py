@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from ...files.library.catalogue import load
-from ...files.library.evaluation import UNITS
-from ...files.library.evaluation import evaluate as evaluate_entry
+from ...files.library import UNITS, load
+from ...files.library import evaluate as evaluate_entry
 from ...physics.muscle.isobar_plot import describe_point, isobar_table
 from ...report.write import rendered_figure, save_table
-from ..requests.declaration import RequestError, Where, option, request
-from ..requests.entry import EntryRequest
+from ..requests import EntryRequest, RequestError, Where, option, request
 from .delivery import print_result, write_result
 from .options import Json, Name, OptionalFolder
 from .request_options import with_requests

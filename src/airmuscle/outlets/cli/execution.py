@@ -6,8 +6,7 @@ import contextlib
 from collections.abc import Iterator
 from pathlib import Path
 
-from ...core.atomic_output import check_writable
-from ...core.errors import FolderInUseError
+from ...core import FolderInUseError, check_writable
 from ...engine.executors import SharedFolder, dask_cluster, shared_folder
 from ...engine.processes import Workers, available_cores
 from ...report.write import REPORT_FILE

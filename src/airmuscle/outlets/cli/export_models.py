@@ -8,8 +8,7 @@ from typing import Any
 
 from ...core.atomic_output import check_writable
 from ...files import list_plants
-from ...files.library.entry_file import load_law
-from ...files.library.files import read_toml
+from ...files.library import load_law, read_toml
 from ...files.scenario.scenario import load_scenario
 from ..export import (
     Stack,

@@ -6,10 +6,7 @@ from pathlib import Path
 
 from ...core.atomic_output import check_writable
 from ...files.library.write import to_toml
-from ..requests.declaration import RequestError
-from ..requests.fit import FitRequest
-from ..requests.fitting import fit_requested
-from ..requests.reading import ReadingRequest
+from ..requests import FitRequest, ReadingRequest, RequestError, fit_requested
 from .bench_files import Files, read_recordings
 from .delivery import deliver
 from .execution import Execution

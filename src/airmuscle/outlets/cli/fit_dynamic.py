@@ -15,8 +15,7 @@ from ...bench.segment import inspect
 from ...core.atomic_output import check_writable
 from ...files.scenario.identification import DynamicFitSetup, load_dynamic_fit
 from ...recording.recording import row_notes
-from ..requests.declaration import option, request
-from ..requests.fit import WEAK
+from ..requests import WEAK, option, request
 from .delivery import deliver
 from .options import Folder, Json
 from .request_options import with_requests

@@ -12,14 +12,10 @@ from typing import Any
 from ...bench.identify.experiment_design import BenchLimits
 from ...bench.identify.recursive_fit import RecursiveFit
 from ...bench.readers.follow import RowReader, follow_lines
-from ...core.atomic_output import atomic_folder, check_writable
-from ...core.display import contraction_text, quantity_text
-from ...core.errors import ColumnError, IdentificationError
-from ...files.library.entry import Entry
-from ...files.library.write import save
+from ...core import ColumnError, IdentificationError, atomic_folder, check_writable, contraction_text, quantity_text
+from ...files.library import Entry, save
 from ...physics.muscle.characteristic import ValidityRange
-from ..requests.declaration import option, request
-from ..requests.reading import Pairs, ReadingRequest
+from ..requests import Pairs, ReadingRequest, option, request
 from .options import Json, OptionalFolder
 from .request_options import with_requests
 from .terminal import echo

@@ -8,19 +8,11 @@ from pathlib import Path
 
 from ...bench.identify.static_fit_chapter import volume_chapter, volume_summary
 from ...bench.identify.volume_fit import VolumeFit, fit_volume, volume_points
-from ...core.atomic_output import check_writable
-from ...core.errors import ParameterError, PhysicsError
-from ...files.library.entry import Entry
-from ...files.library.entry_file import load_law
-from ...files.library.fitted_entry import list_files, resting_lengths
-from ...files.library.write import part_toml, to_toml
-from ...physics.muscle.characteristic import ValidityRange
-from ...physics.muscle.characteristic.energy_defect import EnergyDefect, maxwell_defect
-from ...physics.muscle.characteristic.validity_range import validity_range_of
+from ...core import ParameterError, PhysicsError, check_writable
+from ...files.library import Entry, list_files, load_law, part_toml, resting_lengths, to_toml
+from ...physics.muscle.characteristic import EnergyDefect, ValidityRange, maxwell_defect, validity_range_of
 from ...recording import Recording
-from ..requests.braid import check_one_length
-from ..requests.declaration import option, request
-from ..requests.reading import ReadingRequest
+from ..requests import ReadingRequest, check_one_length, option, request
 from .bench_files import Files, read_recordings, reading_chapters
 from .delivery import deliver
 from .options import Folder, Json

@@ -14,13 +14,9 @@ from ...bench.identify.hysteresis.hysteresis_chapter import hysteresis_chapters
 from ...bench.identify.hysteresis.joint import SelectedFriction, select_friction
 from ...bench.identify.hysteresis.loops import CURVE_DEGREE
 from ...core.atomic_output import check_writable
-from ...files.library.entry import Entry
-from ...files.library.entry_file import load_law
-from ...files.library.uncertainty import without_parts
-from ...files.library.write import part_toml, to_toml
+from ...files.library import Entry, load_law, part_toml, to_toml, without_parts
 from ...physics.muscle.characteristic.base import ForceLaw
-from ..requests.declaration import RequestError, Where, option, request
-from ..requests.reading import ReadingRequest
+from ..requests import ReadingRequest, RequestError, Where, option, request
 from .bench_files import Files, read_recordings, reading_chapters
 from .delivery import deliver
 from .options import Folder, Json

@@ -7,8 +7,7 @@ from typing import Annotated
 import typer
 
 from ...bench.readers import ColumnMapping, RecordedTime, read
-from ...bench.segment import inspect_all
-from ...bench.segment.inspection_chapter import inspection_chapters
+from ...bench.segment import inspect_all, inspection_chapters
 from ..requests.reading import ReadingRequest
 from .delivery import deliver
 from .options import Json, OptionalFolder

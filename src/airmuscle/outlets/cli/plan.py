@@ -9,8 +9,7 @@ from ...bench.identify.dynamic import rank_records
 from ...bench.identify.experiment_design import BenchLimits, optimal_design
 from ...bench.readers import write
 from ...core.atomic_output import check_writable
-from ...files.library.entry_file import load_law
-from ...files.library.files import is_path, read_toml
+from ...files.library import is_path, load_law, read_toml
 from ...files.scenario.identification import load_dynamic_fit
 from ...physics.muscle.characteristic import ValidityRange
 from ...report.write import save_table

@@ -10,14 +10,10 @@ import typer
 from ...bench.identify.dynamic import StartTime
 from ...bench.identify.prediction import RecordPrediction
 from ...bench.identify.prediction.prediction_chapter import prediction_chapters
-from ...core.atomic_output import check_writable
-from ...core.errors import FileError
-from ...files.library.entry import PlantEntry
-from ...files.library.entry_file import kind_of, load_law
-from ...files.library.files import is_path, list_plants, read_toml
+from ...core import FileError, check_writable
+from ...files.library import PlantEntry, is_path, kind_of, list_plants, load_law, read_toml
 from ...files.scenario.prediction import load_plant_model, predict_with_entry
-from ..requests.declaration import RequestError, Where, option, request
-from ..requests.reading import ReadingRequest
+from ..requests import ReadingRequest, RequestError, Where, option, request
 from .bench_files import read_recordings, reading_chapters
 from .delivery import deliver
 from .options import Folder, Json, complete_model

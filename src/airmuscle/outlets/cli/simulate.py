@@ -8,15 +8,13 @@ from typing import Annotated, Any
 import typer
 
 from ...bench.readers import write
-from ...core.atomic_output import check_writable
-from ...core.errors import SimulationError
+from ...core import SimulationError, check_writable
 from ...design.study.paths import changed_scenario
 from ...files.scenario.scenario import Scenario, load_scenario
 from ...files.scenario.simulation_chapter import run_chapter
 from ...recording import Recording
 from ...report.chapter import Chapter
-from ..requests.declaration import option, request
-from ..requests.reading import read_pair
+from ..requests import option, read_pair, request
 from .delivery import Files, deliver, write_result
 from .options import Folder, Json, complete_plant
 from .request_options import with_requests

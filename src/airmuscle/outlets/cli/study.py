@@ -9,8 +9,7 @@ from typing import Annotated
 
 import typer
 
-from ...core.atomic_output import temporary_folder
-from ...core.errors import AirmuscleError, SimulationError
+from ...core import AirmuscleError, SimulationError, temporary_folder
 from ...design.study import Study, StudyResult, load_study, run_study
 from ...design.study.chapter import RESULTS_FILE, study_chapter, write_study
 from ...design.study.chunk import count_finished_runs

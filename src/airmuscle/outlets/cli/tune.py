@@ -8,8 +8,7 @@ from typing import Annotated, Any
 
 import typer
 
-from ...core.atomic_output import check_writable
-from ...core.tree import leaves
+from ...core import check_writable, leaves
 from ...design.tuning import (
     IntegralAbsoluteError,
     IntegralTimeAbsoluteError,

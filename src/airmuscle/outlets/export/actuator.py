@@ -16,10 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core import autodiff
-from ...core.errors import ParameterError
-from ...core.system import Input
-from ...core.tree import Leaf, leaves
+from ...core import Input, Leaf, ParameterError, autodiff, leaves
 from ...engine.compile import compile_system, derivatives
 from ...engine.compile.functions import Printer, TracedSystem
 from ...engine.compile.ir.emission import TargetLanguage

@@ -13,8 +13,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from ...core.atomic_output import temporary_folder
-from ...core.errors import FileError, ParameterError, suggestion
+from ...core import FileError, ParameterError, suggestion, temporary_folder
 from .identifiers import template
 
 COMPILERS = ("gcc", "clang", "cc")

@@ -9,13 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from ...core.arrays import Array
-from ...core.errors import ParameterError
+from ...core import Array, ParameterError
 from ...engine.compile.kernel_text.printer import KernelPrinter
 from ...engine.compile.kernel_text.types import TypedKernel
-from ...engine.loop.control_loop import COMMAND, MEASURED, SETPOINT, ControlLoop
-from ...engine.loop.driver import WithDrivers
-from ...engine.loop.piecewise_linear import PiecewiseLinear
+from ...engine.loop import COMMAND, MEASURED, SETPOINT, ControlLoop, PiecewiseLinear, WithDrivers
 from ...engine.run import Problem
 from ...engine.run.driver_table import KINDS, MAX_CAPACITY, DriverTable, greatest_capacity
 from ...engine.run.integrators import ExplicitRungeKutta, Integrator, Rodas4

@@ -11,8 +11,7 @@ import zipfile
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from ...core.atomic_output import atomic_folder
-from ...core.errors import ParameterError
+from ...core import ParameterError, atomic_folder
 from .compiler import Platform, this_platform
 from .fmi_description import FmuDescription
 from .identifiers import block_comment, filled, template

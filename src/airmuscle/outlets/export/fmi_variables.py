@@ -12,8 +12,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from xml.etree.ElementTree import Element, SubElement
 
-from ...core.errors import ParameterError, printable
-from ...core.tree import Leaf
+from ...core import Leaf, ParameterError, printable
 from ...engine.compile.jacobians import Place
 from ...engine.run.integrators import Rodas4
 from ...recording.columns import quantity_of

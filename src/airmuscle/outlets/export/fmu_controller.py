@@ -9,12 +9,9 @@ from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 
-from ...core.atomic_output import atomic_folder
-from ...core.errors import ParameterError
+from ...core import ParameterError, atomic_folder
 from ...engine.compile.text.programs import CLanguage
-from ...engine.loop.control_loop import MEASURED, SETPOINT, ControlLoop
-from ...engine.loop.controller import named_signal_units
-from ...engine.loop.inputs import Schedule
+from ...engine.loop import MEASURED, SETPOINT, ControlLoop, Schedule, named_signal_units
 from ...engine.run import Problem, solve
 from ...engine.run.sampled_loop import SampledLoop, prepare_loop
 from ...engine.state import column_units

@@ -13,11 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from ...core.annotation import abridged
-from ...core.errors import ParameterError, printable
+from ...core import ParameterError, abridged, cite, leaves, printable
 from ...core.fingerprint import fingerprint
-from ...core.reference import cite
-from ...core.tree import leaves
 from ...engine.compile.text.programs import CBody
 
 LONGEST = 48

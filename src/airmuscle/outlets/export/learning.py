@@ -11,8 +11,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ...core.arrays import Array
-from ...core.errors import AirmuscleError, ParameterError
+from ...core import AirmuscleError, Array, ParameterError
 from ...engine.compile.ir import emission
 from ...engine.compile.ir.emission import TargetLanguage
 from ...engine.compile.ir.instructions import instructions

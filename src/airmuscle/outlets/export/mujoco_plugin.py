@@ -11,12 +11,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ...core.arrays import Array
-from ...core.atomic_output import atomic_folder
-from ...core.errors import ParameterError
-from ...core.short_repr import ShortRepr
-from ...core.system import Input
-from ...core.tree import leaves, with_parameters
+from ...core import Array, Input, ParameterError, ShortRepr, atomic_folder, leaves, with_parameters
 from ...engine.compile.program import compile_system
 from ...engine.run.integrators import Rodas4
 from ...physics.mechanism import HangingMass

@@ -8,9 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.arrays import Array
-from ...core.errors import ParameterError
-from ...core.tree import Leaf, leaves
+from ...core import Array, Leaf, ParameterError, leaves
 from ...engine.compile.functions import Printer
 from ...engine.compile.ir import emission
 from ...engine.compile.ir.emission import TargetLanguage
@@ -18,8 +16,7 @@ from ...engine.compile.ir.instructions import Code, instructions
 from ...engine.compile.ir.interpreter import InterpretedBody
 from ...engine.compile.text.body import Labels
 from ...engine.compile.text.programs import CLanguage
-from ...engine.loop.control_law import ControlLaw
-from ...engine.loop.control_loop import ControlLoop
+from ...engine.loop import ControlLaw, ControlLoop
 from ...engine.run import Problem
 from ...engine.run.compiled_law import trace_sample
 from ...engine.run.sampled_loop import SampledLoop

@@ -8,9 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.arrays import Array
-from ...core.errors import ParameterError, printable, suggestion
-from ...core.tree import Leaf, leaves
+from ...core import Array, Leaf, ParameterError, leaves, printable, suggestion
 from ...engine.compile.functions import ArraySizes, Extension, TracedSystem, implicit_module, rates_module
 from ...engine.compile.ir.emission import TargetLanguage
 from ...engine.compile.program import CompiledSystem

@@ -10,9 +10,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
 
-from ...core.atomic_output import atomic_folder
-from ...core.errors import ParameterError
-from ...core.units import STANDARD_GRAVITY
+from ...core import STANDARD_GRAVITY, ParameterError, atomic_folder
 from ...physics.mechanism import AntagonisticJoint, Mechanism, MuscleRoute, PlanarArm, SerialArm
 from ...physics.mechanism.pulley_profile import ConstantRadius
 from ...physics.plant import Plant

@@ -7,10 +7,7 @@ import dataclasses
 from collections.abc import Sequence
 from typing import Any, ClassVar
 
-from ...core import autodiff
-from ...core.annotation import one_line
-from ...core.errors import ParameterError
-from ...core.tree import Leaf, leaves
+from ...core import Leaf, ParameterError, autodiff, leaves, one_line
 from ...engine.compile.functions import PARAMETERS, Printer
 from ...engine.compile.ir.emission import TargetLanguage
 from ...engine.compile.text.programs import DEFINITION, CLanguage, JavaScriptLanguage, MatlabLanguage

@@ -9,13 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from ...control import LinearModelPredictive
-from ...core.arrays import Array
-from ...core.atomic_output import atomic_folder
-from ...core.errors import ParameterError, suggestion
-from ...engine.loop.control_law import EnclosingLaw, without_simulated
-from ...engine.loop.control_loop import MEASURED, ControlLoop
-from ...engine.loop.controller import Controller
-from ...engine.loop.sensors import WithSensors
+from ...core import Array, ParameterError, atomic_folder, suggestion
+from ...engine.loop import MEASURED, Controller, ControlLoop, EnclosingLaw, WithSensors, without_simulated
 from ...engine.run import Problem, solve
 from ...engine.run.batch.lanes import Double, Precision, Single
 from ...engine.run.sampled_loop import prepare_loop

@@ -6,11 +6,8 @@ import dataclasses
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from ...core import tree
-from ...core.errors import ParameterError
-from ...core.units import quantity
-from ...files.library.entry import Entry
-from ...files.library.fitted_entry import resting_lengths
+from ...core import ParameterError, quantity, tree
+from ...files.library import Entry, resting_lengths
 from ...physics.muscle.geometry import Braid, Geometry
 from ...recording import Recording
 from .declaration import RequestError, Where, option, request

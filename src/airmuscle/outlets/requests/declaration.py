@@ -14,8 +14,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar, dataclass_transform
 
-from ...core.errors import InputError, suggestion
-from ...core.units import quantity
+from ...core import InputError, quantity, suggestion
 
 T = TypeVar("T")
 Where = Callable[[str], str]

@@ -6,13 +6,8 @@ import dataclasses
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
-from ...core.errors import ParameterError, suggestion
-from ...core.tree import leaves, with_parameters
-from ...core.units import quantity
-from ...files.library.entry import Entry
-from ...files.library.entry_display import PARTS
-from ...files.library.entry_file import load_law
-from ...files.library.scaling import scale_entry
+from ...core import ParameterError, leaves, quantity, suggestion, with_parameters
+from ...files.library import PARTS, Entry, load_law, scale_entry
 from .declaration import option, request
 from .reading import read_pair
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from ...core.errors import UnitError
-from ...core.units import quantity
+from ...core import UnitError, quantity
 from ...design.sizing import (
     SORT_KEYS,
     JointRequirement,

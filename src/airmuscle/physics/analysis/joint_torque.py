@@ -8,9 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.arrays import Array, ArrayProgram, make_program
-from ...core.errors import ParameterError
-from ...core.ops import Value, Values
+from ...core import Array, ArrayProgram, ParameterError, Value, Values, make_program
 from ...engine.compile.function import LanesFunction
 from ..muscle import ElasticSeriesElement, Muscle
 from ..plant.plant import Plant

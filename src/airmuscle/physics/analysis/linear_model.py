@@ -10,9 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ...core.arrays import Array
-from ...core.errors import ParameterError, suggestion
-from ...core.system import System
+from ...core import Array, ParameterError, System, suggestion
 from ...engine.compile.jacobians import derivatives
 from ...engine.compile.program import CompiledSystem, compile_system
 from ...engine.state import check_system, column_units, state_vector

@@ -10,9 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ...core.arrays import Array
-from ...core.errors import AirmuscleError, ParameterError
-from ...core.plotting import BLACK, DASHES, LINES, RED, legend_below, new_figure
+from ...core import BLACK, DASHES, LINES, RED, AirmuscleError, Array, ParameterError, legend_below, new_figure
 
 MAX_CURVES = 7
 """Curves of one figure that can be told apart."""

@@ -6,9 +6,7 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
-from ...core import autodiff
-from ...core.ops import Value, Values
-from ...core.short_repr import ShortRepr
+from ...core import ShortRepr, Value, Values, autodiff
 from ...engine.state import state_vector
 from ..muscle import ElasticSeriesElement, Muscle
 from ..plant.muscle_state import MuscleState

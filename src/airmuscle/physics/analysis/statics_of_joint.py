@@ -7,10 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.arrays import Array
-from ...core.errors import ParameterError, SolveError
-from ...core.plotting import BLUE, RED, new_figure
-from ...core.short_repr import ShortRepr
+from ...core import BLUE, RED, Array, ParameterError, ShortRepr, SolveError, new_figure
 from ...recording import Recording
 from ..plant.plant import Plant
 from ..pneumatics.gas import gauge_pressure

@@ -9,11 +9,7 @@ from typing import Any, TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from ...core.annotation import one_line
-from ...core.arrays import Array
-from ...core.errors import AirmuscleError, EquilibriumError, ParameterError
-from ...core.system import System
-from ...core.units import quantity
+from ...core import AirmuscleError, Array, EquilibriumError, ParameterError, System, one_line, quantity
 from ...engine.compile.program import CompiledSystem, compile_system
 from ...engine.loop.inputs import check_input_names
 from .multi_dof import equilibria_of_several_coordinates

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ...core.arrays import Array
-from ...core.errors import EquilibriumError, GeometryLimitError, PhysicsError
+from ...core import Array, EquilibriumError, GeometryLimitError, PhysicsError
 from ...engine.compile.program import CompiledSystem, Program
 from .multi_dof import starts
 from .single_dof import grid

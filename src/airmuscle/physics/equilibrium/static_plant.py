@@ -9,9 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.arrays import Array
-from ...core.ops import Value, Values
-from ...core.system import System
+from ...core import Array, System, Value, Values
 from ..mechanism import Mechanism
 from ..muscle import Muscle
 from ..pneumatics.gas import Ambient, Gas, absolute_pressure, gauge_pressure

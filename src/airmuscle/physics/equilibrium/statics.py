@@ -9,10 +9,7 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
-from ...core import ops, tree
-from ...core.arrays import Array
-from ...core.errors import AirmuscleError
-from ...core.ops import Value
+from ...core import AirmuscleError, Array, Value, ops, tree
 from ...engine.compile.cache.kernel import evaluate_rates
 from ...engine.compile.program import CompiledSystem
 from ..muscle import Muscle

@@ -4,10 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ...core import ops
-from ...core.declaration import check_structure, model, parameter
-from ...core.errors import ParameterError
-from ...core.ops import Value, Values
+from ...core import ParameterError, Value, Values, check_structure, model, ops, parameter
 from .base import Coordinate, Mechanism
 from .pulley_profile import ConstantRadius, PulleyProfile, check_profile
 

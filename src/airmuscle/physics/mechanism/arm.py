@@ -6,9 +6,7 @@ import abc
 from collections.abc import Sequence
 from typing import Any
 
-from ...core.declaration import check_structure, model, parameter
-from ...core.errors import ParameterError
-from ...core.ops import Value, Values
+from ...core import ParameterError, Value, Values, check_structure, model, parameter
 from .base import Coordinate, Mechanism
 from .pulley_profile import ConstantRadius, PulleyProfile
 

@@ -6,9 +6,7 @@ import abc
 import dataclasses
 from collections.abc import Mapping, Sequence
 
-from ...core import autodiff
-from ...core.ops import Value, Values
-from ...core.system import Input, StateVariable
+from ...core import Input, StateVariable, Value, Values, autodiff
 
 INFINITY = float("inf")
 

@@ -5,11 +5,7 @@ from __future__ import annotations
 import abc
 from typing import ClassVar
 
-from ...core import ops
-from ...core.declaration import check_structure, model, parameter
-from ...core.errors import ParameterError
-from ...core.ops import Value, Values
-from ...core.reference import Reference
+from ...core import ParameterError, Reference, Value, Values, check_structure, model, ops, parameter
 from .base import Coordinate, Mechanism
 from .wrapper import MechanismWrapper
 

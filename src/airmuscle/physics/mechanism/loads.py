@@ -4,11 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ...core.declaration import model, parameter
-from ...core.errors import ParameterError
-from ...core.ops import Value, Values
-from ...core.system import Input
-from ...core.units import STANDARD_GRAVITY
+from ...core import STANDARD_GRAVITY, Input, ParameterError, Value, Values, model, parameter
 from .base import Coordinate, Mechanism, Translation
 
 SHORTENING, SHORTENING_SPEED = "shortening", "shortening_speed"

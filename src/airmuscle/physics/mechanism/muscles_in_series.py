@@ -5,10 +5,7 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 
-from ...core.declaration import check_structure, model, parameter
-from ...core.errors import ParameterError
-from ...core.ops import Value, Values
-from ...core.units import STANDARD_GRAVITY
+from ...core import STANDARD_GRAVITY, ParameterError, Value, Values, check_structure, model, parameter
 from .base import Coordinate, Mechanism
 from .wrapper import MechanismWrapper
 

@@ -4,11 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from ...core import ops
-from ...core.declaration import model, parameter
-from ...core.errors import ParameterError
-from ...core.ops import Value, Values
-from ...core.units import STANDARD_GRAVITY
+from ...core import STANDARD_GRAVITY, ParameterError, Value, Values, model, ops, parameter
 from .arm import Arm, Matrix, MuscleRoute, solve_positive_definite
 
 

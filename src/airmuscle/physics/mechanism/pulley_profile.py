@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import abc
 
-from ...core import ops
-from ...core.declaration import model, parameter
-from ...core.errors import ParameterError
-from ...core.ops import Value
+from ...core import ParameterError, Value, model, ops, parameter
 
 SAMPLES = 101
 """Number of angles at which a profile is checked (chosen)."""

@@ -4,11 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from ...core import ops
-from ...core.declaration import check_structure, model, parameter
-from ...core.errors import ParameterError
-from ...core.ops import Value, Values
-from ...core.system import Input, StateVariable
+from ...core import Input, ParameterError, StateVariable, Value, Values, check_structure, model, ops, parameter
 from .base import Coordinate, Mechanism
 
 

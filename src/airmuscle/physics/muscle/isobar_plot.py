@@ -9,15 +9,11 @@ from typing import Any
 
 import numpy as np
 
-from ...core import plotting
-from ...core.arrays import Array
+from ...core import Array, continues_list, given_axes, leaves, legend_outside, new_figure, plotting
 from ...core.display import contraction_text, in_display_unit, quantity_text
-from ...core.plotting import given_axes, legend_outside, new_figure
-from ...core.tree import continues_list, leaves
 from ...recording import Recording
 from ...report.chapter import Plot, Table, TableColumn
-from .characteristic.base import Characteristic
-from .characteristic.validity_range import ValidityRange, validity_range_of
+from .characteristic import Characteristic, ValidityRange, validity_range_of
 from .isobars import Isobars, WorkingPoint, axis_scales, compute_isobars, draw_isobars, forces_along, mask_slack
 
 PARAMETERS = ("parameter", "symbol", "value", "unit", "meaning")

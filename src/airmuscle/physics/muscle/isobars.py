@@ -8,13 +8,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core import plotting
-from ...core.arrays import Array
-from ...core.display import chosen_scale, quantity_text
-from ...core.errors import PhysicsError
+from ...core import Array, PhysicsError, chosen_scale, plotting, quantity_text
 from ...recording import Recording
-from .characteristic.base import Characteristic, ContractionLaw
-from .characteristic.validity_range import ValidityRange
+from .characteristic import Characteristic, ContractionLaw, ValidityRange
 
 MAX_FORCE_RATIO = 8.0
 """Maximum of the force axis as a multiple of the median force, for laws that diverge (chosen)."""

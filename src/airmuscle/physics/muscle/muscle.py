@@ -6,18 +6,10 @@ import warnings
 from types import MappingProxyType
 from typing import Any, ClassVar, NamedTuple
 
-from ...core import autodiff, ops
-from ...core.annotation import abridged
-from ...core.declaration import model
+from ...core import Reference, StateVariable, Value, Values, abridged, autodiff, model, ops
 from ...core.errors import AirmuscleWarning, ParameterError
-from ...core.ops import Value, Values
-from ...core.reference import Reference
-from ...core.system import StateVariable
 from ...recording.notebook import Card, NotebookDisplay
-from .characteristic.base import Characteristic, Clamped, ForceLaw
-from .characteristic.contractile_surface import HOSOVSKY_HILL
-from .characteristic.validity_range import ValidityRange
-from .characteristic.virtual_work import VirtualWork
+from .characteristic import HOSOVSKY_HILL, Characteristic, Clamped, ForceLaw, ValidityRange, VirtualWork
 from .friction.base import Friction, NoFriction
 from .geometry.base import Geometry
 from .isobar_plot import component_rows, plot_isobars

@@ -4,11 +4,7 @@ from __future__ import annotations
 
 import abc
 
-from ...core import ops
-from ...core.declaration import model, parameter
-from ...core.errors import ParameterError
-from ...core.ops import Value, Values
-from ...core.system import StateVariable
+from ...core import ParameterError, StateVariable, Value, Values, model, ops, parameter
 from ..mechanism.end_stops import HuntCrossley
 
 

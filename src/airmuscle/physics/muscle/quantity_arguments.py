@@ -9,10 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.annotation import one_line
-from ...core.arrays import NUMBERS
-from ...core.errors import ParameterError
-from ...core.units import quantity
+from ...core import NUMBERS, ParameterError, one_line, quantity
 
 _ARRAY, _DOUBLE = np.ndarray, np.dtype(np.float64)
 _EXAMPLES = {"Pa": "'3 bar'", "N": "'200 N'", "1": "'10 %'"}

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 
-from ...core.declaration import INFINITY, model, parameter, parameters
-from ...core.errors import ParameterError
+from ...core import INFINITY, ParameterError, model, parameter, parameters
 from .characteristic.validity_range import CONTRACTION_BOUNDS, PRESSURE_BOUNDS
 
 FORCE_BOUNDS = (0.0, 1e6)

@@ -7,10 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ...core import ops
-from ...core.arrays import Array
-from ...core.declaration import model, parameter
-from ...core.ops import Value
+from ...core import Array, Value, model, ops, parameter
 
 
 class SeriesElement:

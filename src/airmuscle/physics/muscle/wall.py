@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import abc
 
-from ...core import ops
-from ...core.declaration import model, parameter
-from ...core.ops import Value, Values
-from ...core.system import StateVariable
+from ...core import StateVariable, Value, Values, model, ops, parameter
 
 
 class Wall:

@@ -7,12 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core.arrays import Array
+from ...core import Array, ParameterError, Value, describe_model, select_prefix
 from ...core.diagnostics import ColumnLimit, Columns, Diagnostic, DiagnosticCode
-from ...core.errors import ParameterError
-from ...core.ops import Value
-from ...core.short_repr import describe_model
-from ...core.system import select_prefix
 from ..muscle import INNER_CONTRACTION, ElasticSeriesElement, Muscle
 from ..muscle.friction import NoFriction
 from ..pneumatics import Circuit

@@ -10,10 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.declaration import as_finite_float
-from ...core.display import quantity_text
-from ...core.errors import ColumnError, FileError, ParameterError
-from ...core.plotting import BLACK, LINES, new_figure
+from ...core import BLACK, LINES, ColumnError, FileError, ParameterError, as_finite_float, new_figure, quantity_text
 from ...recording import Recording
 from ...recording.notebook import Card, NotebookDisplay
 from ..muscle.isobar_plot import plot_isobars

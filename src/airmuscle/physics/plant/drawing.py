@@ -8,9 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core.arrays import Array
-from ...core.errors import ParameterError
-from ...core.system import select_prefix
+from ...core import Array, ParameterError, select_prefix
 from ..mechanism import AntagonisticJoint, Mechanism, PlanarArm
 from ..mechanism.base import Translation
 from ..mechanism.wrapper import MechanismWrapper

@@ -5,10 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
-from ...core.declaration import model
-from ...core.diagnostics import ColumnLimit, Columns, Diagnostic
-from ...core.ops import Value, Values
-from ...core.system import Input, StateVariable, System
+from ...core import ColumnLimit, Columns, Diagnostic, Input, StateVariable, System, Value, Values, model
 from ..muscle import ElasticSeriesElement, Muscle
 from ..muscle.friction import NoFriction
 from .muscle_state import MuscleState, PlantEvaluation

@@ -5,12 +5,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from ...core.ops import Value, Values
-from ...core.system import StateVariable, select_prefix, with_prefix
+from ...core import StateVariable, Value, Values, select_prefix, with_prefix
 from ..muscle import Muscle
 from ..muscle.friction import NoFriction
-from ..pneumatics import CircuitFlows
-from ..pneumatics.gas import Air, Ambient, Flow, Gas, absolute_pressure, gauge_pressure
+from ..pneumatics import Air, Ambient, CircuitFlows, Flow, Gas, absolute_pressure, gauge_pressure
 
 _TYPICAL_CONTRACTION = 0.05
 """Contraction whose muscle volume defines the nominal value of the air mass (chosen)."""

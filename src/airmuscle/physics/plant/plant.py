@@ -8,19 +8,13 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, ClassVar
 
-from ...core.declaration import model
-from ...core.diagnostics import ColumnLimit, Columns, Diagnostic, DiagnosticCode
-from ...core.errors import GeometryLimitError
-from ...core.ops import Value, Values
+from ...core import ColumnLimit, Columns, Diagnostic, DiagnosticCode, GeometryLimitError, Value, Values, model
 from ...core.system import Input, StateVariable, add_prefix, select_prefix, with_prefix
 from ..equilibrium.equilibrium import equilibria_at_ambient_pressure, equilibrium_at_ambient_pressure
 from ..equilibrium.static_plant import StaticPlant
 from ..mechanism import Mechanism
 from ..muscle import Muscle
-from ..pneumatics import Circuit, CircuitFlows
-from ..pneumatics.circuit import key_by_muscle, key_by_port
-from ..pneumatics.gas import Air, Ambient, Gas
-from ..pneumatics.virial_gas import DEFAULT_GAS
+from ..pneumatics import DEFAULT_GAS, Air, Ambient, Circuit, CircuitFlows, Gas, key_by_muscle, key_by_port
 from . import diagnostics
 from .display import PlantDisplay
 from .muscle_state import (

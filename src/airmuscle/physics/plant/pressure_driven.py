@@ -7,9 +7,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import ClassVar
 
-from ...core.declaration import model, parameter
-from ...core.errors import ParameterError
-from ...core.ops import Value, Values
+from ...core import ParameterError, Value, Values, model, parameter
 from ...core.system import Input, StateVariable, System, select_prefix, with_prefix
 from ..mechanism import ExternalLoad, Mechanism
 from ..muscle import Muscle

@@ -7,18 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from ...core.absolute_pressure import at_ambient, check_above_vacuum
-from ...core.annotation import one_line
+from ...core import ParameterError, TraceError, at_ambient, check_above_vacuum, one_line, quantity, with_ambient
 from ...core.declaration import as_finite_float, check_structure, parameters
-from ...core.errors import ParameterError, TraceError
-from ...core.tree import with_ambient
-from ...core.units import quantity
 from ..mechanism import Mechanism
 from ..muscle import Muscle
 from ..muscle.characteristic.validity_range import ValidityRange
-from ..pneumatics import Circuit
-from ..pneumatics.gas import Ambient, Gas
-from ..pneumatics.supply import check_not_shared
+from ..pneumatics import Ambient, Circuit, Gas, check_not_shared
 
 
 def check_parts(

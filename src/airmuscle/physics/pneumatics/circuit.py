@@ -7,11 +7,7 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, TypeVar
 
-from ...core import ops
-from ...core.declaration import model
-from ...core.ops import Value, Values
-from ...core.reference import Reference
-from ...core.system import Input, StateVariable, add_prefix, select_prefix, with_prefix
+from ...core import Input, Reference, StateVariable, Value, Values, add_prefix, model, ops, select_prefix, with_prefix
 from .gas import NO_FLOW, Air, Ambient, Flow
 from .supply import AirSource, Supply
 from .valve import Orifice, orifice_flow

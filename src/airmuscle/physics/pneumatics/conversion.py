@@ -24,9 +24,7 @@ exact curve. The errors stated below are tested against a numerical solution for
 
 from __future__ import annotations
 
-from ...core import ops
-from ...core.declaration import attribute_hint
-from ...core.errors import ParameterError
+from ...core import ParameterError, attribute_hint, ops
 from .gas import GAS_CONSTANT, HEAT_CAPACITY_RATIO, REFERENCE_DENSITY, REFERENCE_TEMPERATURE, Ambient
 from .valve import Valve
 

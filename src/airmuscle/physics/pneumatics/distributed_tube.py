@@ -5,10 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from ...core import ops
-from ...core.declaration import model, parameter
-from ...core.ops import Value, Values
-from ...core.reference import Reference
+from ...core import Reference, Value, Values, model, ops, parameter
 from ...core.system import StateVariable, add_prefix, select_prefix, with_prefix
 from .gas import GAS_CONSTANT, SPECIFIC_HEAT_CONSTANT_PRESSURE, Air, Ambient, Flow, Gas, Isothermal
 from .tube import TubeModel, check_segment_count

@@ -10,12 +10,7 @@ import abc
 import dataclasses
 from typing import ClassVar, NamedTuple
 
-from ...core import autodiff, ops
-from ...core.declaration import model, parameter
-from ...core.ops import Value, Values
-from ...core.reference import Reference
-from ...core.system import StateVariable
-from ...core.units import ABSOLUTE, AMBIENT_PRESSURE
+from ...core import ABSOLUTE, AMBIENT_PRESSURE, Reference, StateVariable, Value, Values, autodiff, model, ops, parameter
 
 GAS_CONSTANT = 287.05
 """Specific gas constant of dry air [J/(kg K)]."""

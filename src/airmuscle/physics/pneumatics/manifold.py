@@ -6,9 +6,7 @@ import dataclasses
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from ...core.declaration import check_structure, model
-from ...core.errors import ParameterError
-from ...core.ops import Value, Values
+from ...core import ParameterError, Value, Values, check_structure, model
 from ...core.system import Input, StateVariable, add_prefix, select_prefix, with_prefix
 from .circuit import SUPPLY, Circuit, CircuitFlows, CircuitWrapper, ambient_air
 from .gas import Air, Ambient

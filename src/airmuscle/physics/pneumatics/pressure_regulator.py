@@ -4,11 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from ...core import ops
-from ...core.declaration import model, parameter
-from ...core.ops import Value, Values
-from ...core.reference import Reference
-from ...core.system import Input, StateVariable
+from ...core import Input, Reference, StateVariable, Value, Values, model, ops, parameter
 from .circuit import Circuit, CircuitFlows, ambient_air
 from .gas import Air, Ambient, gauge_pressure
 from .supply import AirSource

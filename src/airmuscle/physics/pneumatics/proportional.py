@@ -2,11 +2,7 @@
 
 from __future__ import annotations
 
-from ...core import ops
-from ...core.declaration import model, parameter
-from ...core.errors import ParameterError
-from ...core.ops import Value, Values
-from ...core.system import Input, StateVariable
+from ...core import Input, ParameterError, StateVariable, Value, Values, model, ops, parameter
 from .circuit import Circuit, CircuitFlows, ambient_air
 from .gas import NO_FLOW, Air, Ambient, absolute_pressure, gauge_pressure
 from .supply import AirSource

@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import abc
 
-from ...core import ops
-from ...core.declaration import model, parameter
-from ...core.errors import ParameterError
-from ...core.ops import Value, Values
+from ...core import ParameterError, Value, Values, model, ops, parameter
 from ...core.system import StateVariable, add_prefix, select_prefix, with_prefix
 from .gas import Air, Ambient, Flow, Gas, Isothermal, absolute_pressure, gauge_pressure
 from .valve import Orifice, orifice_flow, proportional_opening

@@ -6,13 +6,8 @@ import abc
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from ...core import ops
-from ...core.declaration import model, parameter
-from ...core.errors import ParameterError
-from ...core.ops import Value, Values
-from ...core.reference import Reference
+from ...core import ParameterError, Reference, Value, Values, model, ops, parameter, unflatten
 from ...core.system import StateVariable, add_prefix, select_prefix, with_prefix
-from ...core.tree import unflatten
 from .circuit import Circuit, CircuitFlows, CircuitWrapper, port_prefix
 from .gas import Air, Ambient, Flow, Gas, Isothermal, gauge_pressure
 from .valve import Orifice, Valve, orifice_flow

@@ -5,10 +5,7 @@ from __future__ import annotations
 import abc
 from typing import ClassVar
 
-from ...core import ops
-from ...core.declaration import model, parameter
-from ...core.ops import Value
-from ...core.reference import Reference
+from ...core import Reference, Value, model, ops, parameter
 from .gas import REFERENCE_DENSITY, REFERENCE_TEMPERATURE, SPECIFIC_HEAT_CONSTANT_PRESSURE, Air, Flow
 
 

@@ -4,10 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from ...core import ops
-from ...core.declaration import model, parameter
-from ...core.ops import Value, Values
-from ...core.reference import Reference
+from ...core import Reference, Value, Values, model, ops, parameter
 from .gas import GAS_CONSTANT, HEAT_CAPACITY_RATIO, Air, Ambient, BarotropicGas, FirstLawGas
 
 CIPM_2007 = Reference(

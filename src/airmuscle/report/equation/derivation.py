@@ -8,8 +8,7 @@ from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
-from ...core.short_repr import ShortRepr
-from ...core.tree import Leaf, leaves
+from ...core import Leaf, ShortRepr, leaves
 from .expression import ADD, COMPARISONS, NEGATIVE, PRODUCT, QUOTIENT, WHERE, Expressions, Node, in_order
 from .intervals import Bounds, traced_expression, within
 from .polynomial import assemble, coefficients_by_monomial, depends_on, expand, summands

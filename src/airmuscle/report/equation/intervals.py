@@ -7,8 +7,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from ...core import autodiff
-from ...core.arrays import instructions_of
+from ...core import autodiff, instructions_of
 from .expression import FUNCTIONS, MAXIMUM, MINIMUM, POWER, Expressions, Node, in_order, is_number
 
 Bounds = tuple[float, float]

@@ -7,16 +7,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ....core import tree
-from ....core.arrays import Array
+from ....core import Array, tree
 from ....engine.loop.inputs import Schedule
 from ....physics.mechanism import Isometric
 from ....physics.muscle import Muscle
 from ....physics.muscle.geometry import Vessel
 from ....physics.plant.plant import Plant
-from ....physics.pneumatics import FillDischarge, Valve
-from ....physics.pneumatics.gas import EnergyBalance
-from ....physics.pneumatics.virial_gas import WallHeatTransfer
+from ....physics.pneumatics import EnergyBalance, FillDischarge, Valve, WallHeatTransfer
 from ....recording import Recording
 from .experiment import Experiment
 from .initial_conditions import InitialConditions

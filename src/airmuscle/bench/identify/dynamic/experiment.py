@@ -7,10 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ....core import tree
-from ....core.annotation import check_field_types
-from ....core.errors import Hint, ParameterError, suggestion
-from ....core.short_repr import ShortRepr
+from ....core import Hint, ParameterError, ShortRepr, check_field_types, suggestion, tree
 from ....engine.compile import System
 from ....engine.loop.inputs import InputSignal, Schedule, check_input_signal
 from ....physics.pneumatics import Ambient

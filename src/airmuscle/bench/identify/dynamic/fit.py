@@ -9,9 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 
-from ....core.annotation import check_whole
-from ....core.arrays import Array
-from ....core.errors import AirmuscleError, IdentificationError, ParameterError
+from ....core import AirmuscleError, Array, IdentificationError, ParameterError, check_whole
 from ....engine.compile import System
 from ....engine.run.integrators import Integrator, Rodas4
 from ....recording.columns import displayed

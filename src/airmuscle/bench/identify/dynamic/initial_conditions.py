@@ -10,15 +10,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ....core import autodiff, tree
-from ....core.arrays import Array
-from ....core.diagnostics import Status
-from ....core.errors import IdentificationError, ParameterError, suggestion
-from ....core.system import System
+from ....core import Array, IdentificationError, ParameterError, Status, System, autodiff, suggestion, tree
 from ....engine.compile.cache.kernel import newton
 from ....engine.compile.function import Function
-from ....engine.loop.inputs import InputSignal
-from ....engine.loop.piecewise_linear import PiecewiseLinear
+from ....engine.loop import InputSignal, PiecewiseLinear
 from ....physics.equilibrium import find_equilibrium
 from ....physics.plant.plant import Plant
 from ....physics.plant.validation import check_pressures

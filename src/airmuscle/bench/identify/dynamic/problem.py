@@ -8,8 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ....core.arrays import Array
-from ....core.errors import AirmuscleError
+from ....core import AirmuscleError, Array
 from ..result import Estimate
 from .experiment import Unknown
 from .levenberg_marquardt import LevenbergMarquardt, minimise

@@ -8,11 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ....core import tree
-from ....core.arrays import Array
-from ....core.diagnostics import Status
-from ....core.errors import IdentificationError, ParameterError
-from ....core.system import System
+from ....core import Array, IdentificationError, ParameterError, Status, System, tree
 from ....engine.compile.cache.kernel import evaluate
 from ....engine.compile.program import CompiledSystem, compile_system
 from ....engine.loop.inputs import InputSignal

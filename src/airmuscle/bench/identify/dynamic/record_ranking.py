@@ -8,9 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ....core import tree
-from ....core.arrays import Array
-from ....core.errors import AirmuscleError, IdentificationError, ParameterError, suggestion
+from ....core import AirmuscleError, Array, IdentificationError, ParameterError, suggestion, tree
 from ....report.chapter import Chapter, Table, TableColumn
 from ...reported import Reported
 from .candidate_records import CandidateRecord, candidate_records

@@ -8,9 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ....core import tree
-from ....core.arrays import Array
-from ....core.errors import ColumnError, IdentificationError, ParameterError
+from ....core import Array, ColumnError, IdentificationError, ParameterError, tree
 from ....engine.loop.inputs import Schedule
 from ....physics.mechanism import Isometric
 from ....physics.muscle import Muscle

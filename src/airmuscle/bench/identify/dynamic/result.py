@@ -9,9 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ....core import tree
-from ....core.arrays import Array
-from ....core.errors import IdentificationError, ParameterError, suggestion
+from ....core import Array, IdentificationError, ParameterError, suggestion, tree
 from ....core.plotting import BLACK, RED, given_axes, legend_outside, new_figure
 from ....engine.compile import System
 from ....recording import Recording

@@ -15,16 +15,10 @@ from typing import Any
 
 import numpy as np
 
-from ....core.annotation import one_line
-from ....core.arrays import Array
-from ....core.declaration import model, parameter
-from ....core.errors import IdentificationError, ParameterError
+from ....core import Array, IdentificationError, ParameterError, model, one_line, parameter
 from ....physics.muscle import CreepElements
 from ....recording import Recording
-from ...segment import Interval, find_plateaus
-from ...segment.interval import level_intervals
-from ...segment.runs import RELATIVE_BAND
-from ...segment.sensor import estimate_noise
+from ...segment import RELATIVE_BAND, Interval, estimate_noise, find_plateaus, level_intervals
 from ..model_evidence import effective_sample_size, f_test_p_value
 from .result import SIGNIFICANCE_LEVEL
 

@@ -9,10 +9,7 @@ import inspect
 import numpy as np
 import numpy.typing as npt
 
-from ....core.annotation import check_whole
-from ....core.arrays import Array
-from ....core.declaration import model, parameter
-from ....core.errors import Hint, IdentificationError
+from ....core import Array, Hint, IdentificationError, check_whole, model, parameter
 from ....physics.muscle import friction
 from ....physics.muscle.characteristic.base import Characteristic
 from ....physics.muscle.friction import Friction, LoopScales

@@ -9,8 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ....core import leaves
-from ....core.plotting import BLACK, BLUE, RED, legend_below, new_figure
+from ....core import BLACK, BLUE, RED, leaves, legend_below, new_figure
 from ....recording.columns import display_scale
 from ....report.chapter import BY_ROW, Chapter, NamedValue, Plot, Table, TableColumn
 from ....report.formatting import P_VALUE

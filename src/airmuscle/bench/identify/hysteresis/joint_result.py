@@ -8,9 +8,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ....core.arrays import Array
-from ....core.plotting import LINES, given_axes, legend_below, new_figure, relabel_in_display_units
-from ....core.tree import leaves
+from ....core import LINES, Array, given_axes, leaves, legend_below, new_figure, relabel_in_display_units
 from ....physics.muscle.friction import Friction, PressureScaledFriction
 from ....report.chapter import Chapter, Plot
 from ....report.parameters import parameter_table

@@ -9,8 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from ....core.arrays import Array
-from ....core.tree import Leaf, leaves
+from ....core import Array, Leaf, leaves
 from ....physics.muscle.friction import Friction
 from ...segment.sensor import estimate_noise
 from ..identifiability import UndeterminedCombination

@@ -8,8 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from ....core.errors import AirmuscleWarning, Hint, HintedText, IdentificationError
-from ....core.short_repr import ShortRepr
+from ....core import AirmuscleWarning, Hint, HintedText, IdentificationError, ShortRepr
 from ....physics.muscle.characteristic.base import Characteristic
 from ....recording import Recording
 from ...segment import (

@@ -8,9 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ....core.arrays import Array
-from ....core.plotting import DASHES, LINES, given_axes, legend_below, new_figure, relabel_in_display_units
-from ....core.tree import leaves
+from ....core import DASHES, LINES, Array, given_axes, leaves, legend_below, new_figure, relabel_in_display_units
 from ....physics.muscle.friction import Friction
 from ....report.chapter import BY_ROW, Chapter, Plot, Table, TableColumn
 from ...reported import Reported

@@ -10,9 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ....core import tree
-from ....core.arrays import Array
-from ....core.tree import Leaf
+from ....core import Array, Leaf, tree
 from ....physics.muscle.friction import Friction, PressureScaledFriction
 from ..identifiability import UndeterminedCombination, analyse_identifiability
 from ..model_evidence import effective_sample_size

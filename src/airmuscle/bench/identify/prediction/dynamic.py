@@ -7,10 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ....core.annotation import check_field_types
-from ....core.arrays import Array
-from ....core.errors import IdentificationError, ParameterError
-from ....core.short_repr import ShortRepr
+from ....core import Array, IdentificationError, ParameterError, ShortRepr, check_field_types
 from ....engine.compile import System
 from ....engine.run.integrators import Integrator, Rodas4
 from ..dynamic.experiment import (

@@ -8,9 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ....core.arrays import Array
-from ....core.plotting import BLACK, BLUE, RED, legend_below, new_figure
-from ....core.reference import cite
+from ....core import BLACK, BLUE, RED, Array, cite, legend_below, new_figure
 from ....recording.columns import display_scale, displayed
 from ....report.chapter import BY_ROW, Chapter, Plot, Table, TableColumn
 from ...baselines import ARX, PERSISTENCE, TimedRecord, baseline_errors, skill

@@ -9,12 +9,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from ....core.arrays import Array
-from ....core.errors import ColumnError, Hint
-from ....core.short_repr import ShortRepr
+from ....core import Array, ColumnError, Hint, ShortRepr
 from ....physics.muscle import CreepElements
-from ....physics.muscle.characteristic.base import Characteristic, ForceLaw
-from ....physics.muscle.characteristic.validity_range import ValidityRange
+from ....physics.muscle.characteristic import Characteristic, ForceLaw, ValidityRange
 from ....physics.muscle.friction import Friction, NoFriction
 from ....recording import Recording
 from ....recording.columns import displayed

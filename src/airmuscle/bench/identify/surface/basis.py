@@ -10,8 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.polynomial import chebyshev, polynomial
 
-from ....core.arrays import Array
-from ....core.units import bar
+from ....core import Array, bar
 from ....physics.muscle.characteristic.base import Characteristic
 from ....recording import Recording
 

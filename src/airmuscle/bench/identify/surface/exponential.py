@@ -10,8 +10,7 @@ import dataclasses
 
 import numpy as np
 
-from ....core.arrays import Array
-from ....core.errors import IdentificationError
+from ....core import Array, IdentificationError
 from ....physics.muscle.characteristic.borzikova import BorzikovaExponential
 from ....recording import Recording
 from ..statistics import CorrelationIndex, correlation_index

@@ -20,9 +20,7 @@ from typing import Any
 import numpy as np
 from numpy.polynomial import chebyshev
 
-from ....core import autodiff
-from ....core.arrays import Array
-from ....core.errors import IdentificationError
+from ....core import Array, IdentificationError, autodiff
 from ....physics.muscle.characteristic.base import ContractionLaw
 from ....recording import Recording
 from ..variable_projection import shortened_step

@@ -13,13 +13,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.polynomial import polynomial
 
-from ....core.annotation import check_whole
-from ....core.arrays import Array
-from ....core.errors import IdentificationError
-from ....core.short_repr import ShortRepr
-from ....physics.muscle.characteristic.base import ForceLaw
-from ....physics.muscle.characteristic.contractile_surface import ContractileSurface, exponents
-from ....physics.muscle.characteristic.validity_range import ValidityRange
+from ....core import Array, IdentificationError, ShortRepr, check_whole
+from ....physics.muscle.characteristic import ContractileSurface, ForceLaw, ValidityRange, exponents
 from ....recording import Recording
 from ..result import Fit
 from ..static_fit import fit

@@ -18,9 +18,7 @@ import warnings
 from collections.abc import Sequence
 from typing import Any
 
-from ....core.atomic_output import atomic_file
-from ....core.display import user_folder
-from ....core.errors import AirmuscleWarning
+from ....core import AirmuscleWarning, atomic_file, user_folder
 from ..llvm.jit import engine_of, object_code
 
 _POSIX = hasattr(os, "getuid")

@@ -8,8 +8,7 @@ import functools
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-from ....core.arrays import instructions_of
-from ....core.errors import TraceError
+from ....core import TraceError, instructions_of
 
 Operand = tuple[Any, ...]
 """("t", k) the result of instruction k, ("c", value) a constant, ("in", argument, index) an input."""

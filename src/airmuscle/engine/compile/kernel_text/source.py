@@ -15,8 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ....core.diagnostics import Status
-from ....core.errors import TraceError
+from ....core import Status, TraceError
 from .. import kernel_layout
 
 _PACKAGE = __package__.rpartition(".")[0] + ".kernels"

@@ -7,9 +7,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 import numpy.typing as npt
 
-from ....core.arrays import Array
-from ....core.errors import AirmuscleError, ParameterError, PhysicsError, suggestion
-from ....core.system import System
+from ....core import AirmuscleError, Array, ParameterError, PhysicsError, System, suggestion
 from .variations import Column, Variations
 
 STATES_AT_ONCE = 500

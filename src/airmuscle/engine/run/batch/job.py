@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ....core.arrays import Array
-from ....core.diagnostics import Status
+from ....core import Array, Status
 from ...compile.program import CompiledSystem
 from ...loop.piecewise_linear import PiecewiseLinear
 from ..bound_integrator import RawSolution

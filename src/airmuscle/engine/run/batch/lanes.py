@@ -10,8 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ....core.diagnostics import Status
-from ....core.errors import ParameterError
+from ....core import ParameterError, Status
 from ...compile.cache.kernel import lanes
 from ...compile.llvm.emit import LlvmType
 from ..integrators import ExplicitRungeKutta

@@ -8,9 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ....core import tree
-from ....core.arrays import Array
-from ....core.diagnostics import Status
+from ....core import Array, Status, tree
 from ...compile.cache.kernel import loop_lanes
 from ...loop.control_law import ControlLaw
 from ..compiled_law import parameters_of, sample_in_lanes

@@ -11,12 +11,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ....core.arrays import Array
-from ....core.errors import ParameterError
-from ....core.system import System
+from ....core import Array, ParameterError, System
 from ...compile.program import CompiledSystem
-from ...loop.control_law import ControlLaw
-from ...loop.control_loop import COMMAND, MEASURED, SETPOINT, ControlLoop, designed_loop
+from ...loop import COMMAND, MEASURED, SETPOINT, ControlLaw, ControlLoop, designed_loop
 from ..compiled_loop import CompiledLoop, CompiledRun
 from ..integrators import Integrator
 from ..problem import Problem

@@ -8,16 +8,9 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from ....core.annotation import one_line
-from ....core.arrays import Array
-from ....core.declaration import as_float
-from ....core.diagnostics import Status
-from ....core.errors import ParameterError, suggestion
-from ....core.system import System
+from ....core import Array, ParameterError, Status, System, as_float, one_line, suggestion
 from ...compile.program import CompiledSystem, compile_system
-from ...loop.control_loop import ControlLoop
-from ...loop.inputs import InputSignal
-from ...loop.piecewise_linear import PiecewiseLinear
+from ...loop import ControlLoop, InputSignal, PiecewiseLinear
 from ...processes import available_cores
 from ...state import check_system
 from ..bound_integrator import MAX_STEPS

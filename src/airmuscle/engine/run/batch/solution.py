@@ -15,11 +15,7 @@ from urllib.parse import quote
 import numpy as np
 import numpy.typing as npt
 
-from ....core.arrays import Array
-from ....core.diagnostics import Columns, Status
-from ....core.errors import ColumnError, FileError, ParameterError, suggestion
-from ....core.reference import Reference, cite
-from ....core.system import System
+from ....core import Array, ColumnError, Columns, FileError, ParameterError, Reference, Status, System, cite, suggestion
 from ....recording import Recording
 from ..integrators import Integrator
 from .variations import Variations

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ....core.errors import ParameterError
-from ....core.system import System
+from ....core import ParameterError, System
 from ...compile.cache.kernel import lane_blocks
 from ...compile.program import compile_system
 from ...processes import available_cores

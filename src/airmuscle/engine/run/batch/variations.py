@@ -9,11 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ....core import tree
-from ....core.annotation import one_line
-from ....core.arrays import Array
-from ....core.errors import AirmuscleError, ParameterError, suggestion
-from ....core.system import System
+from ....core import AirmuscleError, Array, ParameterError, System, one_line, suggestion, tree
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -36,3 +36,9 @@ from .tondu_lopez2000 import TonduLopez2000 as TonduLopez2000
 from .validity_range import ValidityRange as ValidityRange
 from .virtual_work import CircleVirtualWork as CircleVirtualWork
 from .virtual_work import VirtualWork as VirtualWork
+
+# isort: split
+# For the other rooms, not in __all__
+from .contractile_surface import HOSOVSKY_HILL as HOSOVSKY_HILL
+from .energy_defect import EnergyDefect as EnergyDefect
+from .validity_range import validity_range_of as validity_range_of

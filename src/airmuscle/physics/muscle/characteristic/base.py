@@ -11,11 +11,7 @@ import abc
 from collections.abc import Callable
 from typing import Any, ClassVar, NamedTuple, Self
 
-from ....core import autodiff, ops
-from ....core.declaration import model, parameter
-from ....core.errors import IdentificationError, ParameterError
-from ....core.ops import Value
-from ....core.reference import Reference
+from ....core import IdentificationError, ParameterError, Reference, Value, autodiff, model, ops, parameter
 from ..quantity_arguments import accept_quantities_in
 from .data_scales import MeasuredPoints
 from .solve import describe_range, find_first_root, warn_above_whole_length

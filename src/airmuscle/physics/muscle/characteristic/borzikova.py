@@ -11,12 +11,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ....core import ops
-from ....core.declaration import model, parameter
-from ....core.errors import GeometryLimitError, ParameterError
-from ....core.ops import Value
-from ....core.reference import Reference
-from ....core.units import bar, percent
+from ....core import GeometryLimitError, ParameterError, Reference, Value, bar, model, ops, parameter, percent
 from .base import ContractionLaw
 
 BORZIKOVA = Reference(

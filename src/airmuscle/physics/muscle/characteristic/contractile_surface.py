@@ -6,11 +6,7 @@ import dataclasses
 from collections.abc import Callable
 from typing import ClassVar
 
-from ....core import ops
-from ....core.declaration import model, parameter
-from ....core.errors import ParameterError
-from ....core.ops import Value
-from ....core.reference import Reference
+from ....core import ParameterError, Reference, Value, model, ops, parameter
 from ..geometry.base import check_degree
 from .base import Characteristic, ForceLaw
 from .data_scales import DataScales, MeasuredPoints

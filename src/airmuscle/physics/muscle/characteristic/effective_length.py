@@ -6,9 +6,7 @@ import dataclasses
 from collections.abc import Callable
 from typing import Any
 
-from ....core.declaration import model, parameter
-from ....core.errors import ParameterError
-from ....core.ops import Value
+from ....core import ParameterError, Value, model, parameter
 from .base import Characteristic, ForceLaw
 from .data_scales import DataScales, MeasuredPoints
 

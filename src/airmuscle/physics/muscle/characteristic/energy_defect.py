@@ -8,8 +8,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from ....core.arrays import Array
-from ....core.errors import SolveError
+from ....core import Array, SolveError
 from ..geometry.base import Geometry
 from .base import Characteristic
 from .validity_range import ValidityRange

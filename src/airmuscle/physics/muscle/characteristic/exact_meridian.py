@@ -6,9 +6,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from ....core.declaration import model, parameter
-from ....core.ops import Value
-from ....core.reference import Reference
+from ....core import Reference, Value, model, parameter
 from ..geometry.base import check_contraction_range
 from ..geometry.meridian import SAGA_2007, Profile, graded_quadrature
 from ..geometry.meridian_shapes import CircularArc

@@ -4,11 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar, Self
 
-from ....core import ops
-from ....core.declaration import model, parameter
-from ....core.errors import ParameterError
-from ....core.ops import Value
-from ....core.reference import Reference
+from ....core import ParameterError, Reference, Value, model, ops, parameter
 from .base import PressureLaw
 from .data_scales import DataScales, MeasuredPoints
 

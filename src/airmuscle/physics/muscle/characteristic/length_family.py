@@ -7,9 +7,7 @@ import dataclasses
 from collections.abc import Callable
 from typing import Any, ClassVar, Self
 
-from ....core import ops
-from ....core.declaration import model, parameter
-from ....core.ops import Value
+from ....core import Value, model, ops, parameter
 from .base import Characteristic, ForceLaw
 from .data_scales import DataScales, MeasuredPoints
 

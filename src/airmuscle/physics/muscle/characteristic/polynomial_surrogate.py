@@ -8,10 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ....core.arrays import Array
-from ....core.declaration import model, parameter
-from ....core.errors import AirmuscleWarning, PhysicsError, SolveError
-from ....core.ops import Value
+from ....core import AirmuscleWarning, Array, PhysicsError, SolveError, Value, model, parameter
 from ..geometry.base import check_degree
 from .base import Characteristic, ForceLaw
 from .contractile_surface import ContractileSurface, exponents

@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
-from ....core import ops
-from ....core.declaration import model, parameter
-from ....core.errors import ParameterError, suggestion
-from ....core.ops import Value
+from ....core import ParameterError, Value, model, ops, parameter, suggestion
 from .base import ForceLaw
 
 

@@ -4,10 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar, Self
 
-from ....core import ops
-from ....core.declaration import model, parameter
-from ....core.ops import Value
-from ....core.reference import Reference
+from ....core import Reference, Value, model, ops, parameter
 from ..passive_elements import Damper, Spring
 from .base import ForceLaw
 from .data_scales import DataScales, MeasuredPoints

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import abc
 
-from ....core.declaration import model, parameter
-from ....core.ops import Value, pi
+from ....core import Value, model, parameter, pi
 from ..geometry.meridian import Segment
 
 

@@ -7,11 +7,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np  # noqa: TID251  (polynomial roots are never traced)
 
-from ....core import autodiff, ops
-from ....core.declaration import as_finite_float, model, parameter
-from ....core.errors import ParameterError
-from ....core.ops import Value
-from ....core.reference import Reference
+from ....core import ParameterError, Reference, Value, as_finite_float, autodiff, model, ops, parameter
 from ..geometry.base import check_contraction_range
 from ..geometry.meridian import SAGA_2007
 from ..geometry.meridian_shapes import Parabola

@@ -8,10 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from ....core.arrays import Array
-from ....core.declaration import model, parameter
-from ....core.errors import ParameterError, SolveError
-from ....core.ops import Value
+from ....core import Array, ParameterError, SolveError, Value, model, parameter
 from .base import Characteristic, Slopes
 from .solve import as_arrays, describe_range
 

@@ -5,9 +5,7 @@ from __future__ import annotations
 import dataclasses
 from typing import Any
 
-from ....core.declaration import model, parameter
-from ....core.errors import ParameterError
-from ....core.ops import Value
+from ....core import ParameterError, Value, model, parameter
 
 PRESSURE_BOUNDS = (-101_325.0, 1e8)
 CONTRACTION_BOUNDS = (-0.5, 1.0)

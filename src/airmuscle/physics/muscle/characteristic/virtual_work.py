@@ -5,11 +5,7 @@ from __future__ import annotations
 import functools
 from typing import ClassVar, NamedTuple
 
-from ....core import ops
-from ....core.declaration import model, parameter
-from ....core.errors import ParameterError, TraceError
-from ....core.ops import Value
-from ....core.reference import Reference
+from ....core import ParameterError, Reference, TraceError, Value, model, ops, parameter
 from ..geometry.base import Geometry, check_contraction_range
 from ..geometry.braid import CHOU_HANNAFORD_1996
 from ..geometry.meridian import SAGA_2007

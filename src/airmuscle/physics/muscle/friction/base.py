@@ -5,10 +5,7 @@ from __future__ import annotations
 import abc
 from typing import Any, ClassVar, NamedTuple, Self
 
-from ....core.declaration import model
-from ....core.ops import Value, Values
-from ....core.reference import Reference
-from ....core.system import StateVariable
+from ....core import Reference, StateVariable, Value, Values, model
 from .path import LoopScales
 
 

@@ -4,11 +4,7 @@ from __future__ import annotations
 
 from typing import Any, ClassVar, Self
 
-from ....core import ops
-from ....core.declaration import model, parameter
-from ....core.ops import Value, Values
-from ....core.reference import Reference
-from ....core.system import StateVariable
+from ....core import Reference, StateVariable, Value, Values, model, ops, parameter
 from .base import Friction
 from .path import LoopScales, deflection
 

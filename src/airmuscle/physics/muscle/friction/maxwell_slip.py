@@ -5,12 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, ClassVar, Self
 
-from ....core import ops
-from ....core.declaration import model, parameter
-from ....core.errors import ParameterError
-from ....core.ops import Value, Values
-from ....core.reference import Reference
-from ....core.system import StateVariable
+from ....core import ParameterError, Reference, StateVariable, Value, Values, model, ops, parameter
 from .base import Friction
 from .path import LoopScales, stop_operators
 

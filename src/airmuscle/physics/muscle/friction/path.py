@@ -15,8 +15,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from ....core.arrays import Array
-from ....core.errors import IdentificationError
+from ....core import Array, IdentificationError
 
 CURVE_NODES, CURVE_END = 4801, 24.0
 """Nodes of the loading curve of `relative_deflection`, and its end -ln((1 - w)/2), where 1 - w is 8e-11 (chosen)."""

@@ -4,12 +4,7 @@ from __future__ import annotations
 
 from typing import Any, ClassVar, Self
 
-from ....core import ops
-from ....core.declaration import model, parameter
-from ....core.errors import ParameterError
-from ....core.ops import Value, Values
-from ....core.reference import Reference
-from ....core.system import StateVariable
+from ....core import ParameterError, Reference, StateVariable, Value, Values, model, ops, parameter
 from .base import Friction
 from .maxwell_slip import check_equal_lengths, element_rate
 from .path import LoopScales, stop_operators

@@ -8,11 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from ....core import autodiff
-from ....core.annotation import abridged
-from ....core.errors import GeometryLimitError, ParameterError
-from ....core.ops import Value
-from ....core.reference import Reference
+from ....core import GeometryLimitError, ParameterError, Reference, Value, abridged, autodiff
 from ..quantity_arguments import accept_quantities_in
 
 

@@ -7,10 +7,7 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from ....core import ops
-from ....core.declaration import model, parameter
-from ....core.ops import Value
-from ....core.reference import Reference
+from ....core import Reference, Value, model, ops, parameter
 from .base import Geometry
 
 CHOU_HANNAFORD_1996 = Reference(

@@ -5,10 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from ....core import ops
-from ....core.declaration import model, parameter
-from ....core.errors import GeometryLimitError, ParameterError
-from ....core.ops import Value
+from ....core import GeometryLimitError, ParameterError, Value, model, ops, parameter
 from .base import Geometry, check_degree
 
 _ERROR_POINTS = 1001

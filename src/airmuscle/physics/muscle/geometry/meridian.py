@@ -10,10 +10,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from ....core import ops
-from ....core.arrays import Array
-from ....core.ops import Value
-from ....core.reference import Reference
+from ....core import Array, Reference, Value, ops
 
 SAGA_2007 = Reference(
     "saga-2007",

@@ -6,11 +6,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from ....core import ops
-from ....core.arrays import Array
-from ....core.declaration import model
-from ....core.ops import Value
-from ....core.reference import Reference
+from ....core import Array, Reference, Value, model, ops
 from .meridian import Meridian, Profile, Segment, double_angle_term, segment_volume, stumpff, triple_angle_term
 
 _NODES, _WEIGHTS = (

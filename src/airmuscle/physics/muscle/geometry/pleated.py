@@ -7,10 +7,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from ....core.arrays import Array
-from ....core.declaration import model
-from ....core.ops import Value
-from ....core.reference import Reference
+from ....core import Array, Reference, Value, model
 from .meridian import Profile, Segment
 from .straight_fibre import FibreTube
 

@@ -6,11 +6,7 @@ import abc
 
 import numpy as np
 
-from ....core import ops
-from ....core.arrays import Array
-from ....core.declaration import model, parameter
-from ....core.errors import ParameterError
-from ....core.ops import Value
+from ....core import Array, ParameterError, Value, model, ops, parameter
 from .base import Geometry, check_contraction_range
 from .meridian import Meridian, Profile, Segment
 from .meridian_shapes import CircularArc

@@ -8,9 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from ....core.declaration import model, parameter
-from ....core.errors import ParameterError
-from ....core.ops import Value
+from ....core import ParameterError, Value, model, parameter
 from .base import Geometry
 
 
