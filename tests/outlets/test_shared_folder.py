@@ -23,8 +23,11 @@ from scenario_files import MUSCLE_FILE, PRESSURE_LOOP
 from airmuscle import load_data
 from airmuscle.bench import write
 from airmuscle.core import check_writable, exclusive_folders
+from airmuscle.core.display import quantity_text
 from airmuscle.design import shared_folder
+from airmuscle.engine.processes import check_running
 from airmuscle.errors import AirmuscleError, FileError, InputError
+from airmuscle.units import display
 
 STUDY = """
 scenario = "scenario.toml"
@@ -139,6 +142,29 @@ def test_a_renewed_claim_is_respected_and_its_result_read(tmp_path: Path):
     process.join()
     assert source.rpartition(":")[2] == str(os.getpid())  # of the first executor, which computed it
     assert len(list(tmp_path.glob("*.result"))) == 1
+
+
+def test_one_worker_is_the_process_itself_with_its_units_and_stops_between_two_runs(tmp_path: Path):
+    with display("bar"), shared_folder(tmp_path, 1) as executor:
+        assert executor.submit(os.getpid).result() == os.getpid()
+        assert executor.submit(quantity_text, 3e5, "Pa", "kPa").result() == "3 bar"
+    tasks = []
+
+    def interrupted() -> None:
+        with shared_folder(tmp_path, 1) as executor:
+            tasks.append(executor.submit(_until_stopped))
+            time.sleep(0.2)  # the task has begun
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        interrupted()
+    assert tasks[0].cancelled()
+
+
+def _until_stopped() -> None:
+    while True:
+        time.sleep(0.01)
+        check_running()
 
 
 def test_a_damaged_result_is_computed_again_and_an_exception_is_raised_not_stored(tmp_path: Path):

@@ -6,9 +6,11 @@ An executor has the interface of `concurrent.futures`; local processes are those
 from __future__ import annotations
 
 import contextlib
+import contextvars
 import dataclasses
 import hashlib
 import importlib
+import math
 import os
 import pickle
 import socket
@@ -16,13 +18,13 @@ import threading
 import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
 from pathlib import Path
 from typing import Any
 
 from ..core import FileError, InputError, atomic_file, check_writable, program_fingerprint
 from .distribution import Claims
-from .processes import available_cores, process_pool
+from .processes import available_cores, process_pool, stop_events
 
 CONNECT_TIMEOUT = 10.0
 """Time limit for the first response of a scheduler [s] (chosen)."""
@@ -61,7 +63,7 @@ def shared_folder(folder: Path | str, workers: int | None = None) -> Iterator[Sh
     """A context manager for the executor of a folder that several processes share, on any machines.
 
     folder   a folder of a file system that all processes see; it is created if it is missing
-    workers  number of local processes of this one; by default one per core
+    workers  number of local processes of this one, by default one per core; 1: a thread of this process itself
 
     Each process runs the same program with the same input. Each task is computed by the process that claims it first;
     its result is stored in the folder, where the others read it. The claim of a process that has ended is taken over
@@ -71,8 +73,8 @@ def shared_folder(folder: Path | str, workers: int | None = None) -> Iterator[Sh
     """
     count = available_cores() if workers is None else workers
     check_writable(folder, shared=True)
-    with process_pool(count, one_thread_each=True, separate=True) as local:
-        assert local is not None  # a separate process even for one worker
+    with _own_thread() if count == 1 else process_pool(count, one_thread_each=True) as local:
+        assert local is not None
         executor = SharedFolder(Path(folder), local, count)
         try:
             yield executor
@@ -80,6 +82,22 @@ def shared_folder(folder: Path | str, workers: int | None = None) -> Iterator[Sh
             executor.shutdown(cancel_futures=True)
             raise
         executor.shutdown()
+
+
+@contextlib.contextmanager
+def _own_thread() -> Iterator[Executor]:
+    """A context manager for a thread that computes; if the block is left by an exception, it stops between two runs."""
+    stop_events.append(stopped := threading.Event())
+    context = contextvars.copy_context()  # with the display units of a block
+    executor = ThreadPoolExecutor(1, "worker", lambda: [name.set(value) for name, value in context.items()])
+    try:
+        yield executor
+    except BaseException:
+        stopped.set()
+        raise
+    finally:
+        executor.shutdown(cancel_futures=True)
+        stop_events.remove(stopped)
 
 
 @dataclasses.dataclass
@@ -109,6 +127,7 @@ class SharedFolder(Executor):
         self._claims = Claims(folder, self._name)
         self._pending: list[_Task] = []
         self._running: dict[Future[Any], _Task] = {}
+        self._read_at = -math.inf
         self._changed = threading.Condition()
         self._closed = self._stopped = False
         self._thread: threading.Thread | None = None
@@ -176,7 +195,10 @@ class SharedFolder(Executor):
         return True
 
     def _collect_results(self) -> None:
-        """Complete the tasks whose results are in the folder."""
+        """Complete the tasks whose results are in the folder, which is read at intervals."""
+        if time.monotonic() - self._read_at < _POLL:
+            return
+        self._read_at = time.monotonic()
         stored = {entry.name for entry in os.scandir(self._folder)}
         for task in list(self._pending):
             if task.future.cancelled():

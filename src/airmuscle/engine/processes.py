@@ -24,8 +24,9 @@ from ..core.display import display
 
 Workers = int | Executor
 """Number of local processes, or an executor of `concurrent.futures`."""
-_stop_event: Any = None
-_share: int | None = None
+stop_events: list[Any] = []
+"""Events that stop what this process computes for a pool, between two runs."""
+_share: list[int | None] = [None]
 """Cores of a worker: those of its parent, divided among its workers."""
 _BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 """Environment variables that limit the threads of linear algebra, which a process reads when it loads the library."""
@@ -33,20 +34,19 @@ _BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
 
 def available_cores() -> int:
     """The number of cores that this process may use; that of a worker is its share of those of its parent."""
-    if _share is not None:
-        return _share
+    if _share[0] is not None:
+        return _share[0]
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 @contextlib.contextmanager
 def process_pool(
-    workers: Workers, *, one_thread_each: bool = False, terminate: bool = False, separate: bool = False
+    workers: Workers, *, one_thread_each: bool = False, terminate: bool = False
 ) -> Iterator[Executor | None]:
     """A context manager for an executor with `workers` local processes; None for one worker, the process itself.
 
-    If `workers` is an executor, such as that of a cluster or of a shared folder, it is yielded and remains open. With
-    `separate`, one worker is also a process of its own. `one_thread_each` limits the linear algebra of each worker to
-    one thread, unless the environment states a number.
+    If `workers` is an executor, such as that of a cluster or of a shared folder, it is yielded and remains open.
+    `one_thread_each` limits the linear algebra of each worker to one thread, unless the environment states a number.
     If the block is left by an exception, the workers stop between two runs, or at once with `terminate`, for tasks
     that write nothing; if this process is killed, they exit.
     Raises InputError for a number of workers below 1.
@@ -56,7 +56,7 @@ def process_pool(
         return
     if workers < 1:
         raise InputError(f"workers is {workers}; it must be at least 1.")
-    if workers == 1 and not separate:
+    if workers == 1:
         yield None
         return
     context = multiprocessing.get_context("spawn")  # a forked copy of a process with threads may deadlock
@@ -123,8 +123,8 @@ def _initialise_worker(stop_event: Any, units: tuple[str, ...] | None, share: in
     """Make a worker ignore SIGINT, which its parent handles, exit with its parent, and have its units and cores."""
     if units is not None:
         display(*units)
-    global _stop_event, _share
-    _stop_event, _share = stop_event, share
+    stop_events.append(stop_event)
+    _share[0] = share
     threading.Thread(target=_exit_with_parent, name="parent watchdog", daemon=True).start()
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if hasattr(signal, "pthread_sigmask"):
@@ -144,7 +144,7 @@ def _exit_with_parent() -> None:
 
 def check_running() -> None:
     """Raise KeyboardInterrupt in a worker whose pool has been stopped."""
-    if _stop_event is not None and _stop_event.is_set():
+    if any(event.is_set() for event in stop_events):
         raise KeyboardInterrupt
 
 
