@@ -439,6 +439,7 @@ def test_other_impossible_requests_are_refused():
 def test_a_batch_of_steppers_is_its_steppers():
     start = JOINT.state_at(pressure=2e5)
     batch = BatchStepper(JOINT, 3, RungeKutta4(1e-3), cores=1)
+    assert batch._parts[0].entry_address  # of stored machine code: no further process compiles it
     batch.states[:] = np.array(list(start.values()))[None, :, None]
     batch.inputs[:, :, 1] = 0.5, 0.0, 0.0, 0.5
     batch.advance(100)

@@ -272,7 +272,7 @@ def lanes(
 def lane_blocks(
     step: Any, outputs: Any, x: Any, u: Any, c: Any, w: Any, h: Any, other: Any, o: Any, span: Any, steps: Any
 ) -> Any:
-    """Advance the blocks span[0] .. span[1] - 1 by steps[0] steps, then compute their outputs; returns 0.
+    """Advance the blocks span[0] .. span[1] - 1 by steps[0] steps, then compute their outputs.
 
     step(x, u, c, w, h, y), outputs(x, u, c, o)  addresses of the printed functions, W lanes each
     x, u, c, o  (B, n, W), (B, m, W), (B, C, W), (B, k, W): states, inputs, what `prepare` left, outputs of each block
@@ -290,4 +290,3 @@ def lane_blocks(
                 for lane in range(x.shape[2]):
                     x[block, i, lane] = other[i, lane]
         invoke(outputs, (at_x, at_u, at_c, pointer(o[block])))
-    return 0
