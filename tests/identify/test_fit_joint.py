@@ -137,6 +137,9 @@ def test_the_command_inspects_and_fits(tmp_path):
     assert (tmp_path / "out" / "report.html").exists()
     plant = am.files.load_scenario(tmp_path / "out" / "scenario.toml")
     assert len(plant.plant.muscles) == 2
+    varied = am.environments.FitUncertainty(plant.uncertainty).variations(plant.plant, 50)
+    assert "circuit[1].lag.frequency" in varied
+    assert 0.0 < varied["mechanism.inner.links[0].damping"].std() < 0.5
     controlled = tmp_path / "out" / "controlled.toml"
     for arguments in (
         ("simulate", tmp_path / "out" / "scenario.toml", "--out", tmp_path / "run"),

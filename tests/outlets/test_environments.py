@@ -22,6 +22,7 @@ from airmuscle.engine.run.batch import BatchStepper
 from airmuscle.errors import ParameterError
 from airmuscle.files.library import ParameterUncertainty
 from airmuscle.outlets import (
+    ArmReaching,
     FactorRange,
     FitUncertainty,
     JointTracking,
@@ -371,13 +372,63 @@ def test_randomisation_reaches_the_plants():
 def test_the_covariance_of_a_fit_is_that_of_the_draws():
     told = ParameterUncertainty(("characteristic.a", "b"), (2.0, 0.5), ((1.0, -0.8), (-0.8, 1.0)))
     normal = FitUncertainty(told, muscles=(0, 1))
-    draws = normal.values(np.array([10.0, 1.0, 20.0, 2.0]), np.random.default_rng(0).random((20000, 2)))
-    np.testing.assert_allclose(draws.mean(axis=0), [10.0, 1.0, 20.0, 2.0], rtol=0.02)
-    np.testing.assert_allclose(np.cov(draws[:, :2].T), told.covariance, rtol=0.05)
-    np.testing.assert_allclose(draws[:, 2:] - draws[:, :2], [[10.0, 1.0]] * 20000, rtol=1e-12)
+    draws = normal.values(np.array([10.0, 20.0, 1.0, 2.0]), np.random.default_rng(0).random((20000, 2)))
+    np.testing.assert_allclose(draws.mean(axis=0), [10.0, 20.0, 1.0, 2.0], rtol=0.02)
+    np.testing.assert_allclose(np.cov(draws[:, ::2].T), told.covariance, rtol=0.05)
+    np.testing.assert_allclose(draws[:, 1::2] - draws[:, ::2], [[10.0, 1.0]] * 20000, rtol=1e-12)
     assert normal.paths == (
-        "plant.muscle[0].contractile.a", "plant.muscle[0].b", "plant.muscle[1].contractile.a", "plant.muscle[1].b"
+        "plant.muscle[0].contractile.a", "plant.muscle[1].contractile.a", "plant.muscle[0].b", "plant.muscle[1].b"
     )  # fmt: skip
+
+
+IDENTIFIED = """
+[uncertainty]
+deviations = { angle = "1 deg" }
+parameters = ["mechanism.inertia", "circuit[0].supply.pressure, circuit[1].supply.pressure", "mechanism.weight_torque"]
+standard_errors = [0.002, 1e4, 0.05]
+correlations = [[1.0, -0.7, 0.0], [-0.7, 1.0, 0.2], [0.0, 0.2, 1.0]]
+"""
+
+
+@pytest.fixture
+def identified(tmp_path):
+    """A scenario as a fit writes it."""
+    path = tmp_path / "identified.toml"
+    run = '[run]\nduration = "1 s"\n'
+    path.write_text(f'[plant]\nlibrary = "joint-dmsp-20-matrix"\n{run}{IDENTIFIED}')
+    return am.files.load_scenario(path)
+
+
+def test_draws_of_an_identified_plant_have_its_covariance_and_stay_within_the_bounds(identified):
+    told = identified.uncertainty
+    drawn = FitUncertainty(told).variations(identified.plant, 4000, seed=1)
+    names = [path for group in told.parameters for path in group]
+    assert list(drawn) == names
+    columns = np.array([drawn[group[0]] for group in told.parameters])
+    errors = np.sqrt(np.diag(told.covariance))
+    assert abs((np.cov(columns) - told.covariance) / np.outer(errors, errors)).max() < 0.08  # 3.5 standard deviations
+    np.testing.assert_array_equal(drawn[names[1]], drawn[names[2]])
+    wide = dataclasses.replace(told, covariance=1e6 * told.covariance)
+    low = FitUncertainty(wide).variations(identified.plant, 200)["mechanism.inertia"].min()
+    assert low == 1e-6  # its declared bound
+    run = am.simulate_batch(
+        identified.plant, {name: column[:8] for name, column in drawn.items()}, am.Schedule({"left.fill": ((0.0, 1.0),)}),
+        duration=0.4, integrator=RungeKutta4(1e-3), keep=["angle"],
+    )  # fmt: skip
+    assert 0.0 < np.ptp(run["angle"][:, -1]) < 0.1
+
+
+def test_an_identified_plant_varies_in_its_environment(identified):
+    fitted = FitUncertainty(identified.uncertainty)
+    env = vector(64, JointTracking(identified.plant), randomisation=(fitted,))
+    env.reset(seed=3)
+    parameters = env.unwrapped._plants.parameters.transpose(0, 2, 1).reshape(
+        -1, env.unwrapped._plants.parameters.shape[1]
+    )
+    assert np.count_nonzero(np.ptp(parameters[:64], axis=0)) == 4
+    without = dataclasses.replace(identified.uncertainty, parameters=(), covariance=np.zeros((0, 0)))
+    with pytest.raises(ParameterError, match="the fit states no covariance of its parameters"):
+        FitUncertainty(without)
 
 
 def test_parameters_of_very_different_size_keep_their_standard_errors_and_correlations():
@@ -418,10 +469,12 @@ def test_other_impossible_requests_are_refused():
         FactorRange(("a",), 1.0, float("nan"))
     with pytest.raises(ParameterError, match="give a tuple of one path or more"):
         FactorRange("plant.mechanism.inertia", 0.8, 1.2)
-    with pytest.raises(ParameterError, match=r"give that of a muscle file with a table \[uncertainty\]"):
+    with pytest.raises(ParameterError, match="the fit states no covariance of its parameters"):
         FitUncertainty(None)
     with pytest.raises(ParameterError, match="give an EnvironmentTask"):
         single(JOINT)
+    with pytest.raises(ParameterError, match="ArmReaching: 2 targets for 1 joints; give one each"):
+        ArmReaching(JOINT)
     with pytest.raises(ParameterError, match="the period must be a whole number of steps"):
         single(integrator=RungeKutta4(0.003))
     with pytest.raises(ParameterError, match="max_episode_steps is 0"):

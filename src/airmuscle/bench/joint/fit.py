@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from ...core import tree
 from ...core.arrays import Array
@@ -85,12 +86,13 @@ def fit_joint(
     regulators = fit_regulator_lags(ordered[:split], rows)
     commanded = from_commands(regulators, ordered[split:], inspection.delay, rows) if regulators else None
     separated = [separate(arm, joint, own, train) for joint, own in paths.items()]
-    remarks = [*inspection.remarks, SCALE, *(text for _, texts in separated for text in texts)]
+    remarks = [*inspection.remarks, SCALE, *(text for _, texts, _ in separated for text in texts)]
     remarks += _contacts(ordered, errors, judge, split)
     return ArmFit(
         arm, inspection, found, errors, judge.episode, others, band(errors),
-        tuple({e.path: e for each, _ in separated for e in each}.values()), tuple(dict.fromkeys(remarks)), split,
+        tuple(e for each, _, _ in separated for e in each), tuple(dict.fromkeys(remarks)), split,
         regulators, None if commanded is None else free_run(arm, commanded) - judge.angle[:, HISTORY + 1 :],
+        block_diag(*(covariance for *_, covariance in separated)),
     )  # fmt: skip
 
 
@@ -160,8 +162,9 @@ WORDS = {
 
 def separate(
     arm: PressureDriven, joint: int, paths: Sequence[str], windows: Windows
-) -> tuple[list[ArmParameter], list[str]]:
-    """Estimates of one joint, and what the record does not separate, in words; from the Fisher information."""
+) -> tuple[list[ArmParameter], list[str], Array]:
+    """Estimates of one joint, what the record does not separate, in words, and the covariance (P, P) along what it
+    separates; from the Fisher information."""
     some = windows.part(np.linspace(0, len(windows) - 1, min(WINDOWS, len(windows))).astype(int))
     leaves = {leaf.path: leaf for leaf in tree.leaves(arm)}
     values = np.array([float(leaves[path].value) for path in paths])
@@ -181,7 +184,8 @@ def separate(
         ArmParameter(path, float(value), float(deviation))
         for path, value, deviation in zip(paths, values, deviations, strict=True)
     ]
-    return estimates, _words(joint, paths, np.sum(directions[:, weak] ** 2, axis=1))
+    known = sizes[:, None] * inverse[:, ~weak]
+    return estimates, _words(joint, paths, np.sum(directions[:, weak] ** 2, axis=1)), known @ known.T
 
 
 def _words(joint: int, paths: Sequence[str], shares: Array) -> list[str]:

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import dataclasses
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from ...core import plotting
+from ...core import plotting, tree
 from ...core.arrays import Array
 from ...core.errors import ParameterError
 from ...core.short_repr import ShortRepr
 from ...physics import Plant, PressureDriven, ProportionalRegulator, SecondOrderLag, Supply, Valve
 from ...report import Chapter, NamedValue, Plot, Table, TableColumn
+from ..identify.prediction import PlantUncertainty
 from ..reported import Reported
 from .episode_inspection import EpisodeInspection
 from .episodes import Episode, Episodes, in_pairs
@@ -47,6 +49,8 @@ class ArmFit(Reported):
     fitted       number of the episodes, the first ones, to which the arm is fitted
     regulators   of the muscles of `arm`, between command and pressure; empty where the episodes have no commands
     commanded    errors as `errors`, of the free run from the commands alone, or None
+    covariance   (P, P) of `estimates` [SI] along what the record separates; other combinations of them are not varied,
+                 because the arm moves alike with any of them
     """
 
     arm: PressureDriven
@@ -61,6 +65,7 @@ class ArmFit(Reported):
     fitted: int
     regulators: tuple[RegulatorLag, ...] = ()
     commanded: Array | None = None
+    covariance: Array = dataclasses.field(default_factory=lambda: np.zeros((0, 0)))
 
     @property
     def rms(self) -> Array:
@@ -101,6 +106,20 @@ class ArmFit(Reported):
             for lag in self.arm.lags
         )
         return Plant(self.arm.muscle, regulators, self.arm.mechanism)
+
+    def uncertainty(self) -> PlantUncertainty:
+        """That of `plant()`: rms errors of its angles, and the covariance of its parameters, for randomisation.
+
+        A parameter at a bound of its range has no variance.
+        """
+        paths, slopes = [], []
+        bounds = {leaf.path: leaf.declared.bounds for leaf in tree.leaves(self.arm)}
+        for each in self.estimates:
+            lag = re.fullmatch(r"lags(\[\d+\])", each.path)
+            paths.append((f"circuit{lag[1]}.lag.frequency" if lag else each.path,))
+            slopes.append(-1 / (2 * np.pi * each.value**2) if lag else float(each.value not in bounds[each.path]))
+        errors = {c.name: float(rms) for c, rms in zip(self.arm.mechanism.coordinates, self.rms, strict=True)}
+        return PlantUncertainty(errors, tuple(paths), self.covariance * np.outer(slopes, slopes))
 
     def chapter(self) -> Chapter:
         """The description of the fit: errors beside those of the baselines, skill, band, muscles and parameters."""

@@ -1,6 +1,6 @@
 """Table [uncertainty] of a scenario: residuals of the fit of its plant, with the covariance of the parameters.
 
-[uncertainty]                               written by airmuscle fit-dynamic and campaign, read by airmuscle predict
+[uncertainty]                               written by airmuscle fit-dynamic, fit-joint and campaign, read by predict
 deviations = { pressure = 620.0 }           standard deviation of the residuals of each observed quantity
 records = 3                                 number of records of the fit
 factors = { pressure = 2.4 }                half width of the 95 % band in deviations, from records predicted by others
@@ -88,6 +88,23 @@ def _covariance(fit: DynamicFit) -> dict[str, Any]:
         "standard_errors": [fit.estimates[i].stderr for i in common],
         "correlations": np.clip(fit.correlations[np.ix_(common, common)], -1.0, 1.0).tolist(),
     }
+
+
+def parameter_uncertainty(found: PlantUncertainty) -> ParameterUncertainty:
+    """Standard errors and correlations of the parameters that have a variance; several paths of one are one name."""
+    errors = np.sqrt(np.maximum(np.diag(found.covariance), 0.0))
+    known = np.flatnonzero(errors)
+    correlations = found.covariance[np.ix_(known, known)] / np.outer(errors[known], errors[known])
+    return ParameterUncertainty(
+        tuple(SEPARATOR.join(found.parameters[i]) for i in known),
+        tuple(errors[known].tolist()),
+        tuple(map(tuple, np.clip(correlations, -1.0, 1.0).tolist())),
+    )
+
+
+def uncertainty_table(found: PlantUncertainty) -> dict[str, Any]:
+    """The table [uncertainty] of the deviations and of the covariance alone."""
+    return {"deviations": found.deviations, **dataclasses.asdict(parameter_uncertainty(found))}
 
 
 def tail_factor(fit: DynamicFit, name: str) -> float:

@@ -13,6 +13,7 @@ from ...bench.joint import ArmFit, fit_joint, inspect_episodes, read_episode_map
 from ...control.laws import PID, Cascade, CoContraction, Decentralised
 from ...core.atomic_output import check_writable
 from ...files.library.write import model_table, scenario_toml
+from ...files.scenario.plant_uncertainty import uncertainty_table
 from ..requests.declaration import option, request
 from .delivery import deliver
 from .options import Folder, Json
@@ -89,6 +90,8 @@ def _scenarios(fit: ArmFit, title: str) -> dict[str, str]:
     note = "supply, orifices and volumes are chosen"
     tuned = f"{note}, and so are the gains: airmuscle tune finds better ones"
     return {
-        "scenario.toml": scenario_toml(title, fit.plant(), held, run, note),
+        "scenario.toml": scenario_toml(
+            title, fit.plant(), held, run, note, {"uncertainty": uncertainty_table(fit.uncertainty())}
+        ),
         "controlled.toml": scenario_toml(f"{title}, controlled", fit.plant(), {"controller": controller}, run, tuned),
     }

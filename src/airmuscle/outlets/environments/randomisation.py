@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import abc
 import dataclasses
+import functools
 import math
 import re
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 import numpy.typing as npt
 
+from ...bench.identify.prediction import PlantUncertainty
 from ...core import tree
 from ...core.annotation import abridged, check_field_types, one_line
 from ...core.arrays import Array
@@ -20,8 +22,11 @@ from ...core.short_repr import ShortRepr
 from ...engine.run.batch.variations import Column
 from ...engine.run.integrators import RungeKutta4
 from ...files.library.uncertainty import ParameterUncertainty
+from ...files.scenario.plant_uncertainty import SEPARATOR, parameter_uncertainty
+from ...physics.plant import Plant
 from .task import EnvironmentTask, check_actions
 
+T = TypeVar("T")
 _LAW = "characteristic"
 """Name of the law in a muscle file; a muscle calls it `contractile`."""
 
@@ -89,40 +94,62 @@ class FactorRange(UniformRange):
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class FitUncertainty(ShortRepr, Randomisation):
-    """Normal distribution about the fitted values with the covariance of the fit, from a muscle file.
+    """Normal distribution about the fitted values with the covariance of the fit, from a muscle file or a scenario.
 
-    uncertainty  standard errors and correlations of a muscle file: `am.load(PATH).uncertainty`
-    muscles      indices of the muscles of the plant to which it applies; all have the same draw, because it is the
-                 common law that is uncertain
+    uncertainty  `am.load(PATH).uncertainty` of a muscle file, or `load_scenario(PATH).uncertainty` of the scenario of
+                 an identified plant (fit-joint, fit-dynamic, campaign)
+    muscles      of a muscle file, indices of the muscles of the plant to which it applies; all have the same draw,
+                 because it is the common law that is uncertain
+
+    Draws are limited to the declared ranges. Raises ParameterError where the fit states no covariance.
     """
 
-    uncertainty: ParameterUncertainty
+    uncertainty: ParameterUncertainty | PlantUncertainty
     muscles: tuple[int, ...] = (0,)
 
     def __post_init__(self) -> None:
-        if not isinstance(self.uncertainty, ParameterUncertainty):
+        if not isinstance(self.uncertainty, ParameterUncertainty | PlantUncertainty) or not self.uncertainty.parameters:
             raise ParameterError(
-                f"FitUncertainty: uncertainty is {one_line(self.uncertainty)}; give that of a muscle file with a table "
-                "[uncertainty]: am.load(PATH).uncertainty."
+                f"FitUncertainty: the fit states no covariance of its parameters ({one_line(self.uncertainty)}); give "
+                "am.load(PATH).uncertainty of a muscle file, or load_scenario(PATH).uncertainty of a scenario, with a "
+                "table [uncertainty], or state ranges: FactorRange(paths, low, high)."
             )
         check_field_types(self)
 
+    @functools.cached_property
+    def groups(self) -> tuple[tuple[str, ...], ...]:
+        """The paths in the task that take each drawn value; a muscle that is not in a tuple has no index there."""
+        if isinstance(self.uncertainty, PlantUncertainty):
+            names = parameter_uncertainty(self.uncertainty).parameters
+            return tuple(tuple(f"plant.{path}" for path in name.split(SEPARATOR)) for name in names)
+        names = tuple(re.sub(rf"^{_LAW}\b", "contractile", name) for name in self.uncertainty.parameters)
+        return tuple(tuple(f"plant.muscle[{i}].{name}" for i in self.muscles) for name in names)
+
     @property
     def paths(self) -> tuple[str, ...]:  # type: ignore[override]
-        """The paths in the plant; those of a plant with one muscle that is not in a tuple have no index."""
-        names = [re.sub(rf"^{_LAW}\b", "contractile", name) for name in self.uncertainty.parameters]
-        return tuple(f"plant.muscle[{i}].{name}" for i in self.muscles for name in names)
+        """The paths of all groups."""
+        return tuple(path for group in self.groups for path in group)
 
     @property
     def dimension(self) -> int:
-        return len(self.uncertainty.parameters)
+        return len(self.groups)
 
     def values(self, nominal: Array, uniform: Array) -> Array:
         from scipy.special import ndtri
 
-        draws = self.uncertainty.deviations(ndtri(np.clip(uniform, 1e-12, 1.0 - 1e-12)))
-        values: Array = nominal + np.tile(draws, len(self.muscles))
+        found = self.uncertainty
+        fitted = parameter_uncertainty(found) if isinstance(found, PlantUncertainty) else found
+        draws = fitted.deviations(ndtri(np.clip(uniform, 1e-12, 1.0 - 1e-12)))
+        values: Array = nominal + np.repeat(draws, [len(group) for group in self.groups], axis=1)
         return values
+
+    def variations(self, plant: Plant, count: int, seed: int = 0) -> dict[str, Array]:
+        """Values (N,) of N draws by the path in the plant, as `simulate_batch(plant, variations, ...)` takes them."""
+        leaves = {f"plant.{leaf.path}": leaf for leaf in tree.leaves(plant)}
+        chosen = [_place(path, leaves) for path in self.paths]
+        nominal = np.array([leaf.value for leaf in chosen], dtype=float)
+        drawn = self.values(nominal, np.random.default_rng(seed).random((count, self.dimension)))
+        return {leaf.path: np.clip(x, *leaf.declared.bounds) for leaf, x in zip(chosen, drawn.T, strict=True)}
 
 
 class ParameterDraw:
@@ -165,7 +192,7 @@ class ParameterDraw:
         return table
 
 
-def _place(path: str, places: Mapping[str, int]) -> int:
+def _place(path: str, places: Mapping[str, T]) -> T:
     for known in (path, path.replace("plant.muscle[0].", "plant.muscle.")):
         if known in places:
             return places[known]

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 
 from ...core import ops
 from ...core.declaration import model, parameter
-from ...core.errors import AirmuscleWarning
+from ...core.errors import AirmuscleWarning, ParameterError
 from ...core.ops import Value
 from ...core.units import bar
 from ...files.library.catalogue import load
@@ -140,6 +140,11 @@ class ArmReaching(EnvironmentTask):
     initial_angle: float = parameter("rad", "theta_0", "largest initial angle", bounds=(0.0, 3.0), default=0.03)
     min_pressure: float = parameter("Pa", "p_min", "lowest initial pressure", bounds=(0.0, 1e6), default=2.5e5)
     max_pressure: float = parameter("Pa", "p_max", "highest initial pressure", bounds=(0.0, 1e6), default=3.5e5)
+
+    def check(self) -> None:
+        joints = len(self.plant.mechanism.coordinates)
+        if len(self.targets) != joints:
+            raise ParameterError(f"ArmReaching: {len(self.targets)} targets for {joints} joints; give one each.")
 
     @property
     def observations(self) -> tuple[Observation, ...]:
