@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import abc
 import dataclasses
-import functools
 import math
 import re
 from collections.abc import Mapping
@@ -116,7 +115,7 @@ class FitUncertainty(ShortRepr, Randomisation):
             )
         check_field_types(self)
 
-    @functools.cached_property
+    @property
     def groups(self) -> tuple[tuple[str, ...], ...]:
         """The paths in the task that take each drawn value; a muscle that is not in a tuple has no index there."""
         if isinstance(self.uncertainty, PlantUncertainty):
