@@ -111,7 +111,7 @@ def signature(function: Any, name: str, *, method: bool = False) -> str:
         return f"{name}(...)"
     if method and node.args.args:
         node.args.args.pop(0)
-    returns = f" -> {ast.unparse(node.returns)}" if node.returns else ""
+    returns = f" -> {annotation(node.returns)}" if node.returns else ""
     line = f"{name}({', '.join(arguments(node.args))}){returns}"
     if len(line) <= MAX_LINE:
         return line
@@ -135,8 +135,13 @@ def arguments(args: ast.arguments) -> Iterator[str]:
         yield f"**{_argument(args.kwarg, None)}"
 
 
+def annotation(node: ast.expr) -> str:
+    """The text of an annotation, without the quotes of a name that is defined later."""
+    return node.value if isinstance(node, ast.Constant) and isinstance(node.value, str) else ast.unparse(node)
+
+
 def _argument(arg: ast.arg, default: ast.expr | None) -> str:
-    text = ast.unparse(arg)
+    text = f"{arg.arg}: {annotation(arg.annotation)}" if arg.annotation else arg.arg
     if default is None:
         return text
     return f"{text} = {ast.unparse(default)}" if arg.annotation else f"{text}={ast.unparse(default)}"

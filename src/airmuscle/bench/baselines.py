@@ -1,7 +1,5 @@
 """Baselines that a prediction must beat, persistence and a linear ARX model, and the skill of a model against them."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
@@ -73,7 +71,7 @@ class TimedRecord(NamedTuple):
     inputs: Array
     compared: Array
 
-    def on_grid(self, step: float) -> TimedRecord:
+    def on_grid(self, step: float) -> "TimedRecord":
         """The record at even times; missing values are interpolated."""
         time = self.time[0] + step * np.arange(int((self.time[-1] - self.time[0]) / step * (1 + 1e-9)) + 1)
         outputs, inputs = (_interpolated(time, self.time, part) for part in (self.outputs, self.inputs))

@@ -1,7 +1,5 @@
 """Results of an identification that describe themselves: one chapter for `print`, notebooks, reports and outlets."""
 
-from __future__ import annotations
-
 import abc
 import shutil
 from collections.abc import Sequence

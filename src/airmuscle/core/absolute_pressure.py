@@ -1,7 +1,5 @@
 """Pressures that are stated as absolute: gauge pressures that keep the absolute pressure they were converted from."""
 
-from __future__ import annotations
-
 import contextlib
 from collections.abc import Iterator
 from contextvars import ContextVar
@@ -26,7 +24,7 @@ class AbsolutePressure(float):
     ambient: float
     """The ambient pressure that was subtracted [Pa]."""
 
-    def __new__(cls, absolute: float, ambient: float) -> AbsolutePressure:
+    def __new__(cls, absolute: float, ambient: float) -> "AbsolutePressure":
         pressure = super().__new__(cls, absolute - ambient)
         pressure.absolute, pressure.ambient = absolute, ambient
         return pressure

@@ -1,7 +1,5 @@
 """Annotations of fields and arguments: whether a value conforms, its description, checks of a dataclass and a call."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import inspect

@@ -4,8 +4,6 @@ CasADi evaluates a function point by point, which takes about 10 us each. NumPy 
 instruction for all points together. Instructions that the required outputs do not need are left out.
 """
 
-from __future__ import annotations
-
 import functools
 import math
 from collections.abc import Callable, Collection, Iterator, Sequence

@@ -1,7 +1,5 @@
 """Atomic output: a file, or the files of a folder, appear completely or not at all."""
 
-from __future__ import annotations
-
 import contextlib
 import errno
 import os

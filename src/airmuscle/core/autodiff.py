@@ -4,8 +4,6 @@
 a trace) and JAX arrays. `jacobian` returns the derivatives with respect to all parameters, as a fit requires.
 """
 
-from __future__ import annotations
-
 import functools
 import math
 from collections.abc import Callable, Sequence

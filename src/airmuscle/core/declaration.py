@@ -4,8 +4,6 @@ A declared field is a leaf (a float or a tuple of floats) with unit, symbol, mea
 Any other field is structure: another model, a tuple of models, an integer or a name.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import math

@@ -1,7 +1,5 @@
 """Status: how a computation ended; diagnostic: remark on a result, with code, subject, rows and hint."""
 
-from __future__ import annotations
-
 import dataclasses
 import enum
 from collections.abc import Iterator, Mapping, Sequence

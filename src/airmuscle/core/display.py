@@ -4,8 +4,6 @@ The choice is, in this order: that of the innermost `with display(...)` block, t
 in this process, that of the file config.toml in the user's configuration folder, or else the default of each output.
 """
 
-from __future__ import annotations
-
 import functools
 import math
 import os
@@ -37,7 +35,7 @@ class DisplayUnits:
     units  the texts of the units, such as ("bar", "mm"); a quantity without one keeps the default of the output
     """
 
-    def __init__(self, units: tuple[str, ...], where: str = "display", before: DisplayUnits | None = None) -> None:
+    def __init__(self, units: tuple[str, ...], where: str = "display", before: "DisplayUnits | None" = None) -> None:
         self.units = units
         self.before = before
         self.is_block = False

@@ -19,8 +19,6 @@ AirmuscleError
 AirmuscleWarning             a result that may differ from what the user expects
 """
 
-from __future__ import annotations
-
 import dataclasses
 import difflib
 import itertools
@@ -71,7 +69,7 @@ class HintedText(str):
 
     parts: tuple[str | Hint, ...]
 
-    def __new__(cls, *parts: str | Hint) -> HintedText:
+    def __new__(cls, *parts: str | Hint) -> "HintedText":
         """The text of its parts; parts that are hinted texts are merged."""
         merged: list[str | Hint] = []
         for part in parts:
@@ -80,7 +78,7 @@ class HintedText(str):
         text.parts = tuple(merged)
         return text
 
-    def __reduce__(self) -> tuple[type[HintedText], tuple[str | Hint, ...]]:
+    def __reduce__(self) -> "tuple[type[HintedText], tuple[str | Hint, ...]]":
         return HintedText, self.parts
 
     @property
@@ -92,7 +90,7 @@ class HintedText(str):
         """The text with each hint as the sentence that `write` returns; a hint without a sentence is omitted."""
         return _joined(self.parts, write)
 
-    def changed(self, change: Callable[[str], str]) -> HintedText:
+    def changed(self, change: Callable[[str], str]) -> "HintedText":
         """The text with `change` applied to all parts that are not hints."""
         return HintedText(*(part if isinstance(part, Hint) else change(part) for part in self.parts))
 

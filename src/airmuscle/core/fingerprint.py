@@ -1,7 +1,5 @@
 """Fingerprints of the inputs that results depend on: model descriptions and the version of the program."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import hashlib

@@ -4,8 +4,6 @@ Each function selects the library by the type of its operands: floats and NumPy 
 symbols are traced, JAX arrays are passed to jax.numpy. Models are written with these functions and + - * / **.
 """
 
-from __future__ import annotations
-
 import math
 import sys
 from collections.abc import Mapping

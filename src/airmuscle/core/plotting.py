@@ -1,7 +1,5 @@
 """Plot style shared by all figures: size, fonts, colours suited to print and colour blindness; axes of a caller."""
 
-from __future__ import annotations
-
 import functools
 import io
 from collections.abc import Iterable, Sequence

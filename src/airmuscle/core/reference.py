@@ -1,7 +1,5 @@
 """References of formulas and numbers; `cite` collects the references of an object."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Iterator
 from typing import Any

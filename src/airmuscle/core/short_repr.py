@@ -1,7 +1,5 @@
 """Short representation of results: class, fields with values, and the shapes of arrays, on at most ten lines."""
 
-from __future__ import annotations
-
 import dataclasses
 import textwrap
 from collections.abc import Mapping

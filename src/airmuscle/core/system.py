@@ -1,7 +1,5 @@
 """System: ordinary differential equations with named states, inputs and outputs, written over `ops`."""
 
-from __future__ import annotations
-
 import abc
 import dataclasses
 from collections.abc import Mapping, Sequence

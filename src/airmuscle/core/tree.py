@@ -5,8 +5,6 @@ tuple of models, a whole number, a name. What is derived from a model is stored 
 by `dataclasses.replace` derives anew only what changed.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 from collections.abc import Iterator, Mapping, Sequence

@@ -5,8 +5,6 @@
 a plain `"bar"` is gauge.
 """
 
-from __future__ import annotations
-
 import contextlib
 import dataclasses
 import difflib

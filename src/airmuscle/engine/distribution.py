@@ -1,7 +1,5 @@
 """Distribution of independent calls by an executor, and claims of a process on the tasks of a shared folder."""
 
-from __future__ import annotations
-
 import contextlib
 import functools
 import os

@@ -3,8 +3,6 @@
 An executor has the interface of `concurrent.futures`; local processes are those of `engine.processes`.
 """
 
-from __future__ import annotations
-
 import contextlib
 import contextvars
 import dataclasses
@@ -59,7 +57,7 @@ def dask_cluster(address: str) -> Iterator[Executor]:
 
 
 @contextlib.contextmanager
-def shared_folder(folder: Path | str, workers: int | None = None) -> Iterator[SharedFolder]:
+def shared_folder(folder: Path | str, workers: int | None = None) -> "Iterator[SharedFolder]":
     """A context manager for the executor of a folder that several processes share, on any machines.
 
     folder   a folder of a file system that all processes see; it is created if it is missing

@@ -3,8 +3,6 @@
 They are started afresh, not as copies of this process, and end together with it.
 """
 
-from __future__ import annotations
-
 import atexit
 import contextlib
 import multiprocessing

@@ -1,7 +1,5 @@
 """State vector of a system from values by name, checked; units of the columns of a run."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

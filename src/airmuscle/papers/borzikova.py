@@ -3,8 +3,6 @@
 The measurements and figures of the paper are lost; its three printed plane curves serve as data.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

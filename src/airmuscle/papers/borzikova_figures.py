@@ -1,7 +1,5 @@
 """Figures of the chapter on Borzíková et al.: Figs. 2 to 5 of the paper, residuals and monotonicity violations."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Contraction surfaces of the chapter on Borzíková et al., and the disturbed data for their fits."""
 
-from __future__ import annotations
-
 import dataclasses
 import warnings
 

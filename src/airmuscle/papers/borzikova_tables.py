@@ -1,7 +1,5 @@
 """Tables of the chapter on Borzíková et al."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Report chapter: Hošovský et al., muscle dynamics by Hill's model with valves by ISO 6358; Figures 1 and 2."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Claims of Hošovský et al. as tables, and ratios of the effects over the ranges of the suspected causes."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Callable, Mapping

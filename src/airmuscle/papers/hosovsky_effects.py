@@ -5,8 +5,6 @@ the volume is added, as its formula is lost in our copy. One component of the pr
 then one of each cause together. The parameter values are chosen, as the paper prints none.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Fill and discharge, Fig. 3 of Hošovský et al."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

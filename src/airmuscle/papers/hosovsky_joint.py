@@ -1,7 +1,5 @@
 """Joint variation of all chosen values of the quick release of Hošovský et al.: corners and a Sobol set."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import itertools

@@ -1,7 +1,5 @@
 """Plant of Hošovský et al.: printed values, values measured elsewhere, and chosen values."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 
@@ -78,7 +76,7 @@ class UnpublishedParameters:
     low_pressure: ChosenValue = ChosenValue(200e3, 150e3, 250e3, "Pa", "lower initial gauge pressure of the release")
     high_pressure: ChosenValue = ChosenValue(400e3, 350e3, 500e3, "Pa", "higher initial gauge pressure of the release")
 
-    def with_value(self, name: str, value: float) -> UnpublishedParameters:
+    def with_value(self, name: str, value: float) -> "UnpublishedParameters":
         """Return the parameters with another value of one of them."""
         return dataclasses.replace(self, **{name: dataclasses.replace(getattr(self, name), value=value)})
 

@@ -1,7 +1,5 @@
 """Quick release, Fig. 4 of Hošovský et al.: 30 kg, two initial pressures, closed valves."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping
 from typing import Any

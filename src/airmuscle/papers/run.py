@@ -1,7 +1,5 @@
 """Reproduction of the papers: computes their chapters and writes the report."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import importlib

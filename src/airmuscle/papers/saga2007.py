@@ -1,7 +1,5 @@
 """Report chapter: Saga, Nakamura and Yaegashi 2007, the straight-fibre muscle, its tables and its verdict."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -3,8 +3,6 @@
 The function of each row takes the model, so that the verdict follows from its fibre sum, projection factor and rubber.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

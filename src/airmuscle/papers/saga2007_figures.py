@@ -1,7 +1,5 @@
 """Figures of the chapter on Saga et al. 2007, which replace the lost figures of the paper."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -4,8 +4,6 @@ The paper proposes its closed form for feed-forward control. Here the pressures 
 a pair of muscles with the exact meridian, in steady state and without friction; the paper has no such experiment.
 """
 
-from __future__ import annotations
-
 import functools
 from typing import Any
 

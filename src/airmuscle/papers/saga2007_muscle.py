@@ -1,7 +1,5 @@
 """Muscle of Table 1 of Saga et al. 2007: interpretations of the paper, exact meridian and circular meridian."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

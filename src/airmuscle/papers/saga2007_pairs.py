@@ -4,8 +4,6 @@ The outline is the shape of the fibres, the closure the balance that determines 
 closures. The previous model, Ferraresi et al. 2001, is the circle with the balance at the middle.
 """
 
-from __future__ import annotations
-
 import functools
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """Previous model of the straight-fibre muscle: circular meridian of Ferraresi et al. 2001, as Saga et al. print it."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from typing import Any, NamedTuple

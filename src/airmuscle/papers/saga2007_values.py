@@ -1,7 +1,5 @@
 """Values that the claims of Saga et al. 2007 concern, for any interpretation of their model and the exact meridian."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Quantities of a recording, their SI and display units, and displacements of the muscle end as contractions."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping
 from typing import Any

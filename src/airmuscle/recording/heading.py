@@ -1,7 +1,5 @@
 """Column headings: quantity and unit."""
 
-from __future__ import annotations
-
 import dataclasses
 import re
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Display in notebooks: a card with a chart and a short table, as HTML that is readable on light and dark grounds."""
 
-from __future__ import annotations
-
 import abc
 import base64
 import dataclasses

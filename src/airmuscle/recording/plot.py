@@ -1,7 +1,5 @@
 """Plot of a recording over time: one panel for each physical quantity, with set point and measurement."""
 
-from __future__ import annotations
-
 import dataclasses
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence

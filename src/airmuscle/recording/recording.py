@@ -1,7 +1,5 @@
 """Recording: SI columns with common rows, constants and origin, its notes on rows, and its display in a notebook."""
 
-from __future__ import annotations
-
 import dataclasses
 import textwrap
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -73,7 +71,7 @@ class Recording(NotebookDisplay):
     def from_arrays(
         cls, columns: Mapping[str, Array], origin: str, constants: Mapping[str, float | str], notes: tuple[str, ...],
         references: tuple[Reference, ...],
-    ) -> Recording:  # fmt: skip
+    ) -> "Recording":  # fmt: skip
         """A recording of read-only vectors of one length, which are not checked again."""
         recording = object.__new__(cls)
         recording.__dict__.update(
@@ -134,21 +132,21 @@ class Recording(NotebookDisplay):
                 return np.asarray(convert(values))
         return self[name]
 
-    def rows(self, selection: Any) -> Recording:
+    def rows(self, selection: Any) -> "Recording":
         """The recording reduced to the rows that a mask, slice or index array selects; itself for a mask of all."""
         if isinstance(selection, np.ndarray) and selection.dtype == bool and selection.all():
             return self
         return dataclasses.replace(self, columns={name: values[selection] for name, values in self.columns.items()})
 
-    def with_columns(self, **columns: Any) -> Recording:
+    def with_columns(self, **columns: Any) -> "Recording":
         """The recording with added or replaced columns in SI units."""
         return dataclasses.replace(self, columns={**self.columns, **columns})
 
-    def with_constants(self, **constants: float | str) -> Recording:
+    def with_constants(self, **constants: float | str) -> "Recording":
         """The recording with added or replaced constants."""
         return dataclasses.replace(self, constants={**self.constants, **constants})
 
-    def to_pandas(self) -> pd.DataFrame:
+    def to_pandas(self) -> "pd.DataFrame":
         """The recording as a data frame with units in the column headings: `pressure [Pa]`."""
         try:
             import pandas as pd

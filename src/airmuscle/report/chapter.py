@@ -4,8 +4,6 @@
 in SI units; the unit in which a column or quantity is shown is declared with it.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -177,7 +175,7 @@ class Chapter(ShortRepr):
             return tuple(text for text in self.summary if text)
         return tuple(" ".join(part.split()) for part in re.split(r"\n\s*\n", self.summary) if part.strip())
 
-    def among(self, prefix: str = "", suffix: str = "") -> Chapter:
+    def among(self, prefix: str = "", suffix: str = "") -> "Chapter":
         """The chapter with names of itself, its tables and figures that are unique among others of its kind."""
         named: dict[str, Any] = {
             kind: tuple(dataclasses.replace(each, name=f"{prefix}{each.name}{suffix}") for each in getattr(self, kind))

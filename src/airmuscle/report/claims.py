@@ -1,7 +1,5 @@
 """Claims of a report: statements of papers with the expected and the computed value; every verdict is computed."""
 
-from __future__ import annotations
-
 import abc
 import dataclasses
 import enum

@@ -9,8 +9,6 @@ and of each column of a table, `parameters.value`; "by row" is that of the colum
 in data/ alone.
 """
 
-from __future__ import annotations
-
 import csv
 import dataclasses
 import io

@@ -1,7 +1,5 @@
 """Formatting of numbers, units and claims for the page and the terminal."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterable

@@ -5,8 +5,6 @@ A text of a chapter (claim, caption, table title, column header, cell) may conta
 terminal and alternative texts of figures contain the plain form, k_max.
 """
 
-from __future__ import annotations
-
 import functools
 import html
 import re

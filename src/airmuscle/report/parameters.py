@@ -1,7 +1,5 @@
 """Tables of parameters: of a model, and of the estimates of a fit."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from typing import Any, Protocol

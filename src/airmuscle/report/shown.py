@@ -1,7 +1,5 @@
 """Tables and quantities as they are shown: headings with their unit, and numbers in that unit."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping
 from typing import Any

@@ -1,7 +1,5 @@
 """Brief view of chapters as plain text: for each the title, the result, its quantities and tables, and the notes."""
 
-from __future__ import annotations
-
 import re
 import textwrap
 import unicodedata

@@ -1,7 +1,5 @@
 """Files of a report: report.html with embedded figures and formulas, claims.json, figures/ and data/."""
 
-from __future__ import annotations
-
 import base64
 import dataclasses
 import datetime

@@ -1,7 +1,5 @@
 """Approximation of one characteristic by another in least squares, and its error."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 from typing import Any

@@ -1,7 +1,5 @@
 """Bootstrap of a fit: refits to resampled groups of rows (runs, levels or specimens)."""
 
-from __future__ import annotations
-
 import contextlib
 import dataclasses
 from collections.abc import Callable, Sequence

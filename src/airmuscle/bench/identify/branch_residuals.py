@@ -5,8 +5,6 @@ follows that of the pressure by tau. The loop of friction is independent of the 
 pressure. A delay is found where the loop and the turning point give the same tau.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 import weakref

@@ -1,8 +1,6 @@
 """Scores of candidate laws: their fit to all rows, and their errors on the rows left out by one or several splits; in
 this process or in several."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable, Iterable, Sequence
 
@@ -45,7 +43,7 @@ class FoldScore:
     """Number of rows with a positive force; of a fold without any, the number of its slack rows."""
 
     @classmethod
-    def of(cls, fold: str, residuals: Array, measured: int) -> FoldScore:
+    def of(cls, fold: str, residuals: Array, measured: int) -> "FoldScore":
         """The score for residuals (N,), `measured` of them at a positive force."""
         rows = measured or residuals.size
         return cls(fold, float(np.sqrt(residuals @ residuals / rows)), rows)

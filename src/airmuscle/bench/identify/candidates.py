@@ -1,7 +1,5 @@
 """Candidates of a model comparison, and the evaluation of their forces at slack rows."""
 
-from __future__ import annotations
-
 import dataclasses
 import inspect
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Selection of a law for one purpose or for two, and the report chapter of a comparison by cross-validation."""
 
-from __future__ import annotations
-
 import dataclasses
 import re
 from collections import Counter

@@ -1,7 +1,5 @@
 """Compared points: the rows of all recordings with their cross-validation folds, shared by all candidate laws."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 from collections.abc import Iterator, Sequence
@@ -114,7 +112,7 @@ class ComparedPoints:
     @classmethod
     def from_recordings(
         cls, runs: Sequence[Recording], labels: Sequence[Labels], names: Sequence[str], points: FitPoints | None = None
-    ) -> ComparedPoints:
+    ) -> "ComparedPoints":
         """The points divided into the folds of these names; `points` are those of the recordings, if they exist."""
         folds = tuple(LeftOutGroup(name, [label == name for label in labels]) for name in names)
         return cls(runs, labels, folds, points or FitPoints.from_recordings(runs))

@@ -1,8 +1,6 @@
 """Contradictions: runs of one specimen whose forces differ at equal pressure, contraction and direction of motion; rows
 that occur in two recordings, as where files overlap, which are one measurement."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple

@@ -4,8 +4,6 @@ Rows are left out in groups, never at random: neighbouring rows of one run are c
 of them also fits the others, which says nothing about its error on a new run.
 """
 
-from __future__ import annotations
-
 import abc
 import dataclasses
 from collections.abc import Sequence

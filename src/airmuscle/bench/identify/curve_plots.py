@@ -1,7 +1,5 @@
 """Plots of a fit as curves: isometric ramps at the held contractions, and confidence and prediction bands."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Any, NamedTuple
 

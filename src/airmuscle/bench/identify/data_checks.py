@@ -3,8 +3,6 @@
 They need no law. `DataChecks` joins them with the checks of `bench.checks`, for every static fit.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Iterator, Sequence
@@ -37,7 +35,7 @@ class Scatter:
     branches: float = 0.0
 
     @classmethod
-    def of(cls, recordings: Sequence[Recording], repeatability: float | None) -> Scatter:
+    def of(cls, recordings: Sequence[Recording], repeatability: float | None) -> "Scatter":
         """The scatter of recordings; the noise only where the rows are in order of time."""
         timed = [run["force"] for run in recordings if "time" in run and "force" in run]
         noise = [estimate_noise(force[np.isfinite(force)]) for force in timed]
@@ -140,7 +138,7 @@ class DataChecks:
     delay: SensorDelay | None
 
     @classmethod
-    def of(cls, recordings: Sequence[Recording]) -> DataChecks:
+    def of(cls, recordings: Sequence[Recording]) -> "DataChecks":
         """The checks of recordings, without the rows in which a code stands for a missing value."""
         return _check(recordings)
 

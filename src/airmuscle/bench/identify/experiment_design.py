@@ -6,8 +6,6 @@ minimise the volume of the confidence ellipsoid. They are selected greedily and 
 Reference: Fedorov, V. V., Theory of Optimal Experiments, Academic Press, 1972.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Collection, Sequence

@@ -1,7 +1,5 @@
 """Notes of a static fit: rows, weights, bounds, losses and misfit that affect its interpretation, as sentences."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

@@ -1,7 +1,5 @@
 """FitPoints: the rows of one or several recordings as the points of static fits."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 from collections.abc import Collection, Sequence
@@ -48,7 +46,7 @@ class FitPoints:
     repeated: tuple[RepeatedRows, ...] = ()
 
     @classmethod
-    def from_recordings(cls, recording: Recording | Sequence[Recording]) -> FitPoints:
+    def from_recordings(cls, recording: Recording | Sequence[Recording]) -> "FitPoints":
         """The points of one or several recordings. Raises IdentificationError for an infinite value."""
         single = isinstance(recording, Recording)
         runs = (recording,) if isinstance(recording, Recording) else tuple(recording)

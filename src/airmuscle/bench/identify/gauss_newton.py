@@ -6,8 +6,6 @@ References: Björck, Numerical Methods for Least Squares Problems (1996), sectio
 and Optimization 20:221 (1982).
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -14,8 +14,6 @@ range: the variance of the former is s^2/(1 - h_i), that of the latter s^2 (1 + 
 regression (Cook and Weisberg, Residuals and Influence in Regression (1982), section 2.2).
 """
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Sequence

@@ -5,8 +5,6 @@ along a right singular vector is 1/s, with s the singular value; where it is lar
 not determined.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 

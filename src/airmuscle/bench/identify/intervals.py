@@ -1,7 +1,5 @@
 """Intervals of a static fit: confidence and prediction bands of the law, profile likelihood of a parameter."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import NamedTuple
 

@@ -4,8 +4,6 @@ The shortening L_0 - L of a specimen is taken as measured, and its resting lengt
 (L_0 - L)/(L_0 + d). Such an error leaves no residual at rest and residuals of one sign elsewhere.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -195,7 +193,7 @@ class _State(NamedTuple):
     rmse: float
 
     @classmethod
-    def at(cls, start: Characteristic, runs: Sequence[Recording], members: Sequence[bool], offset: float) -> _State:
+    def at(cls, start: Characteristic, runs: Sequence[Recording], members: Sequence[bool], offset: float) -> "_State":
         low, here, high = (
             FitPoints.from_recordings([corrected_length(r, d) if m else r for r, m in zip(runs, members, strict=True)])
             for d in (offset - _STEP, offset, offset + _STEP)

@@ -5,8 +5,6 @@ the specimen, so that the distance of two matched rows does not count. Rows of d
 their difference is hysteresis.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 from collections.abc import Iterator, Sequence

@@ -1,7 +1,5 @@
 """Model evidence: effective sample size, AICc, F test and Student's quantile."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Model selection by cross-validation: ranking, eligible laws, one-standard-error rule, evidence for few folds."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable, Sequence
 from typing import Any

@@ -11,8 +11,6 @@ samples", Survey Methodology 28(2), 169-181; Cameron and Miller (2015), "A pract
 inference", Journal of Human Resources 50(2), 317-372.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 from typing import NamedTuple
@@ -57,7 +55,7 @@ class Runs:
     in_time: bool
     """Whether the rows of a run follow each other in time."""
 
-    def rows(self, selection: Mask) -> Runs:
+    def rows(self, selection: Mask) -> "Runs":
         """The runs of a selection of the rows, a mask (N,)."""
         return dataclasses.replace(self, run=self.run[selection], specimen=self.specimen[selection])
 
@@ -146,7 +144,7 @@ class ParameterCovariance:
     def _design_correlations(self) -> Array:
         return _normalised(self.basis @ self.basis.T)
 
-    def within_bounds(self, low: Mask, high: Mask, descent: Array) -> ParameterCovariance:
+    def within_bounds(self, low: Mask, high: Mask, descent: Array) -> "ParameterCovariance":
         """The covariance where some of the parameters, masks (P,), are on their lower and upper bounds.
 
         descent  -J^T e (P,) of the weighted residuals e, which points outwards at a bound

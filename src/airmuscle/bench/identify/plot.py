@@ -1,7 +1,5 @@
 """Figure of a fit: modelled against measured values, and residuals."""
 
-from __future__ import annotations
-
 import textwrap
 from collections.abc import Iterator
 from typing import Any

@@ -6,8 +6,6 @@ estimates without run g, with the residuals of the pooled law and the same ratio
 (2002), Survey Methodology 28(2), 169-181, for the population parameters; here of the effects as well).
 """
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 from typing import NamedTuple
@@ -59,11 +57,11 @@ class Sums(NamedTuple):
         left = self.zr - self.xz.T @ population
         return np.concatenate([population, np.linalg.solve(self.zz + ratio * np.eye(len(self.zz)), left)])
 
-    def without(self, other: Sums) -> Sums:
+    def without(self, other: "Sums") -> "Sums":
         """The sums without these rows."""
         return Sums(*(whole - part for whole, part in zip(self, other, strict=True)))  # type: ignore[operator]
 
-    def scaled(self, share: float) -> Sums:
+    def scaled(self, share: float) -> "Sums":
         """The sums for rows that count only as this share of independent ones."""
         xx, xz, zz, xr, zr = (share * each for each in (self.xx, self.xz, self.zz, self.xr, self.zr))
         return Sums(xx, xz, zz, xr, zr, share * self.rr, share * self.rows)

@@ -1,7 +1,5 @@
 """Partial pooling: fits of a PooledLengthLaw, from the fit of its population law to all specimens."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 from typing import Any, NamedTuple
@@ -40,7 +38,7 @@ class Specimens:
     member: npt.NDArray[np.intp]
 
     @classmethod
-    def of(cls, points: FitPoints) -> Specimens:
+    def of(cls, points: FitPoints) -> "Specimens":
         """The specimens of the complete rows. Raises IdentificationError for fewer than two, or without a length."""
         names = [specimen_name(run) for run in points.recordings]
         lengths = _lengths(points.recordings, names)

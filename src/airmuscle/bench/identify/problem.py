@@ -1,7 +1,5 @@
 """FitProblem: law, free parameters, data points and the quantity in which residuals are taken."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 from collections.abc import Collection, Iterator, Sequence
@@ -135,7 +133,7 @@ class FitProblem:
             leaf_values[i] = float(value)
         return leaf_values
 
-    def rows(self, selection: npt.NDArray[Any]) -> FitProblem:
+    def rows(self, selection: npt.NDArray[Any]) -> "FitProblem":
         """The problem of these rows, a mask or indices."""
         return dataclasses.replace(
             self,

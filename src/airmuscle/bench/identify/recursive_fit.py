@@ -7,8 +7,6 @@ force. References: Bierman, G. J., Factorization Methods for Discrete Sequential
 Fedorov, V. V., Theory of Optimal Experiments, Academic Press, 1972.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 from typing import Any, NamedTuple
@@ -77,7 +75,7 @@ class RecursiveFit(ShortRepr):
             if self.forgetting < 1.0:
                 object.__setattr__(self, "squared_factor", PRIOR * np.eye(size - 1))
 
-    def updated(self, pressure: float, contraction: float, force: float) -> RecursiveFit:
+    def updated(self, pressure: float, contraction: float, force: float) -> "RecursiveFit":
         """The fit with one more sample [Pa, 1, N]. A sample outside the limits is counted and left out."""
         if not self.limits.validity_range.contains(pressure, contraction):
             return dataclasses.replace(self, outside=self.outside + 1)

@@ -1,7 +1,5 @@
 """Fit: estimates, standard errors and residual statistics of a static fit."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 from collections.abc import Callable
@@ -88,7 +86,7 @@ class Fit(Reported):
     problem: FitProblem
     """The fitted problem, for refits: data, targets, weights and free parameters."""
     loss: Loss
-    remarks: Remarks | Callable[[Fit], Remarks]
+    remarks: "Remarks | Callable[[Fit], Remarks]"
     """The remarks, or the examination of the data that gives them, which is made when they are first read."""
     effects: SpecimenEffects | None = None
     """The effects of the specimens on a PooledLengthLaw. Estimates and problem are those of its population law."""

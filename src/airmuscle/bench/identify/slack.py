@@ -10,8 +10,6 @@ another length is taken to be slack as well: rows of zero force at these points 
 which count only where the law violates them.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from typing import NamedTuple
 
@@ -45,7 +43,7 @@ class Slackness(NamedTuple):
     pull_pressure: Array
 
     @classmethod
-    def of(cls, pressure: Array, contraction: Array, slack: Rows, pulls: Rows) -> Slackness:
+    def of(cls, pressure: Array, contraction: Array, slack: Rows, pulls: Rows) -> "Slackness":
         """The steps of rows (N,), of which two masks are slack and pull."""
         order, last = np.argsort(contraction[slack]), np.argsort(-contraction[pulls])
         return cls(

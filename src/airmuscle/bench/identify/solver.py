@@ -1,7 +1,5 @@
 """Least-squares solvers: direct for laws linear in their parameters, iterative otherwise."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Any, NamedTuple
 

@@ -8,8 +8,6 @@ residuals of the population law (Robinson, Statistical Science 6:15 (1991)). A s
 specimen from above: the effects are then those of penalised least squares with one-sided residuals.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 from typing import NamedTuple
@@ -37,7 +35,7 @@ class BoundedRows(NamedTuple):
     side: Array
     weights: Array
 
-    def joined(self, other: BoundedRows) -> BoundedRows:
+    def joined(self, other: "BoundedRows") -> "BoundedRows":
         """These rows followed by others."""
         return BoundedRows(*(np.concatenate(pair) for pair in zip(self, other, strict=True)))
 

@@ -1,7 +1,5 @@
 """Errors of the specimens that were left out of a fit in turn, and the band for a specimen that was not measured."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Sequence

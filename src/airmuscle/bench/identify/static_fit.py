@@ -1,7 +1,5 @@
 """Fit of a static characteristic to measured points: `fit`."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Collection, Sequence
 

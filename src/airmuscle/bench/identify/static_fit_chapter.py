@@ -1,7 +1,5 @@
 """Report chapters: a static fit with the equation of its law, and its enclosed volume by virtual work."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping, Sequence
 from functools import partial

@@ -1,7 +1,5 @@
 """Statistics of a static fit: errors of rows, correlation index, rank, condition number and standard errors."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from typing import NamedTuple
@@ -79,7 +77,7 @@ class WorstPoint:
     force: float
 
     @classmethod
-    def of(cls, errors: Array, data: Recording) -> WorstPoint:
+    def of(cls, errors: Array, data: Recording) -> "WorstPoint":
         """The row of the error (N,) of maximum magnitude."""
         worst = int(np.argmax(np.abs(errors)))
         return cls(float(errors[worst]), *(float(data[name][worst]) for name in ("pressure", "contraction", "force")))
@@ -168,7 +166,7 @@ class _Design(NamedTuple):
     right_singular_vectors: Array
 
     @classmethod
-    def of(cls, problem: FitProblem, solution: LeastSquaresSolution, columns: Mask) -> _Design:
+    def of(cls, problem: FitProblem, solution: LeastSquaresSolution, columns: Mask) -> "_Design":
         """The singular values at a solution."""
         active = problem.active_rows(solution.modelled)
         matrix = problem.weights[active, None] * solution.jacobian[np.ix_(active, columns)]

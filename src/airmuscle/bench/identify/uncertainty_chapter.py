@@ -1,7 +1,5 @@
 """Report chapters: uncertainty by standard errors, bootstrap and profile likelihood; constrained surfaces."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 from functools import partial

@@ -8,8 +8,6 @@ References: Golub and Pereyra, SIAM Journal on Numerical Analysis 10:413 (1973);
 15:49 (1975).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -5,8 +5,6 @@ that enters between two settled pressures, V = Delta m R T/Delta p. A fill witho
 ratio of volume and valve conductance: see `bench.identify.dynamic`.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 from typing import NamedTuple

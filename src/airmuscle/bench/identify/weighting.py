@@ -1,8 +1,6 @@
 """Rules by which rows count in a fit: losses, censored observations (slack muscle, limits of the sensor), weights of
 different test rigs."""
 
-from __future__ import annotations
-
 import abc
 import dataclasses
 import math
@@ -117,7 +115,7 @@ class Censoring:
         """By row: 0 uncensored, 1 censored below (the true force is at most the limit), -1 censored above."""
         return (force <= self.min_force) * 1.0 - (force >= self.max_force) * 1.0
 
-    def within(self, other: Censoring) -> Censoring:
+    def within(self, other: "Censoring") -> "Censoring":
         """The range that both have in common."""
         return Censoring(max(self.min_force, other.min_force), min(self.max_force, other.max_force))
 

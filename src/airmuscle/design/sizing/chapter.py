@@ -1,7 +1,5 @@
 """Report chapter: choices of muscles for a lift or a joint, the valves for the best one, and its chart."""
 
-from __future__ import annotations
-
 import functools
 import warnings
 from typing import Any

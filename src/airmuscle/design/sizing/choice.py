@@ -1,7 +1,5 @@
 """Choices of a sizing: length, number, end points, air and energy of a muscle that meets a requirement."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Callable, Mapping

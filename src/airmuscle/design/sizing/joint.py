@@ -1,7 +1,5 @@
 """Shortest muscles of an antagonistic joint: contractions of both muscles and pulley radius."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 

@@ -1,7 +1,5 @@
 """Shortest muscle of a lift: end points at which the load lies between the least force and the capacity."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Requirements of a sizing: a lift over a stroke or a joint over an angle, and the conditions of operation."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from typing import Any, ClassVar
@@ -63,7 +61,7 @@ class LiftRequirement:
         """Work against the load over the stroke [J]."""
         return float(0.5 * (self.load(0.0) + self.load(self.stroke)) * self.stroke)
 
-    def reduced(self, load: float = 1.0, travel: float = 1.0) -> LiftRequirement:
+    def reduced(self, load: float = 1.0, travel: float = 1.0) -> "LiftRequirement":
         """The requirement with a fraction of the load and of the stroke."""
         return dataclasses.replace(
             self, mass=load * self.mass, force=load * self.force, stiffness=load * self.stiffness / travel,
@@ -108,7 +106,7 @@ class JointRequirement:
         """Work against the torque in a cycle, once over the range in each direction [J]."""
         return 2.0 * self.torque * self.angle
 
-    def reduced(self, load: float = 1.0, travel: float = 1.0) -> JointRequirement:
+    def reduced(self, load: float = 1.0, travel: float = 1.0) -> "JointRequirement":
         """The requirement with a fraction of torque and inertia, and of the angle."""
         return dataclasses.replace(
             self, torque=load * self.torque, inertia=load * self.inertia, angle=travel * self.angle

@@ -1,7 +1,5 @@
 """Scenario of a choice: a lift with on/off valves or a joint with pressure regulators, as text for `load_scenario`."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Sequence

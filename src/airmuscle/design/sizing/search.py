@@ -1,7 +1,5 @@
 """Search of the muscles of a catalogue that meet a requirement, ranked, with the reasons for all others."""
 
-from __future__ import annotations
-
 import contextlib
 import dataclasses
 import functools

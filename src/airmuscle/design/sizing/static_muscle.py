@@ -1,7 +1,5 @@
 """Static force of a muscle within its working range: validity range, ratings, supply pressure and geometry."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Report chapter of a parameter study, and its result files."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path

@@ -5,8 +5,6 @@ not be computed again, even if the study was interrupted; if an input has change
 computed.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import zipfile
 from collections.abc import Callable, Iterator, Mapping, Sequence

@@ -4,8 +4,6 @@ Each design places its points in the unit cube; the variation of each parameter 
 same designs therefore serve for levels and for all distributions.
 """
 
-from __future__ import annotations
-
 import abc
 import dataclasses
 import math

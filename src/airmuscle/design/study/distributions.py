@@ -1,7 +1,5 @@
 """Parameter distributions and level sets."""
 
-from __future__ import annotations
-
 import abc
 import dataclasses
 import math

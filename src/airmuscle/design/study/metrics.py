@@ -5,8 +5,6 @@ level is reached where the straight line between two rows crosses it. The output
 therefore determines the accuracy of the metrics.
 """
 
-from __future__ import annotations
-
 import abc
 import dataclasses
 import math
@@ -199,7 +197,7 @@ class TimeSeries(Metric):
         if not 0 < self.sample_time < math.inf:
             raise ParameterError(f"TimeSeries: sample_time is {self.sample_time:g} s; it must be positive and finite.")
 
-    def clip_to_run(self, start: float, duration: float) -> TimeSeries:
+    def clip_to_run(self, start: float, duration: float) -> "TimeSeries":
         """A copy whose window is clipped to a run, which fixes its times. Raises ParameterError."""
         begin, end = max(self.begin, start), min(self.end, start + duration)
         if not begin < end or (end - begin) / self.sample_time > 1_000_000:

@@ -8,8 +8,6 @@ The unit of a field of designs, distributions and metrics is that of the varied 
 such a field is declared with `custom_field` and one of the readers, which receive that unit.
 """
 
-from __future__ import annotations
-
 import copy
 import dataclasses
 import math

@@ -1,7 +1,5 @@
 """Plots of a study: histograms and scatter plots of the metrics, sensitivity indices and time series."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from typing import Any

@@ -12,8 +12,6 @@ References: Sobol, Math. and Computers in Simulation 55 (2001) 271-280; Jansen, 
 (1999) 35-43 (T_i); Saltelli et al., Computer Physics Communications 181 (2010) 259-270 (S_i, and the design).
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping
 from typing import Any

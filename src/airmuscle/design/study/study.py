@@ -17,8 +17,6 @@ seed = 1
 contraction = { model = "Final", column = "contraction" }
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping, Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Expressions as compiled functions of arrays, at one point or at several side by side; rates with disturbances."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 from typing import Any

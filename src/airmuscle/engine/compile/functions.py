@@ -1,7 +1,5 @@
 """Functions that a system is printed as, in LLVM text or any other target language."""
 
-from __future__ import annotations
-
 import copy
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence

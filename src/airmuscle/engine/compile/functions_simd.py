@@ -1,7 +1,5 @@
 """The functions of a system over vectors: for many plants side by side, and for many rows of one plant."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 from .functions import PARAMETERS, Extension, Printer, TracedSystem

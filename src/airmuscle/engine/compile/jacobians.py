@@ -1,7 +1,5 @@
 """Partial derivatives of rates and outputs, at a point and printed, and event indicators, where slopes jump."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 import weakref

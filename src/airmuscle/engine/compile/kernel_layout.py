@@ -1,7 +1,5 @@
 """Layout of arrays that kernels share with their callers."""
 
-from __future__ import annotations
-
 import enum
 
 

@@ -1,7 +1,5 @@
 """ONNX graph of printed functions: each instruction is a node, each array a tensor (elements, count)."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 
 from .ir.emission import FunctionBlock, unknown_operation

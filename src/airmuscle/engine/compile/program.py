@@ -1,7 +1,5 @@
 """Compiled systems: machine code shared by all systems of one structure, and the data of one system."""
 
-from __future__ import annotations
-
 import ctypes
 import dataclasses
 import functools
@@ -224,7 +222,7 @@ class CompiledSystem:
         """The outputs, in the order of their vector."""
         return self.program.output_names
 
-    def at(self, parameters: Array, nominal: Array) -> CompiledSystem:
+    def at(self, parameters: Array, nominal: Array) -> "CompiledSystem":
         """The same system with other parameters and nominal sizes, for callers that change them often."""
         precomputed = self.program.precompute(parameters)
         return dataclasses.replace(self, parameters=parameters, precomputed=precomputed, nominal=nominal)

@@ -1,7 +1,5 @@
 """RunCache: what the runs of one system leave for the next one, so that a run like the last one repeats no work."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Hashable
 from typing import Any

@@ -6,8 +6,6 @@ dJ = (dJ/dx) S + dJ/dtheta: without it the derivatives converge with order one. 
 derivatives V = du/dtheta, further inputs (M, K), row by row; all of the above then has a term of V too.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -77,7 +75,7 @@ class Values:
         by_index = {index: operand for _, index, operand in code.outputs}
         self.results = [by_index.get(i, ZERO) for i in range(expressions.numel())]
 
-    def along(self, results: Sequence[Operand]) -> DirectionalDerivative:
+    def along(self, results: Sequence[Operand]) -> "DirectionalDerivative":
         """The derivatives of some operands of the tape."""
         states = [("in", POINT.index("x"), i) for i in range(self.t.size)]
         inputs = [("in", POINT.index("u"), i) for i in self.t.inputs]

@@ -1,7 +1,5 @@
 """A whole step of an explicit method, and its derivatives along columns, as one function."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from .functions import PARAMETERS, Printer
@@ -42,7 +40,7 @@ class _Stage:
             early = (item if isinstance(item, Instruction) else item.body[0]).result in needed
             (self.first if early else self.second).append(item)
 
-    def print_rates(self, before: _Stage | None) -> None:
+    def print_rates(self, before: "_Stage | None") -> None:
         """The rates of this stage, and in between the derivatives of the one before."""
         done, ahead = 0, 0 if before is None else len(before.second)
         for number, line in enumerate(self.first, 1):

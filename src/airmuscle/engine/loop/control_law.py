@@ -3,8 +3,6 @@
 Laws around other laws, laws of one column by one input or by two in split range, and sigma-delta modulation.
 """
 
-from __future__ import annotations
-
 import abc
 import dataclasses
 from collections.abc import Callable, Mapping

@@ -3,8 +3,6 @@
 A control law that is designed from weights (LawDesign) is designed before the loop runs.
 """
 
-from __future__ import annotations
-
 import abc
 import dataclasses
 import functools

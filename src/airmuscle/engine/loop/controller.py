@@ -1,7 +1,5 @@
 """Controllers (interface): from measured columns to commanded inputs, and the units of their signals and parameters."""
 
-from __future__ import annotations
-
 import abc
 import dataclasses
 from collections.abc import Iterator, Mapping

@@ -5,8 +5,6 @@ many steps equals the run in one. At the start of a run every driver is at rest:
 carrier at the start of a period.
 """
 
-from __future__ import annotations
-
 import abc
 import dataclasses
 import math

@@ -1,7 +1,5 @@
 """Input signals: inputs of a plant as functions of time, linear between two instants."""
 
-from __future__ import annotations
-
 import abc
 import bisect
 import dataclasses

@@ -1,7 +1,5 @@
 """PiecewiseLinear: all inputs of a run, linear in time within each segment; and segments of a single input."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 import operator
@@ -73,20 +71,20 @@ class PiecewiseLinear(ShortRepr):
         if ends[0] <= start or not _rising(ends):
             raise ParameterError(f"segments must end in rising order after {start:g} s; they end at {ends.tolist()} s.")
 
-    def as_floats(self) -> PiecewiseLinear:
+    def as_floats(self) -> "PiecewiseLinear":
         """The same inputs as arrays that a kernel can read: contiguous, writeable, of float64."""
         tables = (self.ends, self.values, self.slopes)
         if all(t.dtype == np.float64 and t.flags.carray for t in tables):
             return self
         return PiecewiseLinear(*(np.array(t, dtype=float, order="C") for t in tables))
 
-    def read_only(self) -> PiecewiseLinear:
+    def read_only(self) -> "PiecewiseLinear":
         """The same inputs; nobody can write to these arrays any more."""
         for table in (self.ends, self.values, self.slopes):
             table.setflags(write=False)
         return self
 
-    def split_at(self, starts: Array, start: float) -> PiecewiseLinear:
+    def split_at(self, starts: Array, start: float) -> "PiecewiseLinear":
         """The same inputs with segments that start at other instants (R,), in rising order, the first not before
         `start`; no segment may end within one of them."""
         ends = np.append(starts[1:], self.ends[-1])

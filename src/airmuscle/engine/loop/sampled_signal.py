@@ -1,7 +1,5 @@
 """SampledSignal: inputs as connected straight lines, from points, recordings, functions of time or a trajectory."""
 
-from __future__ import annotations
-
 import dataclasses
 import warnings
 from collections.abc import Callable, Mapping, Sequence
@@ -46,7 +44,7 @@ class SampledSignal(InputSignal):
         return tuple(self.points)
 
     @classmethod
-    def recorded(cls, recording: Recording, columns: Mapping[str, str]) -> SampledSignal:
+    def recorded(cls, recording: Recording, columns: Mapping[str, str]) -> "SampledSignal":
         """Columns of a recording as inputs: for each input the column that it follows, in SI.
 
         `SampledSignal.recorded(read_csv("bench.csv"), {"fill": "fill"})`
@@ -63,7 +61,7 @@ class SampledSignal(InputSignal):
     def sampled(
         cls, functions: Mapping[str, Callable[[float], float]], *, duration: float, start: float = 0.0,
         error: float = 1e-4,
-    ) -> SampledSignal:  # fmt: skip
+    ) -> "SampledSignal":  # fmt: skip
         """Functions of time [s], approximated to within `error` by straight lines that are bisected until they are.
 
         Each line is compared with its function at a quarter, a half and three quarters of it, and none is longer than

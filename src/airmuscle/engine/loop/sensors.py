@@ -1,7 +1,5 @@
 """WithSensors: a control law that receives its measurements through sensors with finite quality."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import ClassVar
 

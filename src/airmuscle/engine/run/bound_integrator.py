@@ -1,7 +1,5 @@
 """Integrator bound to a compiled system: its kernel with all arguments, run after run."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any, NamedTuple
 

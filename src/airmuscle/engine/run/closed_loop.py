@@ -5,8 +5,6 @@ differ in the parameters of the control law alone: the sampling instants, the se
 inputs are then the same, and so is the kernel with its arrays.
 """
 
-from __future__ import annotations
-
 from collections.abc import Hashable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Compiled sample of a control law: measurements, set points and memory to commands and memory, as machine code."""
 
-from __future__ import annotations
-
 import array
 import ctypes
 import dataclasses

@@ -4,8 +4,6 @@ A controller that is no control law, and drivers that no kernel implements, are 
 program pause at each sample.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

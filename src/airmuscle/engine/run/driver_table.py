@@ -1,7 +1,5 @@
 """Drivers of a loop as arrays, for the kernel that passes commands through them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any

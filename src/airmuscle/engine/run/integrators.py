@@ -1,7 +1,5 @@
 """Integrators: numerical methods for ordinary differential equations, each a thin caller of one kernel."""
 
-from __future__ import annotations
-
 import abc
 import functools
 from typing import ClassVar

@@ -1,7 +1,5 @@
 """Control loop as a JAX function of the parameters of plant and controller, with classical Runge-Kutta steps."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Callable, Mapping

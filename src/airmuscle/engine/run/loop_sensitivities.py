@@ -1,7 +1,5 @@
 """Sensitivities of control loops: derivatives of laws and through their samples, gradient of a tracking error."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import math

@@ -1,7 +1,5 @@
 """Output times of a run: a grid or given instants, together with the instants of its inputs."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Problem: a system, its input, initial state, duration, output times and integrator, checked as a whole."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import sys

@@ -1,7 +1,5 @@
 """Rows of a run: outputs and inputs at its states, the first invalid row, and the recording with its diagnostics."""
 
-from __future__ import annotations
-
 import functools
 import operator
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """Simulation of a problem, and the short ways in: `simulate` and `advance`."""
 
-from __future__ import annotations
-
 import functools
 import operator
 from collections.abc import Mapping

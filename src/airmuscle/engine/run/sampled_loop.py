@@ -1,7 +1,5 @@
 """SampledLoop: a control loop prepared for one run, what does not change from sample to sample; called controllers."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import math

@@ -1,7 +1,5 @@
 """Solution: the recording of a run with its status, statistics, diagnostics, final state and references."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -74,13 +72,13 @@ class Solution(NotebookDisplay):
             control_state=self.control_state,
         )
 
-    def raise_if_incomplete(self) -> Solution:
+    def raise_if_incomplete(self) -> "Solution":
         """The solution itself; raises SimulationError with the solution if the run ended early."""
         if self.complete:
             return self
         raise SimulationError(self.diagnostics[-1].message, self, interrupted=self.status == Status.INTERRUPTED)
 
-    def to_pandas(self) -> pd.DataFrame:
+    def to_pandas(self) -> "pd.DataFrame":
         """The recording as a data frame."""
         return self.recording.to_pandas()
 

@@ -1,7 +1,5 @@
 """Stepper: a plant that is advanced by hand, step after step, for hardware in the loop, other simulators and ROS."""
 
-from __future__ import annotations
-
 import dataclasses
 import numbers
 from collections.abc import Mapping, Sequence

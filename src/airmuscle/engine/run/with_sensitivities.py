@@ -1,7 +1,5 @@
 """Forward sensitivities: a system extended by the derivatives of its states with respect to chosen parameters."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 

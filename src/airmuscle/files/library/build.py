@@ -6,8 +6,6 @@ only one is possible, and a model without parameters is its name alone (`gas = "
 also be a column of a data file, relative to the folder of the TOML file: `{ file = "data/map.csv", column = "force" }`.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import inspect
 import typing

@@ -4,8 +4,6 @@
 Entry, a ValveEntry or a PlantEntry; a unique beginning of a name is sufficient.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from pathlib import Path
 

@@ -11,8 +11,6 @@ The fields of an entry are the keys of its file, see build.py. A valve file, for
     [[reference]]                   sources
 """
 
-from __future__ import annotations
-
 import dataclasses
 import math
 import warnings

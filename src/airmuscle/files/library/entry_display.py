@@ -1,7 +1,5 @@
 """Description of library entries: provenance, components, parameters, checks, chart and references."""
 
-from __future__ import annotations
-
 import abc
 from collections.abc import Iterator
 from typing import Any

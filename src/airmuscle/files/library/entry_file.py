@@ -1,7 +1,5 @@
 """Entries of the library by name, or from files of the same form: muscles and laws, valves, and products."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Evaluation of a muscle or a law: the third of pressure, contraction and force from the other two."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 import warnings

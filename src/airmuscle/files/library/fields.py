@@ -1,7 +1,5 @@
 """Fields of an object in a TOML table: their declaration, the reading of numbers, and values against annotations."""
 
-from __future__ import annotations
-
 import dataclasses
 import types
 import typing

@@ -1,7 +1,5 @@
 """Files of the library: folders, entry names, and reading of TOML."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Entries before and after a fit: initial law, fitted law, and muscle of a campaign, each with its uncertainty."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Locations in a TOML file for error messages, and the checks of its tables and values."""
 
-from __future__ import annotations
-
 import contextlib
 import dataclasses
 import math
@@ -25,15 +23,15 @@ class Location:
     key: str = ""
 
     @classmethod
-    def of_file(cls, path: Path) -> Location:
+    def of_file(cls, path: Path) -> "Location":
         """Location of the tables of a file."""
         return cls(str(path), "", path.parent)
 
-    def inside(self, key: str) -> Location:
+    def inside(self, key: str) -> "Location":
         """Location of a table or list item inside this table."""
         return dataclasses.replace(self, table=".".join(filter(None, (self.table, self.key, key))), key="")
 
-    def at(self, key: str) -> Location:
+    def at(self, key: str) -> "Location":
         """Location of the value of a key of this table."""
         return dataclasses.replace(self, key=f"{self.key}, {key}" if self.key else key)
 

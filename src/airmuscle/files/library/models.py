@@ -4,8 +4,6 @@ It contains every class that is declared with `@model`, unless it has `from_file
 `__all__` of one of the packages below.
 """
 
-from __future__ import annotations
-
 import contextlib
 import contextvars
 import functools

@@ -14,8 +14,6 @@ Parts of a plant may be named: a muscle and a plant of the library or of a file,
 values of a valve, `{ library = "matrix-821" }`; of a muscle and of a plant the other keys replace parts.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping
 from pathlib import Path

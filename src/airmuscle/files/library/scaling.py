@@ -1,7 +1,5 @@
 """Scaling of entries, laws and geometries to another resting length or, for McKibben muscles, to another diameter."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Any, TypeVar
 

@@ -1,7 +1,5 @@
 """Uncertainty in a muscle file: standard errors and correlations of parameters, and the stated band of a quantity."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Collection, Mapping

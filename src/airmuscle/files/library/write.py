@@ -1,7 +1,5 @@
 """Writing of library entries, model tables and scenarios as TOML that the loaders read back to the same numbers."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Scenarios of a campaign: one for each record, which reproduces it with the identified muscle."""
 
-from __future__ import annotations
-
 import dataclasses
 import re
 from collections.abc import Mapping, Sequence

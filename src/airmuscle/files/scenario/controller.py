@@ -28,8 +28,6 @@ Numbers are SI or texts with a unit that fits the signals of the law in whose ta
 static inverse are those of the plant unless the table gives others, in the form of [plant].
 """
 
-from __future__ import annotations
-
 import dataclasses
 import math
 import re

@@ -30,8 +30,6 @@ mapping = "rig.toml"                        optional, and resting_length, ambien
                                             that which the file of the record states, unless [plant.ambient] does
 """
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence

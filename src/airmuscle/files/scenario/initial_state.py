@@ -5,8 +5,6 @@ initial_state = { "left.pressure" = "1 bar", "right.pressure" = "3 bar" }   equi
 initial_state = { pressure = "2 bar", angle = "5 deg" }                  a state at rest that need not be an equilibrium
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -10,8 +10,6 @@ columns = { fill = "valve [%]" }            optional: the column of an input, by
 fill = { model = "SolenoidDriver", opening_delay = "5 ms" }     optional: one driver, or a list in signal order
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any

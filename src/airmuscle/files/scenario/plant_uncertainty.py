@@ -12,8 +12,6 @@ standard_errors = [0.01, 2.1e-11]           SI
 correlations = [[1.0, 0.2], [0.2, 1.0]]
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any

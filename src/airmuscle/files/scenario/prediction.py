@@ -12,8 +12,6 @@ initial_state = { pressure = "3 kPa" }
 file = "fill3.csv"
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping, Sequence
 from pathlib import Path

@@ -22,8 +22,6 @@
 Components are tables with `model` and their parameters; new components need no new grammar.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping, Sequence
 from pathlib import Path

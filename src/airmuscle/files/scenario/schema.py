@@ -5,8 +5,6 @@ meaning of each parameter. Names of inputs, columns and files are not in the sch
 loaded. JSON Schema, draft 2020-12.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import inspect
 import math
@@ -59,7 +57,7 @@ def muscle_schema() -> Schema:
     return _document("A muscle or a law in airmuscle", tables, models)
 
 
-def _document(title: str, tables: Schema, models: _ModelSchemas) -> Schema:
+def _document(title: str, tables: Schema, models: "_ModelSchemas") -> Schema:
     return {"$schema": DRAFT, **tables, "title": title, "$defs": dict(sorted(models.definitions.items()))}
 
 

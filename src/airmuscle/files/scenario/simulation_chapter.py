@@ -1,7 +1,5 @@
 """Report chapter: a simulated run with its time series, inputs, parameters, and the tracking of set points."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 from functools import partial

@@ -4,8 +4,6 @@ Tables of these files are dataclasses, whose fields are declared with `custom_fi
 the reader knows is the plant.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping
 from typing import Any

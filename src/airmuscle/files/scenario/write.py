@@ -1,7 +1,5 @@
 """Writing of scenarios with input signals, drivers and control loops as TOML that `load_scenario` reads back."""
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Mapping
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`airmuscle approximate`: approximation of one characteristic by another, with the remaining error."""
 
-from __future__ import annotations
-
 import dataclasses
 from pathlib import Path
 from typing import Annotated

@@ -1,7 +1,5 @@
 """Measurement files as arguments of a command, with the options that complete them."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Iterable
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`airmuscle benchmark`: control benchmark of an antagonistic joint."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 

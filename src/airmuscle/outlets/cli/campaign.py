@@ -4,8 +4,6 @@ A stage is found by a fingerprint of the recordings, the geometry and the progra
 program are fitted anew. The files are removed at the end of the campaign.
 """
 
-from __future__ import annotations
-
 import contextlib
 import dataclasses
 import hashlib

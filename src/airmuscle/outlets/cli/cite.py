@@ -1,7 +1,5 @@
 """`airmuscle cite`: references of a library entry."""
 
-from __future__ import annotations
-
 import dataclasses
 import re
 from typing import Annotated

@@ -3,8 +3,6 @@
 Exit code 0: success. 1: failure, with one line on stderr that gives the reason. 2: wrong usage. 130: interrupted.
 """
 
-from __future__ import annotations
-
 import contextlib
 import functools
 import importlib

@@ -1,7 +1,5 @@
 """`airmuscle convert`: measurement files or recordings in another file format."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Annotated

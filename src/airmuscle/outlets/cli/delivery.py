@@ -1,7 +1,5 @@
 """Delivery of a result: its files, all or none, and its brief view in the terminal, or JSON."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Entry point of the command `airmuscle`: interruptions are handled before anything else is imported."""
 
-from __future__ import annotations
-
 import importlib
 import os
 import sys

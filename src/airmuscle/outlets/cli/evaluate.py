@@ -1,7 +1,5 @@
 """`airmuscle evaluate` and `airmuscle show`: a library entry at an operating point, and what it contains."""
 
-from __future__ import annotations
-
 from ...files.library import UNITS, load
 from ...files.library import evaluate as evaluate_entry
 from ...physics.muscle.isobar_plot import describe_point, isobar_table

@@ -1,7 +1,5 @@
 """Options that distribute a command among processes and machines: --workers, --dask, --join."""
 
-from __future__ import annotations
-
 import contextlib
 from collections.abc import Iterator
 from pathlib import Path

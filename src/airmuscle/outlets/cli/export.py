@@ -1,7 +1,5 @@
 """`airmuscle export`: a scenario or a law as a program in another language."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 from pathlib import Path

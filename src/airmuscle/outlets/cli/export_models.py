@@ -1,7 +1,5 @@
 """Models for simulators by `airmuscle export`: FMUs, MuJoCo plugins, robots, Modelica and batched actuators."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any

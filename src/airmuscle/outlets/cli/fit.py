@@ -1,7 +1,5 @@
 """`airmuscle fit`: identification of a characteristic from measurement files."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from ...core.atomic_output import check_writable

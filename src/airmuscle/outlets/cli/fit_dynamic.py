@@ -1,7 +1,5 @@
 """`airmuscle fit-dynamic`: identification of plant parameters from transient records."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 from pathlib import Path

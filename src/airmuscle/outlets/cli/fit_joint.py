@@ -1,7 +1,5 @@
 """`airmuscle fit-joint`: a joint or an arm identified from episodes of its pressures and angles."""
 
-from __future__ import annotations
-
 import dataclasses
 from pathlib import Path
 from typing import Annotated

@@ -1,7 +1,5 @@
 """`airmuscle fit-live`: identification while a measurement runs."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 import sys

@@ -1,7 +1,5 @@
 """`airmuscle fit-regulator`: a pressure regulator identified from its command and the pressure that it gives."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from ...bench.identify.dynamic import fit_regulator

@@ -1,7 +1,5 @@
 """`airmuscle fit-volume`: volume law of a muscle from a water column or from fills at held lengths."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """`airmuscle hysteresis`: identification of friction models from hysteresis loops."""
 
-from __future__ import annotations
-
 import dataclasses
 from pathlib import Path
 from typing import Any

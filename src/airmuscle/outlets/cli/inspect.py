@@ -1,7 +1,5 @@
 """`airmuscle inspect`: inspection of measurement files before a fit."""
 
-from __future__ import annotations
-
 from typing import Annotated
 
 import typer

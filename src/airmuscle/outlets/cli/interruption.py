@@ -1,7 +1,5 @@
 """Deferred handling of SIGINT (Ctrl-C), so that no interruption is lost."""
 
-from __future__ import annotations
-
 import contextlib
 import functools
 import signal

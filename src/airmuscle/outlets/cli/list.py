@@ -1,7 +1,5 @@
 """`airmuscle list`: contents of the library."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 import tomllib

@@ -1,7 +1,5 @@
 """Options of the command line that the hints of messages stand for: one table of the remedies of every command."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Mapping
 

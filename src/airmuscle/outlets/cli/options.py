@@ -1,7 +1,5 @@
 """Arguments and options shared by several commands, and the completion of library names by the shell."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Iterable
 from pathlib import Path

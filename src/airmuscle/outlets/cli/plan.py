@@ -1,7 +1,5 @@
 """`airmuscle plan`: D-optimal design of static experiments, and the record that separates parameters of a plant."""
 
-from __future__ import annotations
-
 import dataclasses
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """`airmuscle predict`: prediction of further records by an identified muscle or plant."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated, Any
 

@@ -1,7 +1,5 @@
 """`airmuscle reproduce`: reproduction of the three papers, claim by claim."""
 
-from __future__ import annotations
-
 import textwrap
 from pathlib import Path
 from typing import Annotated

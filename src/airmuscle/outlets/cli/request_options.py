@@ -1,7 +1,5 @@
 """Options of the command line from declared requests."""
 
-from __future__ import annotations
-
 import contextlib
 import functools
 import inspect

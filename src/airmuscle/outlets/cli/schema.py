@@ -1,7 +1,5 @@
 """`airmuscle schema`: JSON schema of scenario and muscle files."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -1,7 +1,5 @@
 """`airmuscle simulate`: simulation of a scenario file."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated, Any
 

@@ -1,7 +1,5 @@
 """`airmuscle size`: muscles of the catalogue for a lift or a joint."""
 
-from __future__ import annotations
-
 from ...core.atomic_output import check_writable
 from ...design.sizing.chapter import sizing_chapter
 from ...design.sizing.scenario import sizing_scenario

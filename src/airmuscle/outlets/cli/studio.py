@@ -1,7 +1,5 @@
 """`airmuscle studio`: a page in the browser that shows muscles and plants."""
 
-from __future__ import annotations
-
 import webbrowser
 from pathlib import Path
 from typing import Annotated

@@ -1,7 +1,5 @@
 """`airmuscle study`: parameter study of a scenario."""
 
-from __future__ import annotations
-
 import contextlib
 from collections.abc import Callable, Iterator
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Terminal output: messages, tables and JSON without raw control characters, and progress."""
 
-from __future__ import annotations
-
 import contextlib
 import json
 import os

@@ -1,7 +1,5 @@
 """`airmuscle tune`: gains of the controller of a scenario, over a family of perturbed plants."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any

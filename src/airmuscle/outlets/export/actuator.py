@@ -7,8 +7,6 @@ observe(x, z, c, o)  o = (tension [N], gauge pressure [Pa], 1 within the validit
 prepare(p, c)        c, what these need of the parameters
 """
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 from collections.abc import Sequence

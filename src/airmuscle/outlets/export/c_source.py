@@ -1,7 +1,5 @@
 """C99 sources of a system: header, source with solver, and main programs that run a scenario or a control loop."""
 
-from __future__ import annotations
-
 import csv
 import dataclasses
 import io

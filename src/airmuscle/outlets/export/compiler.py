@@ -1,8 +1,6 @@
 """C compilers: exported programs built and run on this machine, on other platforms, and on a microcontroller in the
 emulator QEMU."""
 
-from __future__ import annotations
-
 import dataclasses
 import importlib.util
 import platform

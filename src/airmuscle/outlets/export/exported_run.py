@@ -1,7 +1,5 @@
 """Run of an exported program: its signals and times as numbers, its solver as text, and its control loop."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """Description of an FMU: the file modelDescription.xml of FMI 2.0 and 3.0."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 import re

@@ -1,7 +1,5 @@
 """Packages of Functional Mock-up Units: description, sources and binaries in one ZIP file."""
 
-from __future__ import annotations
-
 import dataclasses
 import hashlib
 import html

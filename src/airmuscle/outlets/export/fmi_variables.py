@@ -4,8 +4,6 @@ and units.
 The value references follow each other in this order, as in the template `instance.h`; time is 0.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import math
 import re

@@ -1,7 +1,5 @@
 """Functional Mock-up Units: a system as an FMU of FMI 2.0 or 3.0, for Model Exchange and Co-Simulation."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Controllers as FMUs for Co-Simulation, and a control loop as an SSP package: FMUs of plant and controller, joined."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 from pathlib import Path

@@ -1,8 +1,6 @@
 """Texts of exported sources: identifiers in all languages, constants in C, templates of files, and comments that state
 where a file comes from."""
 
-from __future__ import annotations
-
 import hashlib
 import re
 import textwrap

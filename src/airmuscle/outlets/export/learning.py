@@ -1,7 +1,5 @@
 """Actuators for learning stacks: modules of PyTorch and Warp and graphs of ONNX, with adapters for robot simulators."""
 
-from __future__ import annotations
-
 import abc
 import dataclasses
 import re

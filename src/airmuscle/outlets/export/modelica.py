@@ -1,7 +1,5 @@
 """Modelica package of a system: a block of equations."""
 
-from __future__ import annotations
-
 import re
 import textwrap
 from collections.abc import Callable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """MuJoCo engine plugins: a muscle with its valves as an actuator of a MuJoCo model, with its states in `act`."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import hashlib

@@ -1,7 +1,5 @@
 """Linear model predictive control as C99: its sample with the quadratic program, printed from the kernels."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np

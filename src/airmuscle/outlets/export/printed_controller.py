@@ -1,7 +1,5 @@
 """Printed control law: a sample of it as a C99 function of its memory, and its replay by the printed operations."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 from typing import Any
@@ -100,7 +98,7 @@ class PrintedController:
         of_law = [(leaf.path, leaf.declared.unit, leaf.declared.meaning) for leaf in self.tunable]
         return make_labels({**rows, "parameters": of_law})
 
-    def files(self, samples: ReplayedSamples) -> dict[str, str]:
+    def files(self, samples: "ReplayedSamples") -> dict[str, str]:
         """Header, source and the program that replays samples, by file name."""
         upper, number = self.name.upper(), self.number
         tables = (
@@ -154,7 +152,7 @@ class PrintedController:
             f"examples/{name}_loop/{name}_loop.ino": sketch,
         }
 
-    def ranges_of(self, samples: ReplayedSamples) -> Array:
+    def ranges_of(self, samples: "ReplayedSamples") -> Array:
         """The width of the range of each command (c,); of one without limits its largest size in the run."""
         largest = np.abs(samples.commands).max(axis=0, initial=0.0)
         width = np.array([high - low for low, high in self.ranges], dtype=float)
@@ -187,7 +185,7 @@ class PrintedController:
             text += f"enum {{ {', '.join(f'{word} = {i}' for i, word in enumerate(words))} }};\n" if words else ""
         return text
 
-    def replay(self, measured: Array, setpoints: Array, *, single: bool = False) -> ReplayedSamples:
+    def replay(self, measured: Array, setpoints: Array, *, single: bool = False) -> "ReplayedSamples":
         """The commands to measurements (K, m) and set points (K, s), from the printed instructions themselves.
 
         single  every number is rounded to single precision

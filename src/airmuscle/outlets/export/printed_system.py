@@ -1,7 +1,5 @@
 """Printed system: the functions of a system in a language of text, with the names, units and defaults of its arrays."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """Robot descriptions of joints and arms: MJCF for MuJoCo, with the muscles as plugin actuators, and URDF."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import math

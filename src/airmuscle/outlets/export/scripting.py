@@ -1,7 +1,5 @@
 """JavaScript module, and MATLAB and Octave functions, of a system: functions, solver and the run of a scenario."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import re

@@ -1,7 +1,5 @@
 """Targets of an export: the languages, the files that each makes of a program, and printed laws."""
 
-from __future__ import annotations
-
 import abc
 import dataclasses
 from collections.abc import Sequence

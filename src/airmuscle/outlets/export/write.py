@@ -1,7 +1,5 @@
 """Writing of exported programs and laws into a folder; all files of an export appear, or none."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping, Sequence
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Geometry of a muscle to be fitted: its braid, as --braid or as two fields of a form."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 from typing import NamedTuple

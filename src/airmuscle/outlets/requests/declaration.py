@@ -4,8 +4,6 @@ The options of a command, the form of the page and the tables of a file are deri
 conversion of texts to SI units and the messages. A request may define `check(where)` for conditions on several fields.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import math
 import types

@@ -1,7 +1,5 @@
 """Request of a variant of a library entry: another size, and other values of its parameters."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any

@@ -1,7 +1,5 @@
 """Request of a static fit: a law fitted to measured points, or the comparison of all laws, with what is asked of it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Computation of a requested static fit: the fit or the comparison, the muscle, and the chapters of its report."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable, Sequence
 from pathlib import Path

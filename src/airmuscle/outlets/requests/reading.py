@@ -1,7 +1,5 @@
 """Request of reading measurement files: how a file is read, and what it does not state itself."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Request of a sizing: a lift or a joint, and the conditions of operation."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Solutions of the statics of a joint: pressures for torque and stiffness, angles for pressures."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Torque of a joint: torque and stiffness of each muscle as traced functions; limits of taut muscles."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 from typing import Any

@@ -1,7 +1,5 @@
 """LinearModel: the linearisation of a system, x' = A x + B u, y = C x + D u, with names, units and poles."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
@@ -81,7 +79,7 @@ class LinearModel:
             Pole(complex(s), abs(s) / (2 * math.pi), -complex(s).real / abs(s) if s else math.nan) for s in values
         )
 
-    def select(self, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None) -> LinearModel:
+    def select(self, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None) -> "LinearModel":
         """The model with only these inputs and outputs, in this order. Raises ParameterError for an unknown name."""
         rows, columns = _places("output", outputs, self.outputs), _places("input", inputs, self.inputs)
         return dataclasses.replace(
@@ -94,7 +92,7 @@ class LinearModel:
             delays={name: self.delays[name] for name in (self.inputs[i] for i in columns) if name in self.delays},
         )
 
-    def with_delay(self, delay: float | Mapping[str, float]) -> LinearModel:
+    def with_delay(self, delay: float | Mapping[str, float]) -> "LinearModel":
         """The model whose inputs act after a dead time [s] more: of all, or by name.
 
         Raises ParameterError for an unknown input, and for a delay that is negative or not finite.
@@ -109,7 +107,7 @@ class LinearModel:
         total = {name: self.delays.get(name, 0.0) + float(value) for name, value in given.items()}
         return dataclasses.replace(self, delays={**self.delays, **total})
 
-    def pade(self, order: int = 3) -> LinearModel:
+    def pade(self, order: int = 3) -> "LinearModel":
         """The model with Pade approximations of this order in place of the delays, as further states."""
         if not 1 <= order <= MAX_PADE:
             raise ParameterError(f"pade: the order is {order}; allowed range: 1 to {MAX_PADE}.")

@@ -1,7 +1,5 @@
 """Sampled linear models, x_(k+1) = A x_k + B u_k, delays, and figures of frequency responses."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """Stiffness of a muscle and of its load at constant pressure and with closed valves."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple

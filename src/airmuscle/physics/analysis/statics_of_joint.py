@@ -1,7 +1,5 @@
 """Statics of an antagonistic joint: pressures from angle, stiffness and load, the inverse of each, and their figure."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Any
 

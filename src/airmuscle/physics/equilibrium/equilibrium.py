@@ -1,7 +1,5 @@
 """Equilibria of a plant, and the stable equilibrium nearest to full length of each of many plants."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any, TypeAlias

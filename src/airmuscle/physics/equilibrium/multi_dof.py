@@ -1,7 +1,5 @@
 """Equilibria of a plant with several coordinates by Newton's method from many start points at once."""
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 

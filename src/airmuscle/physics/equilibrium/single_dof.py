@@ -1,7 +1,5 @@
 """Equilibria of plants with one coordinate: grid over the permitted range, and roots between its points."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable
 from typing import NamedTuple
@@ -43,7 +41,7 @@ class Line:
 
     statics: Statics
 
-    def of(self, rows: Rows) -> Line:
+    def of(self, rows: Rows) -> "Line":
         """Some of the plants."""
         return Line(self.statics.of(rows))
 
@@ -183,7 +181,7 @@ class _Search(NamedTuple):
     at_high: Array
     last: Array
 
-    def of(self, kept: Rows) -> _Search:
+    def of(self, kept: Rows) -> "_Search":
         """Some of the rows."""
         return _Search(self.rows[kept], *(part[kept] for part in self[1:]))
 
@@ -193,7 +191,7 @@ class _Search(NamedTuple):
             crossing = self.low + (self.high - self.low) * self.at_low / (self.at_low - self.at_high)
         return np.where(np.isfinite(crossing), np.clip(crossing, self.low, self.high), 0.5 * (self.low + self.high))
 
-    def narrowed(self, middle: Array, at: Array) -> _Search:
+    def narrowed(self, middle: Array, at: Array) -> "_Search":
         """The subinterval that contains the root; the value at an end that is retained twice is halved (Illinois)."""
         as_low = at * self.at_low > 0.0
         at_low = self.at_low * np.where(self.last >= self.high, 0.5, 1.0)

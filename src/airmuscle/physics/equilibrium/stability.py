@@ -1,7 +1,5 @@
 """Stability of equilibria, by the eigenvalues of the motion; error messages for a plant without equilibrium."""
 
-from __future__ import annotations
-
 import weakref
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Interface between a plant and its equilibria, and the pressure of the air enclosed in a muscle at rest."""
 
-from __future__ import annotations
-
 import abc
 import math
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """Statics of plants: states at rest and residual accelerations as functions of the coordinates."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 from collections.abc import Mapping
@@ -46,14 +44,14 @@ class Statics:
     @classmethod
     def of_plants(
         cls, compiled: CompiledSystem, parameters: Array, air: tuple[float, ...], inputs: Array, shut: bool = False
-    ) -> Statics:
+    ) -> "Statics":
         """The plants with these parameters (N, P)."""
         precomputed = np.array([compiled.program.precompute(row) for row in np.ascontiguousarray(parameters)])
         plant = compiled.system
         assert isinstance(plant, StaticPlant)
         return cls(compiled, parameters, precomputed, air, shut, inputs, _with_arrays(plant, parameters))
 
-    def of(self, rows: Rows) -> Statics:
+    def of(self, rows: Rows) -> "Statics":
         """A selection of the plants, possibly with repetitions."""
         parameters = self.parameters[rows]
         plants = self.plants if len(self.parameters) == 1 else _with_arrays(self.plants, parameters)

@@ -1,7 +1,5 @@
 """Antagonistic joint: two muscles that rotate a joint in opposite directions."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from ...core import ParameterError, Value, Values, check_structure, model, ops, parameter

@@ -1,7 +1,5 @@
 """Arm (interface): links in series with a joint each, and the routes of muscles over these joints."""
 
-from __future__ import annotations
-
 import abc
 from collections.abc import Sequence
 from typing import Any

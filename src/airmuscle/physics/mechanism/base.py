@@ -1,7 +1,5 @@
 """Mechanism (interface) in generalised coordinates: muscle contractions and equations of motion."""
 
-from __future__ import annotations
-
 import abc
 import dataclasses
 from collections.abc import Mapping, Sequence

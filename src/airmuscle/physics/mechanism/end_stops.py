@@ -1,7 +1,5 @@
 """End stops of a mechanism: Hunt-Crossley contacts at both ends of the range of a coordinate."""
 
-from __future__ import annotations
-
 import abc
 from typing import ClassVar
 

@@ -1,7 +1,5 @@
 """Lever with a mass, rotated by muscles on lever arms."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from ...core import STANDARD_GRAVITY, ParameterError, Value, Values, model, ops, parameter

@@ -1,7 +1,5 @@
 """Loads of muscles in parallel on one point: masses, springs, constant forces, prescribed motion, another program."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from ...core import STANDARD_GRAVITY, Input, ParameterError, Value, Values, model, parameter

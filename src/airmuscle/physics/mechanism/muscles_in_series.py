@@ -1,7 +1,5 @@
 """Muscles in series, with a mass at each connection node."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """Planar arm: links in series in a vertical plane, with muscles over one or several joints."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from ...core import STANDARD_GRAVITY, ParameterError, Value, Values, model, ops, parameter

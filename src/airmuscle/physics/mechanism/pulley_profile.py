@@ -1,7 +1,5 @@
 """Pulley profile: moment arm of a muscle as a function of the joint angle."""
 
-from __future__ import annotations
-
 import abc
 
 from ...core import ParameterError, Value, model, ops, parameter

@@ -1,7 +1,5 @@
 """Serial arm: links in space whose joints turn about any axes of their frames."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from ...core import STANDARD_GRAVITY, ParameterError, Value, Values, model, ops, parameter

@@ -1,7 +1,5 @@
 """Stick-slip of joints: dry friction that holds at rest and grows with the tensions of the muscles."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from ...core import ParameterError, StateVariable, Value, Values, check_structure, model, ops, parameter

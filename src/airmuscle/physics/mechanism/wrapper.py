@@ -1,7 +1,5 @@
 """Wrappers of a mechanism: latch, contraction offsets, friction of a joint, torque from outside."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 from ...core import Input, ParameterError, StateVariable, Value, Values, check_structure, model, ops, parameter

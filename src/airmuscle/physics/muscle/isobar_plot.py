@@ -1,7 +1,5 @@
 """Isobar plot of a characteristic, with an optional working point; display of a muscle with its isobars and parts."""
 
-from __future__ import annotations
-
 import dataclasses
 import textwrap
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """Isobars of a characteristic: tension over contraction at constant gauge pressures, and their chart."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """Hill-type muscle: contractile element, parallel spring and damper, series element, and enclosed volume."""
 
-from __future__ import annotations
-
 import warnings
 from types import MappingProxyType
 from typing import Any, ClassVar, NamedTuple
@@ -69,7 +67,7 @@ class Muscle(NotebookDisplay):
     """Values that the maker permits, if known; a simulation reports when and how far they are exceeded."""
 
     @classmethod
-    def ideal(cls, geometry: Geometry, name: str = "muscle") -> Muscle:
+    def ideal(cls, geometry: Geometry, name: str = "muscle") -> "Muscle":
         """An energy-conserving muscle: its tension follows from its volume by the principle of virtual work."""
         return cls(VirtualWork(geometry), geometry, name=name)
 

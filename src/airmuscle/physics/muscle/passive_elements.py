@@ -1,7 +1,5 @@
 """Passive elements in parallel with the contractile element: springs, dampers, creep elements, end stops."""
 
-from __future__ import annotations
-
 import abc
 
 from ...core import ParameterError, StateVariable, Value, Values, model, ops, parameter

@@ -1,7 +1,5 @@
 """Quantity arguments of public methods: texts with a unit and lists become numbers, anything else is an error."""
 
-from __future__ import annotations
-
 import functools
 import inspect
 from collections.abc import Callable, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Ratings of a muscle: values that its maker permits for force, pressure, contraction, length and temperature."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from typing import Any, NamedTuple
 

@@ -1,7 +1,5 @@
 """Series elements, and the equilibrium of the contractile element behind a spring."""
 
-from __future__ import annotations
-
 import abc
 from collections.abc import Callable
 

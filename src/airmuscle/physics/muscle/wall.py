@@ -1,7 +1,5 @@
 """Wall models: volume in addition to that of the geometry, dependent on pressure."""
 
-from __future__ import annotations
-
 import abc
 
 from ...core import StateVariable, Value, Values, model, ops, parameter

@@ -1,7 +1,5 @@
 """Diagnostics of a plant: extrapolation, geometry limits, components beyond their validity, assumptions."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 

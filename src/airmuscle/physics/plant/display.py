@@ -1,7 +1,5 @@
 """Display of a plant: card in a notebook, and animation of a run with the muscles coloured by pressure."""
 
-from __future__ import annotations
-
 import os
 import tempfile
 import textwrap

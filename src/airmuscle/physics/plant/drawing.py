@@ -1,7 +1,5 @@
 """Drawing of a plant in the plane: outlines of the muscles, cables, pulley or load, at one row of a recording."""
 
-from __future__ import annotations
-
 import abc
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """WithEnergyMeters: a plant with integrated powers of its components, for checks of its energy balances."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 

@@ -1,7 +1,5 @@
 """State of the muscles of a plant: one instant, steady state, evaluation of the whole plant."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Plant: muscles, the circuits that feed them, the mechanism that they act on, and the ambient air."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace

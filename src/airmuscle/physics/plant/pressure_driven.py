@@ -1,7 +1,5 @@
 """Plants with ports: muscles whose pressures are inputs, and a load that another simulator carries."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Validation of the parts of a plant: types, numbers, names, closed-form laws."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from typing import Any
 

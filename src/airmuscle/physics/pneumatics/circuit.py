@@ -1,7 +1,5 @@
 """Circuit (interface) from an air supply through valves to the muscles; circuits of on/off valves, closed chamber."""
 
-from __future__ import annotations
-
 import abc
 import dataclasses
 from collections.abc import Mapping, Sequence

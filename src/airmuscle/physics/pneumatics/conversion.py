@@ -22,8 +22,6 @@ pressures are linear in the square of the flow. Between, the equivalent valve fo
 exact curve. The errors stated below are tested against a numerical solution for the pressure between the valves.
 """
 
-from __future__ import annotations
-
 from ...core import ParameterError, attribute_hint, ops
 from .gas import GAS_CONSTANT, HEAT_CAPACITY_RATIO, REFERENCE_DENSITY, REFERENCE_TEMPERATURE, Ambient
 from .valve import Valve

@@ -1,7 +1,5 @@
 """Distributed tube between valve and muscle: lumped segments with the inertia of the air."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, ClassVar
 

@@ -4,8 +4,6 @@ The state of a chamber is its air mass, from which the pressure follows, so that
 integration tolerance.
 """
 
-from __future__ import annotations
-
 import abc
 import dataclasses
 from typing import ClassVar, NamedTuple
@@ -74,13 +72,13 @@ class Flow:
     mass: Value
     enthalpy: Value
 
-    def __add__(self, other: Flow) -> Flow:
+    def __add__(self, other: "Flow") -> "Flow":
         return Flow(self.mass + other.mass, self.enthalpy + other.enthalpy)
 
-    def __sub__(self, other: Flow) -> Flow:
+    def __sub__(self, other: "Flow") -> "Flow":
         return Flow(self.mass - other.mass, self.enthalpy - other.enthalpy)
 
-    def __neg__(self) -> Flow:
+    def __neg__(self) -> "Flow":
         return Flow(-self.mass, -self.enthalpy)
 
 

@@ -1,7 +1,5 @@
 """WithLeak and Manifold: a circuit with leakage, and several circuits on one supply."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Iterator, Mapping
 from typing import Any

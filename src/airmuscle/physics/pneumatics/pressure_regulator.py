@@ -1,7 +1,5 @@
 """PressureRegulator: electro-pneumatic pressure regulator with dead time, pilot stage and overlapped main valve."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 from ...core import Input, Reference, StateVariable, Value, Values, model, ops, parameter

@@ -1,7 +1,5 @@
 """Proportional valves: 5/3 proportional directional valve and proportional pressure regulator."""
 
-from __future__ import annotations
-
 from ...core import Input, ParameterError, StateVariable, Value, Values, model, ops, parameter
 from .circuit import Circuit, CircuitFlows, ambient_air
 from .gas import NO_FLOW, Air, Ambient, absolute_pressure, gauge_pressure

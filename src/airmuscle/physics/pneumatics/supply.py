@@ -1,7 +1,5 @@
 """Air supplies: constant pressure, tank, and pressure regulator."""
 
-from __future__ import annotations
-
 import abc
 
 from ...core import ParameterError, Value, Values, model, ops, parameter

@@ -1,7 +1,5 @@
 """Tubes between valve and muscle: interface, lumped tube in one or more segments, circuit with tubes."""
 
-from __future__ import annotations
-
 import abc
 from collections.abc import Mapping
 from typing import Any, ClassVar
@@ -107,7 +105,7 @@ class Tube(TubeModel):
     gas: Gas = Isothermal()
 
     @classmethod
-    def from_dimensions(cls, length: float, diameter: float, segment_count: int = 1, gas: Gas = Isothermal()) -> Tube:
+    def from_dimensions(cls, length: float, diameter: float, segment_count: int = 1, gas: Gas = Isothermal()) -> "Tube":
         """Tube of a length and an inner diameter [m], with the flow of a `TubeOrifice`."""
         return cls(TubeOrifice(length, diameter), ops.pi / 4.0 * diameter**2 * length, segment_count, gas)
 

@@ -1,7 +1,5 @@
 """Valves and orifices: flow after ISO 6358, check valve, flow between two volumes."""
 
-from __future__ import annotations
-
 import abc
 from typing import ClassVar
 

@@ -1,7 +1,5 @@
 """Gas models of higher accuracy: virial equation of state, heat transfer coefficient of the wall."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 from ...core import Reference, Value, Values, model, ops, parameter

@@ -1,7 +1,5 @@
 """Equation of a law: its traced expression in named symbols, with shared parts defined once."""
 
-from __future__ import annotations
-
 import dataclasses
 import re
 from collections import Counter

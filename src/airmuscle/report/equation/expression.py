@@ -1,7 +1,5 @@
 """Expressions: nodes of a formula, shared where they are equal, with the elementary simplifications."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 
@@ -16,7 +14,7 @@ class Node:
 
     __slots__ = ("arguments", "kind", "value")
 
-    def __init__(self, kind: str, arguments: tuple[Node, ...], value: float | str | None) -> None:
+    def __init__(self, kind: str, arguments: "tuple[Node, ...]", value: float | str | None) -> None:
         self.kind, self.arguments, self.value = kind, arguments, value
 
     @property

@@ -1,7 +1,5 @@
 """Traced law as an expression of its arguments and parameters, within its validity range without unreached limits."""
 
-from __future__ import annotations
-
 import functools
 import math
 from collections.abc import Callable, Mapping, Sequence

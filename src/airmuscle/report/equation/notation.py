@@ -1,7 +1,5 @@
 """Notations of an expression: LaTeX, MATLAB, Excel and C."""
 
-from __future__ import annotations
-
 import abc
 import math
 from collections.abc import Collection, Mapping

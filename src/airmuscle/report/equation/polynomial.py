@@ -1,7 +1,5 @@
 """Polynomials inside an expression, expanded into monomials."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Collection, Mapping
 from fractions import Fraction

@@ -1,7 +1,5 @@
 """Source text of an equation for other programs: LaTeX, MATLAB, Excel and C."""
 
-from __future__ import annotations
-
 from .derivation import LawEquation, Symbol
 from .expression import Node, in_order
 from .notation import C, Excel, Latex, Matlab, latex_symbol

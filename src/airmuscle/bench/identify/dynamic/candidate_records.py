@@ -1,7 +1,5 @@
 """Candidate records of a next experiment: fills and discharges of the same rig that differ from those of a fit."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Iterator
 

@@ -1,7 +1,5 @@
 """Report chapters: a dynamic fit with estimates, identifiability, profiles, and measured and modelled records."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 from functools import partial

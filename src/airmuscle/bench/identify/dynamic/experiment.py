@@ -1,7 +1,5 @@
 """Experiment: one record with its command, initial state, plant and ambient air, and the unknowns of its own."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping, Sequence
 

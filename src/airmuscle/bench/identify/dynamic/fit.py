@@ -1,7 +1,5 @@
 """Dynamic fit of plant parameters to transient records, `fit_dynamic`, and predictions of each record by the others."""
 
-from __future__ import annotations
-
 import dataclasses
 import os
 from collections.abc import Callable, Mapping, Sequence

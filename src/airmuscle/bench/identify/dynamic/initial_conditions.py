@@ -1,7 +1,5 @@
 """Start of a record: initial state from known values and equilibrium conditions, and rows on the clock of the run."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 from collections.abc import Mapping, Sequence
@@ -45,7 +43,7 @@ class InitialConditions:
     settled: tuple[str, ...] = ()
 
     @classmethod
-    def at_rest(cls, plant: Plant, pressure: MusclePressures) -> InitialConditions:
+    def at_rest(cls, plant: Plant, pressure: MusclePressures) -> "InitialConditions":
         """Equilibrium at gauge pressures [Pa], one for all muscles or one for each; walls, tubes and tanks are settled.
 
         Raises ParameterError for another number of pressures than muscles, EquilibriumError where there is none.
@@ -59,7 +57,7 @@ class InitialConditions:
         return cls({**_by_output(plant, pressures), **known}, state, (*stationary, *speeds), equal, settled)
 
     @classmethod
-    def at_coordinates(cls, plant: Plant, pressure: MusclePressures, **coordinates: float) -> InitialConditions:
+    def at_coordinates(cls, plant: Plant, pressure: MusclePressures, **coordinates: float) -> "InitialConditions":
         """A plant at gauge pressures [Pa], one for all muscles or one for each, and given coordinates [SI].
 
         Speeds are zero unless given. Walls and tubes are in steady state at these pressures, tanks and regulators at

@@ -11,8 +11,6 @@ Reference: Moré, J. J., The Levenberg-Marquardt algorithm: implementation and t
 Springer 1978 (scaling by D); Nielsen, H. B., Damping parameter in Marquardt's method, IMM-REP-1999-05, DTU 1999.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import NamedTuple
 

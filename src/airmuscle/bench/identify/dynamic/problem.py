@@ -1,7 +1,5 @@
 """DynamicFitProblem: residuals of all records as a function of the unknowns, their minimisation, and their profile."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 from collections.abc import Sequence
@@ -87,7 +85,7 @@ class DynamicFitProblem:
         """The search from an initial guess (P,), which can be interrupted and continued."""
         return LevenbergMarquardt(*self._restrict(scaled, range(scaled.size)))
 
-    def _restrict(self, scaled: Array, free: Sequence[int]) -> tuple[_GuardedResiduals, Array, Array, Array]:
+    def _restrict(self, scaled: Array, free: Sequence[int]) -> "tuple[_GuardedResiduals, Array, Array, Array]":
         """Residuals as a function of the free unknowns, their initial guess and their bounds."""
         (low, high), indices = self.bounds, list(free)
         return _GuardedResiduals(self, scaled, indices), scaled[indices], low[indices], high[indices]

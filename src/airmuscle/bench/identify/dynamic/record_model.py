@@ -1,7 +1,5 @@
 """RecordModel: modelled outputs of one record, with their derivatives by every unknown."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -71,7 +69,7 @@ class RecordModel:
         self._idle: list[BoundIntegrator] = []
         """Bound integrators that no simulation uses at present."""
 
-    def __reduce__(self) -> tuple[type[RecordModel], tuple[Any, ...]]:
+    def __reduce__(self) -> "tuple[type[RecordModel], tuple[Any, ...]]":
         """Compiled functions are not stored; a loaded model compiles them again."""
         return RecordModel, self._arguments
 
@@ -113,7 +111,7 @@ class RecordModel:
         """The estimated instants [s] by those of the command of the experiment."""
         return {target.instant: float(values[self.sensitivity_indices[j]]) for j, target in self._instant_columns}
 
-    def evaluate(self, values: Array, max_steps: int = MAX_STEPS) -> ModelOutputs:
+    def evaluate(self, values: Array, max_steps: int = MAX_STEPS) -> "ModelOutputs":
         """The modelled outputs at the rows of the record for unknowns at `values` (P,) [SI].
 
         Raises IdentificationError where the simulation fails or no initial state exists.

@@ -1,7 +1,5 @@
 """Ranking of candidate records by how well they separate two parameters of a dynamic fit."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """Identification of a PressureRegulator from records of its command and of the pressure that it gives."""
 
-from __future__ import annotations
-
 import contextlib
 import dataclasses
 from collections.abc import Sequence

@@ -5,8 +5,6 @@ the effect of an unknown on its bound, whose sensitivity follows from the normal
 dx/db = -(J^T J)^-1 J^T j, with j the column of the unknown on the bound.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 

@@ -1,8 +1,6 @@
 """DynamicFit: estimates, standard errors, goodness of fit, undetermined combinations of parameters and figure; location
 of the pressure sensor in a fill by two fits."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 from typing import Any

@@ -7,8 +7,6 @@ reciprocal, K + Sum k_i s tau_i/(1 + s tau_i); the relaxation times belong to th
 Reference: Tschoegl, N. W., The Phenomenological Theory of Linear Viscoelastic Behavior, Springer, 1989.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Iterator
 from typing import Any

@@ -1,7 +1,5 @@
 """Friction from inflating and deflating branches: `fit_hysteresis`."""
 
-from __future__ import annotations
-
 import abc
 import dataclasses
 import inspect

@@ -1,7 +1,5 @@
 """Report chapters: friction laws of each loop and of all runs together, and creep."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 from collections.abc import Sequence

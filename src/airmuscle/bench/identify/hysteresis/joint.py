@@ -1,8 +1,6 @@
 """Joint fit of one friction law to the loops of several runs, with a force scale that depends on the pressure, and
 selection of the friction that is written."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 

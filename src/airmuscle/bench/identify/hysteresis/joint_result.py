@@ -1,7 +1,5 @@
 """JointFit: one friction law for several runs, its dependence on pressure, and its agreement with each run."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 from typing import Any, TypeVar

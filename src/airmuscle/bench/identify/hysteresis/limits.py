@@ -1,7 +1,5 @@
 """Limits of friction parameters that follow from the data: maximum force, and lowest and highest speed."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Sequence

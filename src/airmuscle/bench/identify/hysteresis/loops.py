@@ -1,7 +1,5 @@
 """Hysteresis loops in recordings: kind, fitted rows and repeated runs, and the fit of all friction laws to a loop."""
 
-from __future__ import annotations
-
 import dataclasses
 import warnings
 from collections.abc import Callable, Mapping, Sequence

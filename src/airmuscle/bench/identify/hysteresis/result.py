@@ -1,7 +1,5 @@
 """HysteresisFit: fitted friction, reduction of the error, tests whether the data justify it, and its figures."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 from typing import Any

@@ -1,7 +1,5 @@
 """Search for the parameters of a friction law in the loop series of one run or of several runs together."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 from collections.abc import Sequence
@@ -266,7 +264,7 @@ class _SearchCoordinate:
     size: float
 
     @classmethod
-    def from_leaf(cls, leaf: Leaf, limits: DataLimits) -> _SearchCoordinate:
+    def from_leaf(cls, leaf: Leaf, limits: DataLimits) -> "_SearchCoordinate":
         low, high = limits.bounds(leaf)
         value = min(max(leaf.value, low), high)
         if low > 0:

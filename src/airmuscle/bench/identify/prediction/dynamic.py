@@ -1,7 +1,5 @@
 """Prediction of a transient record by an identified plant: simulation of its input, with the band of the fit."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping, Sequence
 

@@ -1,7 +1,5 @@
 """Report chapters: predicted records with errors, shares within the 95 % band, and measured and predicted values."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from functools import partial
 from typing import Any

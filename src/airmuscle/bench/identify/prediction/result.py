@@ -1,8 +1,6 @@
 """Predicted quantities of a record beside the measured ones, with errors and 95 % bands, and where the record leaves
 the ranges of those of the fit: pressure, contraction, resting length and rates."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping, Sequence
 
@@ -38,7 +36,7 @@ def predict_static(
     band: str = "",
     notes: Sequence[str] = (),
     differences: Sequence[str] = (),
-) -> RecordPrediction:
+) -> "RecordPrediction":
     """Predict the quantity that a law gives at the rows of a recording with pressure, contraction and force.
 
     law             the static law of the muscle of this recording
@@ -187,7 +185,7 @@ def length_notes(length: float | None, fitted: Sequence[float]) -> list[str]:
     return [f"the resting length, {displayed('length', length)}, is outside that of the fit, {span}; {NOT_THERE}"]
 
 
-def with_band_notes(prediction: RecordPrediction, differences: Sequence[str], usual: str) -> RecordPrediction:
+def with_band_notes(prediction: "RecordPrediction", differences: Sequence[str], usual: str) -> "RecordPrediction":
     """The prediction with a note for each quantity whose band does not hold: by how much, and the likely reason.
 
     `differences` name what of the record lies outside the fit; where there are none, `usual` names the usual causes.
@@ -211,7 +209,7 @@ def with_band_notes(prediction: RecordPrediction, differences: Sequence[str], us
     return dataclasses.replace(prediction, notes=(*prediction.notes, *notes))
 
 
-def _share_inside(quantity: QuantityPrediction, outside: npt.NDArray[np.bool_]) -> str:
+def _share_inside(quantity: "QuantityPrediction", outside: npt.NDArray[np.bool_]) -> str:
     rows = quantity.compared & ~outside
     if quantity.half_width is None or not rows.any():
         return ""

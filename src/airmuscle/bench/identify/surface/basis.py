@@ -1,7 +1,5 @@
 """Polynomial bases of a surface in pressure and force, and the conditioning of its design matrix in each."""
 
-from __future__ import annotations
-
 import abc
 import dataclasses
 import functools
@@ -24,13 +22,13 @@ class LoadRange(NamedTuple):
     max_force: float
 
     @classmethod
-    def from_recording(cls, recording: Recording) -> LoadRange:
+    def from_recording(cls, recording: Recording) -> "LoadRange":
         """The smallest range that contains every row."""
         p, f = recording["pressure"], recording["force"]
         return cls(float(p.min()), float(p.max()), float(f.min()), float(f.max()))
 
     @classmethod
-    def from_law(cls, law: Characteristic) -> LoadRange:
+    def from_law(cls, law: Characteristic) -> "LoadRange":
         """The validity range of a law that gives contraction."""
         return cls(*law.pressure_range, *law.force_range)
 
@@ -110,7 +108,7 @@ class Conditioning:
     """Ratio of the largest to the smallest singular value; infinite for a rank-deficient matrix."""
 
     @classmethod
-    def from_design_matrix(cls, matrix: Array) -> Conditioning:
+    def from_design_matrix(cls, matrix: Array) -> "Conditioning":
         """Of a design matrix (N, coefficients), exact also beyond 1e16, where singular values are lost in rounding.
 
         The pseudo-inverse is computed with columns of unit norm, and its rows are scaled back by the norms.

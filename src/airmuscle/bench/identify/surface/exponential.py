@@ -4,8 +4,6 @@
 itself. Both use Chebyshev polynomials on the validity range of the data and return the coefficients in bar and newton.
 """
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np
@@ -56,7 +54,7 @@ class SurfaceProblem:
     @classmethod
     def from_recording(
         cls, recording: Recording, saturation: float, pressure_degree: int, force_degree: int
-    ) -> SurfaceProblem:
+    ) -> "SurfaceProblem":
         """The problem for the points of a recording. Raises IdentificationError where it cannot be solved."""
         _check_usable(recording, pressure_degree, force_degree)
         pressure, force = recording["pressure"], recording["force"]

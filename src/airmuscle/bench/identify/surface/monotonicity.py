@@ -8,8 +8,6 @@ k = k_max (1 - exp v) decreases with v, and v is linear in its coefficients, so 
 inequalities. They are imposed on the Bernstein coefficients of the slopes of v on a few cells.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import itertools

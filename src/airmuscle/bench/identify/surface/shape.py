@@ -5,8 +5,6 @@ slopes on a few cells, which enclose the slopes, and therefore hold at every poi
 grid.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 

@@ -4,8 +4,6 @@ numba takes 0.35 s to import before it runs what it compiled on another day. So 
 machine code is stored (`store`), and every later process loads that alone. It is called with addresses and lengths.
 """
 
-from __future__ import annotations
-
 import ctypes
 import functools
 import importlib
@@ -60,7 +58,7 @@ class Kernel:
         self.name, self.module = name, module or name
         self._entries: dict[tuple[str, ...], Any] = {}
 
-    def bind(self, *arguments: Any) -> BoundKernel:
+    def bind(self, *arguments: Any) -> "BoundKernel":
         """The kernel with its arguments: integers, floats, and C-contiguous arrays of int64, float64 or float32."""
         return BoundKernel(self, arguments)
 

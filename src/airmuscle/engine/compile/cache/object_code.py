@@ -1,7 +1,5 @@
 """Machine code of a kernel: compiled by numba to code that needs no numba, and loaded again from its bytes."""
 
-from __future__ import annotations
-
 import contextlib
 import functools
 from collections import defaultdict

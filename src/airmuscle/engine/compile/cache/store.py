@@ -5,8 +5,6 @@ from and a hash of its name and contents, so that code of other sources or versi
 file, is compiled anew.
 """
 
-from __future__ import annotations
-
 import contextlib
 import functools
 import hashlib

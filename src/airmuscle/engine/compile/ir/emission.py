@@ -1,7 +1,5 @@
 """Emission of instructions into functions of a target language: straight-line code, and branches around blocks."""
 
-from __future__ import annotations
-
 import abc
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any

@@ -1,7 +1,5 @@
 """CasADi expressions as a list of instructions; those that depend on parameters only are separated."""
 
-from __future__ import annotations
-
 import dataclasses
 import enum
 import functools

@@ -4,8 +4,6 @@ The numbers are those of printed C that is compiled without fused operations, bi
 library that Python uses.
 """
 
-from __future__ import annotations
-
 import math
 import struct
 from collections.abc import Callable, Mapping, Sequence

@@ -7,8 +7,6 @@ fewest products (Markowitz criterion), which requires fewer operations than the 
 Reference: Griewank, A., Walther, A., Evaluating Derivatives, 2nd ed., SIAM 2008, chapters 9 and 10.
 """
 
-from __future__ import annotations
-
 import heapq
 from collections.abc import Callable, Iterable, Sequence
 
@@ -46,7 +44,7 @@ class Tape:
         if line.operation in _CONDITIONS or product:
             self._masks.add(line.result)
 
-    def take(self, longer: Tape) -> None:
+    def take(self, longer: "Tape") -> None:
         """Replace the content by that of a continued copy of this tape."""
         self.body, self._known, self._masks = longer.body, longer._known, longer._masks
 

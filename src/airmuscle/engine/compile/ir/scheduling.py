@@ -1,7 +1,5 @@
 """Scheduling of instructions and conditional blocks: each after its operands and as late as possible."""
 
-from __future__ import annotations
-
 import dataclasses
 import heapq
 from collections.abc import Iterable, Sequence

@@ -9,8 +9,6 @@ Evaluation with and without the branch gives the same values, except where a ski
 with zero would be NaN and is zero here.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
@@ -55,7 +53,9 @@ def skipping(code: Code, level: Callable[[Operand], int], early: frozenset[Opera
     return in_order(code, search.apart, early)
 
 
-def _cases(body: Sequence[Instruction], comparisons: _Comparisons, level: Callable[[Operand], int]) -> Iterable[_Case]:
+def _cases(
+    body: Sequence[Instruction], comparisons: "_Comparisons", level: Callable[[Operand], int]
+) -> Iterable[_Case]:
     """The candidate gates: commands first, then clamps and conditions."""
     levels: dict[Operand, int] = {}
 

@@ -4,8 +4,6 @@ With unit diagonals, the two substitutions are separated by one multiplication b
 states: the latency of a solution is determined by the longest chain of dependent operations, not by their number.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Kernels in languages of braces, C99 (C++ too) and JavaScript; variables are declared at their first assignment."""
 
-from __future__ import annotations
-
 import abc
 import ast
 import dataclasses

@@ -1,7 +1,5 @@
 """Printer of the expressions of kernels, by the precedence of their operators."""
 
-from __future__ import annotations
-
 import abc
 import ast
 import math

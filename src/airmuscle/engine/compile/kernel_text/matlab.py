@@ -1,7 +1,5 @@
 """MATLAB text of kernels, which GNU Octave runs as well: functions that return the arrays that they change."""
 
-from __future__ import annotations
-
 import ast
 import math
 from collections.abc import Mapping, Sequence

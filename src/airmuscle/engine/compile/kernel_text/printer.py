@@ -1,7 +1,5 @@
 """Printer of kernels: the walk through statements and expressions that all languages share."""
 
-from __future__ import annotations
-
 import abc
 import ast
 import math

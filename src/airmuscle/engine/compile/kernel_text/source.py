@@ -1,7 +1,5 @@
 """Source of kernels: functions and constants of a module of `compile/kernels/` as syntax trees."""
 
-from __future__ import annotations
-
 import ast
 import dataclasses
 import functools

@@ -1,7 +1,5 @@
 """Types of the variables of a kernel: numbers, integers, flags, and arrays of them, inferred from their use."""
 
-from __future__ import annotations
-
 import ast
 import dataclasses
 import enum
@@ -41,7 +39,7 @@ class TypedKernel:
     kinds: Mapping[str, VariableType]
     returns: tuple[ElementType, ...]
     written: frozenset[str]
-    calls: Mapping[str, TypedKernel]
+    calls: "Mapping[str, TypedKernel]"
     of: Callable[[ast.expr], ElementType]
     called: frozenset[str] = frozenset()
 

@@ -3,8 +3,6 @@
 By enumeration with bounds, the search of predictive control with a finite control set.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numba

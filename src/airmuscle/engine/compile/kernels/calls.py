@@ -3,8 +3,6 @@
 numba copies a part into the kernel that calls it, which so remains one function, whose machine code can be stored.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numba

@@ -3,8 +3,6 @@
 A signal of an input is an array (3, capacity): end, value at the start, and slope of each segment.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from ..kernel_layout import DriverKind, Progress

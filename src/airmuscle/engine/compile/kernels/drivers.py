@@ -4,8 +4,6 @@
 signal is an array (3, capacity): end, value at the start, and slope of each segment; `count` of them are used.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Kernels that evaluate compiled functions: at rows, at many plants, and around a step that is taken by hand."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numba

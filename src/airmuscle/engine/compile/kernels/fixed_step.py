@@ -5,8 +5,6 @@ not depend on the output times. The run calls a step that is printed whole; `sin
 rates stage by stage, because exported programs print them.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numba

@@ -1,7 +1,5 @@
 """Extended and unscented Kalman filters: prediction of the state with its covariance, correction by measurements."""
 
-from __future__ import annotations
-
 from math import sqrt
 from typing import Any
 

@@ -6,8 +6,6 @@ has its own length of step, and one that waits has the length zero; where all ma
 without a look at the clock. So the result of a lane does not depend on its neighbours.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numba

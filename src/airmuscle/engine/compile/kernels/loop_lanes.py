@@ -5,8 +5,6 @@ instant to the next, the last step of each segment shortened so that its end is 
 by a step of their own.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numba

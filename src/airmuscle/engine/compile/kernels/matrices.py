@@ -1,7 +1,5 @@
 """Small matrices as parts of kernels: products, factors, exponential Euler step with the Jacobian and the rates."""
 
-from __future__ import annotations
-
 from math import sqrt
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Newton's method on printed functions: g(x, p) = target of many unknowns, and of pairs of functions."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numba

@@ -1,7 +1,5 @@
 """A sample of linear predictive control: observer, limits, and the quadratic program by a dual active-set method."""
 
-from __future__ import annotations
-
 from math import sqrt
 from typing import Any
 

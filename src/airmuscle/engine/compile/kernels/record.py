@@ -1,7 +1,5 @@
 """Kernel: outputs and inputs at the rows of a run, and the ranges of columns."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numba

@@ -5,8 +5,6 @@ L-stable, six stages with one factorisation, dense output of order three. It car
 within a segment, and meets its end exactly. Exported programs print `single_step` and `state_between`.
 """
 
-from __future__ import annotations
-
 from math import sqrt
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Kernel: a sampled loop, from one sampling instant to the next: measure, command, drive the inputs, integrate."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numba

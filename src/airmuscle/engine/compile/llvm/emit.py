@@ -1,7 +1,5 @@
 """LLVM text of instructions over numbers or vectors of lanes: straight-line code, and branches around blocks."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import struct

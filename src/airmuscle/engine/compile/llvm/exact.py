@@ -10,8 +10,6 @@ greater, and at zero, negative and non-finite bases, a lane takes the value of `
 this lane alone.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Sequence

@@ -1,7 +1,5 @@
 """Compilation of LLVM text to machine code by llvmlite."""
 
-from __future__ import annotations
-
 import functools
 from typing import Any
 

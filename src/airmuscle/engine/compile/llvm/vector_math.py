@@ -10,8 +10,6 @@ References: range reduction and the exact product by the parts of ln 2 after Tan
 sum and product with their rounding error after Dekker, T. J., Numerische Mathematik 18, 1971.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Sequence
 

@@ -1,7 +1,5 @@
 """Arithmetic on values of a function under construction: scalars and LLVM vectors."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping
 
@@ -24,7 +22,7 @@ class LlvmValue:
         """LLVM name of the type."""
         return f"<{self.lanes} x double>" if self.lanes else "double"
 
-    def spread(self, lanes: int) -> LlvmValue:
+    def spread(self, lanes: int) -> "LlvmValue":
         """The scalar in every lane; a vector is returned unchanged."""
         if self.lanes or not lanes:
             return self
@@ -33,18 +31,18 @@ class LlvmValue:
         places = f"<{lanes} x i32> zeroinitializer"
         return LlvmValue(self.block, self.block.put(f"shufflevector {kind} {first}, {kind} poison, {places}"), lanes)
 
-    def _with(self, operation: str, other: LlvmValue) -> LlvmValue:
+    def _with(self, operation: str, other: "LlvmValue") -> "LlvmValue":
         a, b = self.spread(other.lanes), other.spread(self.lanes)
         result = self.block.put(f"{operation} {FLAGS} {a.kind} {a.name}, {b.name}")
         return dataclasses.replace(a, name=result)
 
-    def __add__(self, other: LlvmValue) -> LlvmValue:
+    def __add__(self, other: "LlvmValue") -> "LlvmValue":
         return self._with("fadd", other)
 
-    def __sub__(self, other: LlvmValue) -> LlvmValue:
+    def __sub__(self, other: "LlvmValue") -> "LlvmValue":
         return self._with("fsub", other)
 
-    def __mul__(self, other: LlvmValue) -> LlvmValue:
+    def __mul__(self, other: "LlvmValue") -> "LlvmValue":
         return self._with("fmul", other)
 
     def store(self, array: str, index: int) -> None:

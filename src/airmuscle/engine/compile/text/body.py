@@ -1,7 +1,5 @@
 """Function body in a language of expressions: each value is named once, choices are conditional expressions."""
 
-from __future__ import annotations
-
 import abc
 import math
 import re

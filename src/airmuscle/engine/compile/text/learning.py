@@ -1,7 +1,5 @@
 """Text of printed functions for learning: PyTorch functions of tensors, and Warp kernels, a thread a column."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 

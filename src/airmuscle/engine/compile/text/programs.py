@@ -1,7 +1,5 @@
 """Text of printed functions for programs: C99 in double or single precision, ECMAScript modules, MATLAB and Octave."""
 
-from __future__ import annotations
-
 import dataclasses
 import struct
 from collections.abc import Sequence

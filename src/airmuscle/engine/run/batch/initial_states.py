@@ -1,7 +1,5 @@
 """Initial states of a batch: given, or the equilibria of the plants."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 
 import numpy as np

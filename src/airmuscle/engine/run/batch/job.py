@@ -1,7 +1,5 @@
 """BatchJob: the arguments shared by all execution back ends of a batch, and where results are written."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 from collections.abc import Mapping

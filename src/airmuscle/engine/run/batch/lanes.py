@@ -1,7 +1,5 @@
 """Lanes: blocks of plants through one vectorised step together, one thread per core, in single or double precision."""
 
-from __future__ import annotations
-
 import abc
 import dataclasses
 from collections.abc import Callable
@@ -24,7 +22,7 @@ ALIGNMENT = 64
 class LaneBlock:
     """The arrays of one thread for a block of lanes; it owns them as long as a kernel uses their addresses."""
 
-    def __init__(self, job: BatchJob, precision: Precision) -> None:
+    def __init__(self, job: BatchJob, precision: "Precision") -> None:
         number, sizes = precision.number, job.compiled.sizes
         self.dtype = np.float64 if number.bits == 64 else np.float32
         assert isinstance(job.integrator, ExplicitRungeKutta)
@@ -71,7 +69,7 @@ class SegmentTable:
 
 
 def lane_workers(
-    job: BatchJob, precision: Precision, active: npt.NDArray[np.intp], cores: int
+    job: BatchJob, precision: "Precision", active: npt.NDArray[np.intp], cores: int
 ) -> tuple[Queue, list[Callable[[int], Any]], int]:
     """The queue of blocks of the active plants, one worker per core, and the number of plants in a block."""
     table, first = SegmentTable(job), LaneBlock(job, precision)
@@ -124,7 +122,7 @@ def retry_alone(job: BatchJob, index: int, dtype: Any, status: Status) -> None:
         job.mark_not_run(index, status, f"{status.message} {where}")
 
 
-def check_precision(precision: Precision, integrator: object, *, loops: bool) -> None:
+def check_precision(precision: "Precision", integrator: object, *, loops: bool) -> None:
     """Raise ParameterError for a precision in which an integrator or control loops cannot be computed."""
     if precision.number.bits != 64 and loops:
         raise ParameterError("simulate_batch: control loops are computed in double precision; omit the precision.")

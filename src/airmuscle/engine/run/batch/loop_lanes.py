@@ -1,7 +1,5 @@
 """Control loops in lanes: blocks of loops with common sampling instants through one vectorised step and sample."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

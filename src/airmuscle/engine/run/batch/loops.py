@@ -1,7 +1,5 @@
 """Control loops of a batch: one for all plants or one for each, and controllers whose parameters differ."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import threading
@@ -46,7 +44,7 @@ class LoopBatch:
     def of(
         cls, plant: System, loops: tuple[ControlLoop, ...], laws: Variations | None, span: tuple[float, float],
         times: Array, integrator: Integrator,
-    ) -> LoopBatch:  # fmt: skip
+    ) -> "LoopBatch":  # fmt: skip
         """The loops of plants that are simulated over a span (start, duration) [s] with rows at `times` (N,)."""
         start, duration = span
         template = Problem(plant, loops[0], duration, start_time=start, integrator=integrator)

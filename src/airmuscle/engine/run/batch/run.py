@@ -1,7 +1,5 @@
 """Simulation of many plants of one structure at once."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """BatchSolution: final states, columns in memory or on disk, and status of every plant."""
 
-from __future__ import annotations
-
 import dataclasses
 import json
 import os

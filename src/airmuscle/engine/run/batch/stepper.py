@@ -1,7 +1,5 @@
 """BatchStepper: many plants of one structure that are stepped together by hand, in lanes."""
 
-from __future__ import annotations
-
 import concurrent.futures
 import ctypes
 from typing import Any

@@ -1,7 +1,5 @@
 """Threads that share one queue of work, its progress bar, and interruption by the user."""
 
-from __future__ import annotations
-
 import contextlib
 import contextvars
 import sys

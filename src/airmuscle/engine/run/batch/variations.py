@@ -1,7 +1,5 @@
 """Variations: parameters of N plants by path, checked as if each plant were constructed."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any

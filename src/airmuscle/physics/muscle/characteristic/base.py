@@ -5,8 +5,6 @@ compute the other two by a bracketed root search, and exact slopes by the implic
 several solutions, the one reached from rest is returned: the smallest contraction, pressure or force in equilibrium.
 """
 
-from __future__ import annotations
-
 import abc
 from collections.abc import Callable
 from typing import Any, ClassVar, NamedTuple, Self
@@ -59,7 +57,7 @@ class Characteristic(abc.ABC):
         )
 
     @classmethod
-    def variants(cls, data: MeasuredPoints, surface: Callable[[int], ForceLaw]) -> dict[str, Characteristic]:
+    def variants(cls, data: MeasuredPoints, surface: "Callable[[int], ForceLaw]") -> "dict[str, Characteristic]":
         """The initial laws of this class that are compared, by name: that of `guess`, or several structures.
 
         surface  a surface of a total degree with coefficients of zero, for laws that contain another one

@@ -4,8 +4,6 @@ The coefficients are given as printed in the paper, in per cent, bar and newton.
 not refitted.
 """
 
-from __future__ import annotations
-
 import abc
 from typing import ClassVar
 
@@ -69,7 +67,7 @@ class PlaneCurves:
             f"No plane curve at {force:g} N; curves exist at {loads} N. Use a surface between these loads."
         )
 
-    def interpolate(self, force_degree: int = 2) -> BorzikovaExponential:
+    def interpolate(self, force_degree: int = 2) -> "BorzikovaExponential":
         """Return the exponential surface through all curves, of which there must be `force_degree` + 1.
 
         Raises ParameterError for another number of curves.

@@ -1,7 +1,5 @@
 """Chou and Hannaford 1996: ideal McKibben muscle, a braided cylinder without a wall."""
 
-from __future__ import annotations
-
 from typing import ClassVar, Self
 
 from ....core import Reference, Value, model, ops

@@ -1,7 +1,5 @@
 """Contractile surface of Hill's muscle model: polynomial of total degree n in contraction and pressure."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable
 from typing import ClassVar
@@ -77,7 +75,7 @@ class ContractileSurface(ForceLaw):
                 raise ParameterError(f"ContractileSurface: min_{name} {low:g} must be less than max_{name} {high:g}.")
 
     @classmethod
-    def blank(cls, degree: int = 5, *, min_force: float = 0.0, max_force: float = 1e5) -> ContractileSurface:
+    def blank(cls, degree: int = 5, *, min_force: float = 0.0, max_force: float = 1e5) -> "ContractileSurface":
         """Return a surface with zero coefficients as the initial model of `fit`, which sets the validity range.
 
         The fitted surface is limited to `min_force` and `max_force`; the default limit is above the force of a muscle.
@@ -87,7 +85,7 @@ class ContractileSurface(ForceLaw):
         return cls((0.0,) * size, 0.0, 1.0, 0.0, 1.0, min_force, max_force, degree)
 
     @classmethod
-    def guess(cls, data: MeasuredPoints, degree: int = 5) -> ContractileSurface:
+    def guess(cls, data: MeasuredPoints, degree: int = 5) -> "ContractileSurface":
         """Return the blank surface of a total degree with an upper limit of twice the measured force."""
         return cls.blank(degree, max_force=max(2.0 * DataScales.of(data).force, 1.0))
 
@@ -97,13 +95,13 @@ class ContractileSurface(ForceLaw):
 
     def with_validity_range(
         self, pressure: tuple[float, float], contraction: tuple[float, float]
-    ) -> ContractileSurface:
+    ) -> "ContractileSurface":
         """Return the surface with the same coefficients on another validity range; `fit` calls it before it solves."""
         return ContractileSurface(
             self.coefficients, *pressure, *contraction, self.min_force, self.max_force, self.degree
         )
 
-    def rescaled(self, pressure: tuple[float, float], contraction: tuple[float, float]) -> ContractileSurface:
+    def rescaled(self, pressure: tuple[float, float], contraction: tuple[float, float]) -> "ContractileSurface":
         """Return the same polynomial on another validity range, outside which it is extrapolated linearly."""
         new = self.with_validity_range(pressure, contraction)
         (x0, q0), (new_x0, new_q0) = self._scale(0.0, 0.0), new._scale(0.0, 0.0)

@@ -1,7 +1,5 @@
 """Scales of measured points, from which laws take their initial parameters in a fit."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Sequence
@@ -31,7 +29,7 @@ class DataScales:
     specimen_count: int = 1
 
     @classmethod
-    def of(cls, data: MeasuredPoints) -> DataScales:
+    def of(cls, data: "MeasuredPoints") -> "DataScales":
         """The scales of all rows of one recording or several; given scales as they are."""
         if isinstance(data, DataScales):
             return data

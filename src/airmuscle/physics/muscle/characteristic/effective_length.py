@@ -1,7 +1,5 @@
 """Wrapper for muscles of one type and different lengths: rigid ends of constant length."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable
 from typing import Any
@@ -60,18 +58,18 @@ class EffectiveLength(ForceLaw):
         fields = getattr(self.inner, "linear_in", ())
         return tuple(f"inner.{field}" for field in ((fields,) if isinstance(fields, str) else fields))
 
-    def with_resting_length(self, resting_length: float) -> EffectiveLength:
+    def with_resting_length(self, resting_length: float) -> "EffectiveLength":
         """Return the model of a muscle of the same type with this resting length [m]."""
         return dataclasses.replace(self, resting_length=resting_length)
 
-    def with_validity_range(self, pressure: tuple[float, float], contraction: tuple[float, float]) -> EffectiveLength:
+    def with_validity_range(self, pressure: tuple[float, float], contraction: tuple[float, float]) -> "EffectiveLength":
         """Return the model with another validity range; that of the inner surface is wider in contraction."""
         inner: Any = self.inner
         if not hasattr(inner, "with_validity_range"):
             return self
         return dataclasses.replace(self, inner=inner.with_validity_range(pressure, _widen(contraction)))
 
-    def rescaled(self, pressure: tuple[float, float], contraction: tuple[float, float]) -> EffectiveLength:
+    def rescaled(self, pressure: tuple[float, float], contraction: tuple[float, float]) -> "EffectiveLength":
         """Return the same force law on another validity range; that of the inner surface is wider in contraction."""
         inner: Any = self.inner
         if not hasattr(inner, "rescaled"):

@@ -1,7 +1,5 @@
 """Energy consistency of a muscle: Maxwell and virtual-work defects."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Exact meridian of a straight-fibre muscle with rubber wall, the reference for the assumed meridians."""
 
-from __future__ import annotations
-
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Hunt 2017: pressure of a Festo muscle as a function of contraction, load and direction of motion."""
 
-from __future__ import annotations
-
 from typing import ClassVar, Self
 
 from ....core import ParameterError, Reference, Value, model, ops, parameter

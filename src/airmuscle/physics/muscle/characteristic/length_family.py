@@ -1,7 +1,5 @@
 """Wrappers for muscles of one type and different lengths: a force law plus a length-dependent correction."""
 
-from __future__ import annotations
-
 import abc
 import dataclasses
 from collections.abc import Callable

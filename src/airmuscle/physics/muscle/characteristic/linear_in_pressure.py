@@ -1,7 +1,5 @@
 """Reduced force law: linear in pressure, polynomials of the contraction, for muscles of unknown size."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from ....core import ParameterError, Value, model, ops, parameter

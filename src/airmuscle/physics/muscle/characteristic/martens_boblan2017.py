@@ -1,7 +1,5 @@
 """Martens and Boblan 2017: Festo DMSP muscles, braid with axial and circumferential wall stiffness."""
 
-from __future__ import annotations
-
 from typing import ClassVar, Self
 
 from ....core import Reference, Value, model, ops, parameter

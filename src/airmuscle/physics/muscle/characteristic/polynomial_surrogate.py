@@ -1,7 +1,5 @@
 """Polynomial surrogate: a traceable approximation of any characteristic, with the search for its maximum error."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable
 from typing import Any

@@ -1,7 +1,5 @@
 """Partial pooling of muscles of one type: a law of the population plus the effect of each measured muscle."""
 
-from __future__ import annotations
-
 import dataclasses
 
 from ....core import ParameterError, Value, model, ops, parameter, suggestion
@@ -62,11 +60,11 @@ class PooledLengthLaw(ForceLaw):
     def contraction_range(self) -> tuple[float, float]:
         return self.population.contraction_range
 
-    def with_resting_length(self, resting_length: float) -> PooledLengthLaw:
+    def with_resting_length(self, resting_length: float) -> "PooledLengthLaw":
         """Return the law of a new muscle of the same type with this resting length [m]: its effect is zero."""
         return dataclasses.replace(self, population=_of_length(self.population, resting_length), specimen="")
 
-    def for_specimen(self, specimen: str) -> PooledLengthLaw:
+    def for_specimen(self, specimen: str) -> "PooledLengthLaw":
         """Return the law of a measured muscle, with its resting length and effect. Raises ParameterError."""
         length = self.specimen_lengths[self._index(specimen)]
         return dataclasses.replace(self, population=_of_length(self.population, length), specimen=specimen)

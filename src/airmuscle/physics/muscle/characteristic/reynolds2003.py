@@ -1,7 +1,5 @@
 """Reynolds 2003: contractile force, spring stiffness and damping, linear in pressure."""
 
-from __future__ import annotations
-
 from typing import ClassVar, Self
 
 from ....core import Reference, Value, model, ops, parameter

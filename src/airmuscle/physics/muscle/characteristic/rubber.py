@@ -1,7 +1,5 @@
 """Rubber wall of a straight-fibre muscle: linear relation between hoop stress and strain."""
 
-from __future__ import annotations
-
 import abc
 
 from ....core import Value, model, parameter, pi

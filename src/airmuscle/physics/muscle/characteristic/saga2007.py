@@ -1,7 +1,5 @@
 """Saga, Nakamura and Yaegashi 2007: straight-fibre rubber muscle in closed form, in all interpretations."""
 
-from __future__ import annotations
-
 import functools
 from typing import ClassVar, NamedTuple
 

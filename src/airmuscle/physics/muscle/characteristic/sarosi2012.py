@@ -1,7 +1,5 @@
 """Sárosi 2012: force of a fluidic muscle with six coefficients."""
 
-from __future__ import annotations
-
 from typing import ClassVar, Self
 
 from ....core import Reference, Value, model, ops, parameter

@@ -1,7 +1,5 @@
 """Serres 2009: Reynolds model of a Festo muscle, with two pressure ranges of the spring stiffness; its damper."""
 
-from __future__ import annotations
-
 from typing import ClassVar, Self
 
 from ....core import Reference, Value, model, ops, parameter

@@ -1,7 +1,5 @@
 """Root search for the directions of a characteristic that are not in closed form."""
 
-from __future__ import annotations
-
 import contextlib
 import contextvars
 import sys

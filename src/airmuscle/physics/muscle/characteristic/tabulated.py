@@ -1,7 +1,5 @@
 """Characteristic interpolated from a table of force over contraction at several pressures, without overshoot."""
 
-from __future__ import annotations
-
 import functools
 from typing import Any, ClassVar
 

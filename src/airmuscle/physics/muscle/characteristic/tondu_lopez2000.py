@@ -1,7 +1,5 @@
 """Tondu and Lopez 2000: braided muscle with an end correction."""
 
-from __future__ import annotations
-
 from typing import ClassVar, Self
 
 from ....core import Reference, Value, model, ops, parameter

@@ -1,7 +1,5 @@
 """Validity range: the pressures and contractions for which a characteristic was measured, printed or fitted."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Any
 

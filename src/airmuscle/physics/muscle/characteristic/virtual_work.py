@@ -1,7 +1,5 @@
 """Laws of virtual work: force from the volume of a geometry, also with the rubber of a circular meridian."""
 
-from __future__ import annotations
-
 import functools
 from typing import ClassVar, NamedTuple
 

@@ -1,7 +1,5 @@
 """Friction (interface): hysteresis models with internal bristle states."""
 
-from __future__ import annotations
-
 import abc
 from typing import Any, ClassVar, NamedTuple, Self
 

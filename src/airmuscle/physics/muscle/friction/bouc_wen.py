@@ -1,7 +1,5 @@
 """Bouc-Wen hysteresis model in normalised form."""
 
-from __future__ import annotations
-
 from typing import Any, ClassVar, Self
 
 from ....core import Reference, StateVariable, Value, Values, model, ops, parameter

@@ -1,7 +1,5 @@
 """Dahl friction model: one bristle with gradual sliding."""
 
-from __future__ import annotations
-
 from typing import Any, ClassVar, Self
 
 from ....core import Reference, StateVariable, Value, Values, model, ops, parameter

@@ -1,7 +1,5 @@
 """LuGre friction model: bristle with the Stribeck effect, and viscous friction."""
 
-from __future__ import annotations
-
 from typing import Any, ClassVar, Self
 
 from ....core import Reference, StateVariable, Value, Values, model, ops, parameter

@@ -1,7 +1,5 @@
 """Maxwell-slip friction model: parallel springs, each sliding at its deflection limit."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any, ClassVar, Self
 

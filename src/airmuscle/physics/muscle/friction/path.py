@@ -3,8 +3,6 @@
 This file works on numbers only, for `Friction.force_along`; it is never traced, so it may use NumPy.
 """
 
-from __future__ import annotations
-
 import bisect
 import dataclasses
 import functools

@@ -1,7 +1,5 @@
 """Modified Prandtl-Ishlinskii hysteresis model: stop operators, and dead zones for asymmetric loops."""
 
-from __future__ import annotations
-
 from typing import Any, ClassVar, Self
 
 from ....core import ParameterError, Reference, StateVariable, Value, Values, model, ops, parameter

@@ -1,7 +1,5 @@
 """Wrappers of a friction law: range of its data, force scale affine in gauge pressure."""
 
-from __future__ import annotations
-
 from typing import Any, ClassVar
 
 from ....core import ParameterError, Reference, StateVariable, Value, Values, model, ops, parameter

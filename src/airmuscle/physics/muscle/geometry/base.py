@@ -1,7 +1,5 @@
 """Geometry (interface): enclosed volume and outline of a muscle as functions of contraction."""
 
-from __future__ import annotations
-
 import abc
 from typing import Any, ClassVar
 

@@ -1,7 +1,5 @@
 """Inextensible cylindrical braid of McKibben, Shadow and Festo fluidic muscles."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
 import numpy as np

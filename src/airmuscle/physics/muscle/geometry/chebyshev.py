@@ -1,7 +1,5 @@
 """Chebyshev polynomial approximation of a geometry, with its approximation error."""
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 

@@ -1,7 +1,5 @@
 """Meridian (interface): outline of one segment between two rings, its integrals, and functions for these."""
 
-from __future__ import annotations
-
 import abc
 import functools
 import math

@@ -1,7 +1,5 @@
 """Meridians of a straight-fibre muscle: parabolas and catenary of Saga et al. 2007, circular arc."""
 
-from __future__ import annotations
-
 from typing import ClassVar, NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Pleated muscle: exact outline of inextensible fibres without hoop stress."""
 
-from __future__ import annotations
-
 import functools
 from typing import Any, ClassVar, NamedTuple
 

@@ -1,7 +1,5 @@
 """Straight-fibre geometry: a tube with axial fibres between rings; force resultant of the fibres."""
 
-from __future__ import annotations
-
 import abc
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Geometries of measured volumes: a table over the contraction, a rigid vessel."""
 
-from __future__ import annotations
-
 import functools
 from typing import Any, ClassVar
 
