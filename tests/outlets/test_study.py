@@ -10,7 +10,9 @@ from __future__ import annotations
 
 import contextlib
 import csv
+import ctypes
 import functools
+import importlib
 import multiprocessing
 import os
 import re
@@ -281,6 +283,27 @@ def test_each_worker_of_a_pool_has_one_thread_of_linear_algebra_and_its_share_of
         assert pool.submit(eval, cores).result() == 1  # of those of this process, which conftest limits to one
     assert [text.split()[1:] for text in said] == [["has", "1"]] * 2
     assert "OPENBLAS_NUM_THREADS" not in os.environ
+
+
+def test_one_worker_is_the_process_itself_with_one_thread_of_linear_algebra(monkeypatch):
+    """Two threads of the small matrices of `compare` take five times the CPU time on a busy machine."""
+    for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
+        monkeypatch.delenv(name, raising=False)
+    library = ctypes.CDLL(importlib.import_module("numpy.linalg._umath_linalg").__file__)
+    threads, set_threads = (getattr(library, f"scipy_openblas_{verb}_num_threads64_", None) for verb in ("get", "set"))
+    if threads is None:
+        pytest.skip("NumPy has another library of linear algebra than OpenBLAS")
+    before = threads()
+    try:
+        set_threads(2)
+        with process_pool(1, one_thread_each=True) as pool:
+            assert (pool, threads()) == (None, 1)
+        assert threads() == 2
+        monkeypatch.setenv("OMP_NUM_THREADS", "2")  # the user says otherwise
+        with process_pool(1, one_thread_each=True):
+            assert threads() == 2
+    finally:
+        set_threads(before)
 
 
 @pytest.mark.parametrize("place", [lambda: process_pool(3), threads, local_dask], ids=["processes", "threads", "dask"])

@@ -4,8 +4,11 @@ CasADi evaluates a function point by point, which takes about 10 us each. NumPy 
 instruction for all points together. Instructions that the required outputs do not need are left out.
 """
 
+import contextlib
+import ctypes
 import functools
 import math
+import os
 from collections.abc import Callable, Collection, Iterator, Sequence
 from typing import Any, NamedTuple
 
@@ -167,3 +170,32 @@ def _operations() -> dict[int, Callable[..., Any]]:
         "IF_ELSE_ZERO": _if_else_zero,
     }  # fmt: skip
     return {getattr(casadi, f"OP_{name}"): operation for name, operation in named.items()}
+
+
+BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+"""Environment variables that limit the threads of linear algebra, which a process reads when it loads the library."""
+
+
+@contextlib.contextmanager
+def one_thread() -> Iterator[None]:
+    """One thread for the linear algebra of this process, unless the environment states a number.
+
+    NumPy and SciPy load a copy of OpenBLAS each. Without effect for another library.
+    """
+    from numpy.linalg import _umath_linalg
+    from scipy.linalg import _fblas
+
+    before = []
+    stated = any(name in os.environ for name in BLAS_THREADS)
+    for module, suffix in () if stated else ((_umath_linalg, "64_"), (_fblas, "")):
+        with contextlib.suppress(OSError, AttributeError):
+            library = ctypes.CDLL(module.__file__)
+            get, limit = (getattr(library, f"scipy_openblas_{verb}_num_threads{suffix}") for verb in ("get", "set"))
+            before.append((limit, get()))
+    try:
+        for limit, _ in before:
+            limit(1)
+        yield
+    finally:
+        for limit, count in before:
+            limit(count)

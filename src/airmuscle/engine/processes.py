@@ -18,6 +18,7 @@ from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from typing import IO, Any
 
 from ..core import AirmuscleError, InputError, current_units
+from ..core.arrays import BLAS_THREADS, one_thread
 from ..core.display import display
 
 Workers = int | Executor
@@ -26,8 +27,6 @@ stop_events: list[Any] = []
 """Events that stop what this process computes for a pool, between two runs."""
 _share: list[int | None] = [None]
 """Cores of a worker: those of its parent, divided among its workers."""
-_BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
-"""Environment variables that limit the threads of linear algebra, which a process reads when it loads the library."""
 
 
 def available_cores() -> int:
@@ -44,7 +43,8 @@ def process_pool(
     """A context manager for an executor with `workers` local processes; None for one worker, the process itself.
 
     If `workers` is an executor, such as that of a cluster or of a shared folder, it is yielded and remains open.
-    `one_thread_each` limits the linear algebra of each worker to one thread, unless the environment states a number.
+    `one_thread_each` limits the linear algebra of each worker to one thread, also of the process itself, unless the
+    environment states a number.
     If the block is left by an exception, the workers stop between two runs, or at once with `terminate`, for tasks
     that write nothing; if this process is killed, they exit.
     Raises InputError for a number of workers below 1.
@@ -55,7 +55,8 @@ def process_pool(
     if workers < 1:
         raise InputError(f"workers is {workers}; it must be at least 1.")
     if workers == 1:
-        yield None
+        with one_thread() if one_thread_each else contextlib.nullcontext():
+            yield None
         return
     context = multiprocessing.get_context("spawn")  # a forked copy of a process with threads may deadlock
     stop_event = context.Event()
@@ -78,7 +79,7 @@ def process_pool(
 @contextlib.contextmanager
 def _one_thread_each() -> Iterator[None]:
     """One thread for linear algebra in the processes that are started in the block."""
-    added = [name for name in _BLAS_THREADS if name not in os.environ]
+    added = [name for name in BLAS_THREADS if name not in os.environ]
     os.environ.update(dict.fromkeys(added, "1"))
     try:
         yield
