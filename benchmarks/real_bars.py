@@ -18,7 +18,7 @@ from typing import NamedTuple
 
 import numpy as np
 from real_data import CEILING, NAME, pulling, repeats, rms, slack_force
-from real_fills import MODELS, fit_record, read_record
+from real_fills import fit_divided, read_record
 from real_intervals import held_points
 from startup import program
 
@@ -79,8 +79,8 @@ def main() -> None:
     train, test = repeats(folder)
     surfaces, pooled = held_points((train, test))
     print()
-    fills = [fit_record(MODELS[-1], read_record(path), 16).rms(MODELS[-1].sensor) / 1e3
-             for path in sorted(folder.glob("*fill*.csv"))]  # fmt: skip
+    fits = [fit_divided(read_record(path), 16) for path in sorted(folder.glob("*fill*.csv"))]
+    fills = [fit.rms(model.sensor) / 1e3 for model, fit in fits]
     bars = [
         *law_bars(train, test),
         Bar("stated 95 % intervals of surfaces, repeat 8 against 9", 100 * float(np.mean(surfaces)), 85.0, "%", True),

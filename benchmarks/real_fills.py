@@ -29,6 +29,8 @@ END = 5.0
 """Rows after this time [s] are at rest and are omitted; chosen."""
 REST_VOLUME = 1e-4
 """Assumed volume at rest [m3], which is not known; conductances and volumes are relative to it."""
+SEGMENTS = range(1, 6)
+"""Numbers of segments of the tube of the last plant, of which the one with the lowest AICc is used; chosen."""
 OPEN = am.Schedule({"fill": ((0.0, 1.0),)})
 BOUNDS = {
     "supply.pressure": (590e3, 660e3), "fill.critical_ratio": (0.1, 0.6), "growth_volume": (0.0, 2 * REST_VOLUME),
@@ -128,10 +130,10 @@ GASES = (
 
 
 def read_record(path: pathlib.Path) -> am.Recording:
-    """The transient part of a record; its pressure is given the names of both sensor locations."""
+    """The transient part of a record; its pressure is given the names of all sensor locations."""
     recording = am.read_csv(path)
     recording = recording.rows(recording["time"] < END)
-    return recording.with_columns(**{"tube.pressure": recording["pressure"]})
+    return recording.with_columns(**dict.fromkeys(("tube.pressure", "tube1.pressure"), recording["pressure"]))
 
 
 def noise_floor(recording: am.Recording, width: int = 11) -> tuple[float, float]:
@@ -168,6 +170,29 @@ def fit_record(variant: Model, recording: am.Recording, starts: int) -> DynamicF
     )  # fmt: skip
 
 
+def divided(variant: Model, segments: int) -> Model:
+    """The variant with a tube of some segments, and the sensor in the first of them; one is the variant itself.
+
+    Several have the flow law of friction, a critical ratio of 0, for which the division of a `Tube` is exact.
+    """
+    if segments == 1:
+        return variant
+    circuit = variant.plant.circuit
+    orifice = dataclasses.replace(circuit.tube.orifice, critical_ratio=0.0)
+    tube = dataclasses.replace(circuit.tube, segment_count=segments, orifice=orifice)
+    plant = dataclasses.replace(variant.plant, circuit=dataclasses.replace(circuit, tube=tube))
+    return dataclasses.replace(variant, plant=plant, sensor=f"{tube.prefixes[0]}pressure")
+
+
+def fit_divided(recording: am.Recording, starts: int) -> tuple[Model, DynamicFit]:
+    """The last plant with the number of segments of the lowest AICc, and its fit.
+
+    The number is no further unknown of one of the fits, so that the lowest AICc is the least residual.
+    """
+    fits = {model: fit_record(model, recording, starts) for model in (divided(MODELS[-1], n) for n in SEGMENTS)}
+    return min(fits.items(), key=lambda item: item[1].rms(item[0].sensor))
+
+
 def prediction_rms(fit: DynamicFit, variant: Model, recording: am.Recording, wall: bool) -> float:
     """Rms error [Pa] of the prediction of another record, for which only the nuisance parameters are fitted."""
     plant = fit.plant()
@@ -179,12 +204,12 @@ def prediction_rms(fit: DynamicFit, variant: Model, recording: am.Recording, wal
     return prediction.rms(variant.sensor)
 
 
-def show_record(name: str, fits: list[DynamicFit]) -> None:
+def show_record(name: str, models: list[Model], fits: list[DynamicFit]) -> None:
     """Print the residuals of all variants, and estimates and profiles of the last one."""
-    inside = min((f for f, m in zip(fits, MODELS, strict=True) if m.sensor == "pressure" and "lag" not in m.name),
+    inside = min((f for f, m in zip(fits, models, strict=True) if m.sensor == "pressure" and "lag" not in m.name),
                  key=lambda f: f.rms("pressure"))  # fmt: skip
     print(f"\n## {name}: {locate_pressure_sensor(in_muscle=inside, in_line=fits[-1])}")
-    for variant, fit in zip(MODELS, fits, strict=True):
+    for variant, fit in zip(models, fits, strict=True):
         bound = [e.name for e in fit.estimates if e.on_bound]
         note = f"; on bounds: {', '.join(bound)}" if bound else ""
         print(f"{fit.rms(variant.sensor) / 1e3:7.2f} kPa rms  {variant.name}; {len(fit.estimates)} unknowns{note}")
@@ -214,18 +239,20 @@ def main() -> None:
     files = [f for p in options.paths for f in (sorted(p.glob("*fill*.csv")) if p.is_dir() else [p])]
     start, records, last = time.perf_counter(), [read_record(f) for f in files], []
     for path, recording in zip(files, records, strict=True):
-        fits = [fit_record(variant, recording, options.starts) for variant in MODELS]
-        last.append(fits[-1])
-        show_record(path.name, fits)
+        fits = [fit_record(variant, recording, options.starts) for variant in MODELS[:-1]]
+        model, fit = fit_divided(recording, options.starts)
+        last.append((model, fit))
+        show_record(path.name, [*MODELS[:-1], model], [*fits, fit])
+        print(f"segments of the tube: {model.plant.circuit.tube.segment_count}")
         noise, timing = noise_floor(recording)
-        later = fits[-1].residuals()[MODELS[-1].sensor][recording["time"] >= 0.1]
+        later = fit.residuals()[model.sensor][recording["time"] >= 0.1]
         print(f"noise {noise / 1e3:.2f} kPa, by resolution of the times {timing / 1e3:.2f} kPa; residual of the last "
               f"plant after 0.1 s {np.sqrt(np.mean(later**2)) / 1e3:.2f} kPa")  # fmt: skip
     for wall in (False, True):
         refitted = "supply pressure, initial pressure and start time" + (" and initial wall volume" if wall else "")
         print(f"\n## Prediction of other records, rms error [kPa]; only {refitted} are fitted")
-        for i, fit in enumerate(last):
-            print(files[i].name, *(f"{prediction_rms(fit, MODELS[-1], r, wall) / 1e3:8.2f}" for r in records))
+        for i, (model, fit) in enumerate(last):
+            print(files[i].name, *(f"{prediction_rms(fit, model, r, wall) / 1e3:8.2f}" for r in records))
     compare_gases(records, options.starts)
     print(f"{time.perf_counter() - start:.0f} s")
 

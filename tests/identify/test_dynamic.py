@@ -313,6 +313,27 @@ def test_line_and_muscle_are_told_from_a_sensor_in_the_line():
     assert fit.residual_std == pytest.approx(1.0, abs=0.12)
 
 
+def test_a_tube_that_is_filled_along_its_length_is_told_from_one_at_one_pressure():
+    """A fill through a tube of three segments, sensed behind the valve: three segments give volume and conductances
+    back, one leaves more than the noise of the sensor."""
+    tube, lone = Tube(Valve(6e-10, 0.0), 2e-5, segment_count=3), free_muscle(lag=2.0)
+    along = dataclasses.replace(lone, circuit=dataclasses.replace(lone.circuit, tube=tube))
+    record = free_fill(along, "tube1.pressure").recording
+    record = record.with_columns(**{"tube.pressure": record["tube1.pressure"]})
+    free = ("circuit.circuit.fill.conductance", "circuit.tube.volume", "circuit.tube.orifice.conductance")
+    fits = {}
+    for count, sensed in ((3, "tube1.pressure"), (1, "tube.pressure")):
+        plant = changed(along, circuit__tube__volume=1.5, circuit__tube__orifice__conductance=0.8)
+        circuit = dataclasses.replace(plant.circuit, tube=dataclasses.replace(plant.circuit.tube, segment_count=count))
+        plant = dataclasses.replace(plant, circuit=circuit)
+        experiment = Experiment(record, OPEN, InitialConditions.at_coordinates(plant, 1e4))
+        fits[count] = fit_dynamic(plant, [experiment], free=free, observed={sensed: 500.0})
+    for estimate in fits[3].estimates:
+        assert abs(estimate.value - truth(along, estimate.name)) < 3.5 * estimate.stderr, estimate.name
+    assert fits[3].residual_std == pytest.approx(1.0, abs=0.12)
+    assert fits[1].residual_std > 2.0
+
+
 @pytest.mark.parametrize("sensed", ["tube.pressure", "pressure"])
 def test_a_fill_tells_whether_it_was_sensed_before_the_muscle(sensed):
     """A small line behind a large valve and before a narrow tube fills at once and then waits for the muscle.
