@@ -17,7 +17,16 @@ from command_line import airmuscle
 
 from airmuscle.core import parameters
 from airmuscle.errors import AirmuscleError
-from airmuscle.files import list_laws, list_plants, load, load_scenario, muscle_schema, scenario_schema, to_toml
+from airmuscle.files import (
+    allow_code,
+    list_laws,
+    list_plants,
+    load,
+    load_scenario,
+    muscle_schema,
+    scenario_schema,
+    to_toml,
+)
 from airmuscle.files.library import PLANTS, Location, build_entry, model_class
 from airmuscle.files.scenario import TABLES
 
@@ -239,3 +248,20 @@ def test_the_command_prints_or_writes_what_editors_read(tmp_path: Path):
     nameless = airmuscle("schema", "--out", "")
     assert nameless.exit_code == 2
     assert "--out must be a file name" in nameless.stderr
+
+
+@pytest.mark.parametrize("name", ["my_laws:Zone", "lab.laws:Zone", "my_laws", "my laws:Zone", "PIDD"])
+def test_a_class_of_a_user_passes_with_permission_alone(name):
+    """In place of a controller, and of the law within one, with any parameters; a loop still needs its own keys."""
+    with allow_code():
+        permitted = scenario_schema()
+    loop = tomllib.loads((ROOT / "examples" / "pressure_loop.toml").read_text(encoding="utf-8"))
+    own = {"model": name, "zones": [1.0]}
+    keys = {key: loop["input"]["controller"][key] for key in ("sample_time", "setpoint")}
+    laws = [own | keys, {"model": "Multirate", "law": own, "every": 2} | keys]
+    for law in laws:
+        changed = {**loop, "input": {**loop["input"], "controller": law}}
+        assert (not faults(changed, permitted, permitted)) is (name.count(":") == 1 and " " not in name)
+        assert faults(changed, SCENARIO, SCENARIO)
+    alone = {**loop, "input": {**loop["input"], "controller": own}}
+    assert faults(alone, permitted, permitted)

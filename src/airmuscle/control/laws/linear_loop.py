@@ -66,7 +66,7 @@ def loop_margins(opened: SampledModel) -> Margins:
     def at(f: float) -> complex:
         return complex(opened.frequency_response([f])[0, 0, 0])
 
-    values = opened.frequency_response(frequencies)[:, 0, 0]
+    values = _scanned(opened, frequencies)
     negative = [f for f in _zeros(frequencies, values.imag, lambda f: at(f).imag) if at(f).real < 0]
     if values[-1].real < 0:
         negative.append(float(frequencies[-1]))
@@ -82,6 +82,27 @@ def loop_margins(opened: SampledModel) -> Margins:
         gain, max(below, default=0.0), factors.get(gain, math.nan), abs(angles.get(nearest, math.inf)), nearest,
         min(delays, default=math.inf), peak, where,
     )  # fmt: skip
+
+
+def _scanned(opened: SampledModel, frequencies: Array) -> npt.NDArray[np.complex128]:
+    """The responses (F,) of a loop, many at once: back substitution in the Schur form of its balanced state matrix.
+
+    Next to crossings, where a sign may be rounding, they are those of the linear solution by which crossings are found.
+    """
+    from scipy.linalg import matrix_balance, schur
+
+    balanced, (scale, _) = matrix_balance(opened.A, permute=False, separate=True)
+    triangle, turn = schur(balanced, output="complex")
+    b, c = turn.conj().T @ (opened.B[:, 0] / scale), (opened.C[0] * scale) @ turn
+    z = np.exp(2j * math.pi * frequencies * opened.sample_time)
+    states = np.zeros((len(b), z.size), dtype=complex)
+    for i in reversed(range(len(b))):
+        states[i] = (b[i] + triangle[i, i + 1 :] @ states[i + 1 :]) / (z - triangle[i, i])
+    values = np.asarray(c @ states + opened.D[0, 0])
+    for signs in (np.sign(values.imag), np.sign(np.abs(values) - 1.0)):
+        near = np.unique(np.flatnonzero(np.diff(signs))[:, None] + np.arange(2))
+        values[near] = opened.frequency_response(frequencies[near])[:, 0, 0]
+    return values
 
 
 def _zeros(grid: Array, values: Array, function: Callable[[float], float]) -> list[float]:

@@ -26,6 +26,7 @@ from .location import Location as Location
 from .location import located_errors as located_errors
 from .models import PACKAGES as PACKAGES
 from .models import allow_code as allow_code
+from .models import is_code_allowed as is_code_allowed
 from .models import model_class as model_class
 from .models import model_names as model_names
 from .plant_file import PLANT_READER as PLANT_READER

@@ -88,10 +88,15 @@ def allow_code() -> Iterator[None]:
         _ALLOWED.reset(token)
 
 
+def is_code_allowed() -> bool:
+    """Whether files may name classes of a user's module now."""
+    return _ALLOWED.get()
+
+
 def _class_of_code(name: str, where: str) -> type[Any]:
     """The class `module:Class` of a user. Raises UnknownNameError without permission, or where there is none."""
     module, _, attribute = name.partition(":")
-    if not _ALLOWED.get():
+    if not is_code_allowed():
         raise UnknownNameError(HintedText(
             f"{where}: '{one_line(name)}' is code of a user. Reading the file would run it, and a file may come from "
             "anywhere, so that it is refused.", Hint("To run it because you trust it", function="files.allow_code"),

@@ -2,7 +2,8 @@
 
 With a schema, an editor marks unknown keys, values of the wrong type and numbers out of bounds, and shows unit and
 meaning of each parameter. Names of inputs, columns and files are not in the schema; they are checked when the file is
-loaded. JSON Schema, draft 2020-12.
+loaded. Within `allow_code` a class of a user stands wherever a model does, with any parameters: the schema does not
+import it. JSON Schema, draft 2020-12.
 """
 
 import dataclasses
@@ -18,7 +19,7 @@ from ...engine.loop import RELATIVE, Controller, Driver
 from ...physics.muscle import Muscle
 from ...physics.plant.plant import Plant
 from ...physics.pneumatics.valve import Orifice
-from ..library import PREDICTED, StatedBand, model_class, model_names, only_class, plant_file
+from ..library import PREDICTED, StatedBand, is_code_allowed, model_class, model_names, only_class, plant_file
 from ..library.entry import CONDITIONS, PATHS, Check, Entry
 from ..library.fields import is_required, options, origin
 from . import controller, initial_state, inputs, plant_uncertainty, scenario, values
@@ -30,6 +31,7 @@ _NUMBER = r"^\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?"
 _UNIT = r"\s*([^\s\d.,]|1/).*"
 """Pattern of the unit after a number: no comma and no further digit, except 1/s."""
 _TEXT: Schema = {"type": "string"}
+_CODE: Schema = {"description": "module:Class, code of a user", "pattern": r"^\w+(\.\w+)*:\w+$", **_TEXT}
 _PLAIN: Mapping[Any, str] = {int: "integer", float: "number", str: "string", bool: "boolean"}
 _ANY_UNIT = {
     (Check, "equals"),
@@ -66,6 +68,11 @@ def _table(properties: Schema, required: Sequence[str] = ()) -> Schema:
     return {"type": "object", "properties": properties, **required_keys, "additionalProperties": False}
 
 
+def _code_table(properties: Schema, required: Sequence[str] = ()) -> Schema:
+    """A table of a user's class, whose parameters the schema does not know."""
+    return {"type": "object", "properties": {"model": _CODE, **properties}, "required": ["model", *required]}
+
+
 def _list_of(items: Schema) -> Schema:
     return {"type": "array", "items": items}
 
@@ -99,7 +106,8 @@ class _ModelSchemas:
             tables = [self._reference(member) for member in members]
             if cls is Orifice:
                 tables.append(_table({"library": _TEXT, "path": {"enum": list(PATHS)}}, ("library",)))
-            self.definitions[name] = {"anyOf": [*([{"enum": alone}] if alone else []), *tables]}
+            ours = [_CODE, _code_table({})] if is_code_allowed() else []
+            self.definitions[name] = {"anyOf": [*([{"enum": alone}] if alone else []), *tables, *ours]}
         return {"$ref": f"#/$defs/{name}"}
 
     def _reference(self, cls: type[Any]) -> Schema:
@@ -216,4 +224,4 @@ def _controller(models: _ModelSchemas, setpoint: Schema) -> Schema:
     for table in tables:
         table["properties"] |= keys
         table["required"] += controller.LOOP_KEYS
-    return {"anyOf": tables}
+    return {"anyOf": [*tables, *([_code_table(keys, controller.LOOP_KEYS)] if is_code_allowed() else [])]}

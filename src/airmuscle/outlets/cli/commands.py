@@ -67,7 +67,7 @@ COMMANDS = (
     CommandRow("schema", "schema", "schema", "Print the JSON schema of scenario or muscle files."),
 )
 """All commands, in the order of use."""
-RUN_CODE = ("simulate", "study", "tune", "benchmark", "export")
+RUN_CODE = ("simulate", "study", "tune", "benchmark", "export", "schema")
 """Commands with --allow-code."""
 _ROWS = {row.name: row for row in COMMANDS}
 _UsageError: Any = typer.BadParameter.__base__
