@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from arm_episodes import STEP, changed, made_episodes
+from command_line import airmuscle
 
-from airmuscle.bench import fit_joint, inspect_episodes, read_episodes
+from airmuscle.bench import fit_joint, inspect_episodes, propose_mapping, read_episodes
 from airmuscle.bench.joint.episodes import cut
 from airmuscle.errors import ColumnError, FileError, IdentificationError, ParameterError
 
@@ -93,6 +94,135 @@ def test_a_folder_with_one_file_for_each_episode(tmp_path, mapping, write):
         np.testing.assert_allclose(one.speed[5:-5], other.speed[5:-5], atol=0.3)
 
 
+def steps_of(run):
+    """The steps of an episode as RLDS has them: an observation and an action each, and flags."""
+    return [
+        {"observation": {"q": a.tolist(), "p": p.tolist()}, "action": p.tolist(), "is_first": k == 0}
+        for k, (a, p) in enumerate(zip(run.angle, run.pressure, strict=True))
+    ]
+
+
+def write_steps(folder, run, number):
+    (folder / f"{number}.json").write_text(json.dumps({"steps": steps_of(run), "episode_metadata": {"name": "x"}}))
+
+
+def write_step_lines(folder, run, number):
+    (folder / f"{number}.jsonl").write_text("\n".join(map(json.dumps, steps_of(run))))
+
+
+def write_step_arrays(folder, run, number):
+    arrays = {"steps/observation/q": run.angle, "steps/observation/p": run.pressure, "steps/action": run.pressure}
+    np.savez(folder / f"{number}.npz", **arrays)
+
+
+def write_step_groups(folder, run, number):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(folder / f"{number}.h5", "w") as file:
+        file["steps/observation/q"], file["steps/observation/p"] = run.angle, run.pressure
+        file["steps/action"] = run.pressure
+
+
+def write_step_table(folder, run, number):
+    pyarrow = pytest.importorskip("pyarrow")
+    parquet = pytest.importorskip("pyarrow.parquet")
+    parquet.write_table(pyarrow.Table.from_pylist(steps_of(run)), folder / f"{number}.parquet")
+
+
+RLDS = """
+sample_time = "10 ms"
+[angles]
+columns = "observation.q"
+[pressures]
+columns = "observation.p"
+[commands]
+columns = "action"
+"""
+
+
+@pytest.mark.parametrize(
+    "write", [write_steps, write_step_lines, write_step_arrays, write_step_groups, write_step_table]
+)
+def test_a_folder_of_steps_with_observation_and_action(tmp_path, mapping, write):
+    folder = tmp_path / "episodes"
+    folder.mkdir()
+    for number, run in enumerate(MADE.runs):
+        write(folder, run, number)
+    read = read_episodes(folder, mapping(RLDS))
+    for one, other in zip(read.runs, MADE.runs, strict=True):
+        np.testing.assert_allclose(one.angle, other.angle, rtol=1e-12)
+        np.testing.assert_allclose(one.pressure, other.pressure, rtol=1e-12)
+        np.testing.assert_array_equal(one.command, one.pressure)
+    assert f"{read.notes[0]}".startswith("3 episodes from 3 files (.")
+
+
+def test_flags_of_first_steps_split_one_table(tmp_path, mapping):
+    np.savez(
+        tmp_path / "all.npz", q=MADE.rows("angle"), p=MADE.rows("pressure"),
+        is_first=np.concatenate([np.arange(len(run)) == 0 for run in MADE.runs]),
+    )  # fmt: skip
+    text = 'sample_time = "10 ms"\nstarts = "is_first"\n[angles]\ncolumns = "q"\n[pressures]\ncolumns = "p"\n'
+    read = read_episodes(tmp_path / "all.npz", mapping(text))
+    assert [len(run) for run in read.runs] == [len(run) for run in MADE.runs]
+
+
+@pytest.fixture
+def bags(tmp_path):
+    """A folder with one ROS 2 bag for each episode: joint states and pressures, whose messages come unevenly."""
+    rosbag2 = pytest.importorskip("rosbags.rosbag2", reason="needs the package rosbags")
+    typesys = pytest.importorskip("rosbags.typesys", reason="needs the package rosbags")
+    store = typesys.get_typestore(typesys.Stores.ROS2_HUMBLE)
+    state, several = (store.types[n] for n in ("sensor_msgs/msg/JointState", "std_msgs/msg/Float64MultiArray"))
+    layout = store.types["std_msgs/msg/MultiArrayLayout"]([], 0)
+    header = store.types["std_msgs/msg/Header"](store.types["builtin_interfaces/msg/Time"](1, 0), "")
+    rng, folder = np.random.default_rng(0), tmp_path / "bags"
+    folder.mkdir()
+    for number, run in enumerate(MADE.runs):
+        with rosbag2.Writer(folder / f"episode{number}", version=9) as writer:
+            joints = writer.add_connection("/joint_states", state.__msgtype__, typestore=store)
+            pressures = writer.add_connection("/pressures", several.__msgtype__, typestore=store)
+            for k, (a, v, p) in enumerate(zip(run.angle, run.speed, run.pressure, strict=True)):
+                stamp = 10**9 + k * 10**7 + int(rng.uniform(-1e6, 1e6))
+                message = state(header, ["elbow"], a, v, np.array([]))
+                writer.write(joints, stamp, store.serialize_cdr(message, state.__msgtype__))
+                writer.write(pressures, stamp - 10**5, store.serialize_cdr(several(layout, p), several.__msgtype__))
+    return folder
+
+
+def test_a_folder_of_bags_is_read_by_its_proposed_mapping(bags, mapping):
+    text = propose_mapping(bags)
+    assert 'sample_time = "10 ms"' in text
+    read = read_episodes(bags, mapping(text))
+    assert len(read) == 3
+    assert read.sample_time == STEP
+    for one, other in zip(read.runs, MADE.runs, strict=True):
+        rows = min(len(one), len(other) - 1) - 1  # the first message, of the pressures, has no angle before it
+        assert rows > len(other) - 4
+        assert np.abs(one.angle - other.angle[1 : 1 + len(one)])[:rows].max() < 0.05 * np.ptp(other.angle)
+        assert np.abs(one.pressure - other.pressure[1 : 1 + len(one)])[:rows].max() < 0.1 * np.ptp(other.pressure)
+    assert "intervals of messages differ by" in "".join(read.notes)
+    alone = read_episodes(bags / "episode1", mapping(text))
+    np.testing.assert_array_equal(alone.runs[0].angle, read.runs[1].angle)
+
+
+def test_a_mapping_is_proposed_from_names_and_sizes(tmp_path, mapping):
+    np.savez(
+        tmp_path / "all.npz", start=np.cumsum([0, *map(len, MADE.runs)]), joint_angle=np.degrees(MADE.rows("angle")),
+        joint_speed=np.degrees(MADE.rows("speed")), pressure=MADE.rows("pressure") / 1e5, valve_command=MADE.rows("pressure"),
+        note=np.zeros(3),
+    )  # fmt: skip
+    text = propose_mapping(tmp_path / "all.npz")
+    read = read_episodes(tmp_path / "all.npz", mapping(text))
+    assert read.sample_time == pytest.approx(STEP, rel=0.05)  # with which the angles move as fast as the speeds
+    for name in ("angle", "speed", "pressure"):
+        np.testing.assert_allclose(read.rows(name), MADE.rows(name), rtol=1e-9, atol=1e-12)
+    assert read.runs[0].command is not None
+    assert "note (3,)" in text
+    shown = airmuscle("fit-joint", str(tmp_path / "all.npz"), "--inspect")
+    assert shown.exit_code != 0
+    assert "a mapping file is needed, which states what the columns are" in " ".join(shown.output.split())
+    assert 'unit = "deg"' in shown.output
+
+
 def test_one_file_for_all_with_starts_scales_and_divisors(tmp_path, mapping):
     lengths = np.cumsum([0, *map(len, MADE.runs)])
     np.savez(
@@ -151,6 +281,11 @@ def test_errors_of_an_episode(tmp_path, mapping, change, message):
 def test_a_folder_without_episodes_and_a_foreign_format_are_refused(tmp_path, mapping):
     (tmp_path / "empty").mkdir()
     with pytest.raises(FileError, match="the folder holds no file of episodes; supported are"):
+        read_episodes(tmp_path / "empty", mapping(COLUMNS))
+    (tmp_path / "empty" / "arm-train.tfrecord-00000-of-00001").write_bytes(b"x")
+    with pytest.raises(
+        FileError, match=r"TFRecord files are not read\. Write each episode with the package that made them"
+    ):
         read_episodes(tmp_path / "empty", mapping(COLUMNS))
     (tmp_path / "a.doc").write_text("x")
     with pytest.raises(FileError, match="no format of episodes; supported are"):

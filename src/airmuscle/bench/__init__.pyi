@@ -113,6 +113,7 @@ from .joint import estimate_angles as estimate_angles
 from .joint import fit_joint as fit_joint
 from .joint import fit_regulator_lags as fit_regulator_lags
 from .joint import inspect_episodes as inspect_episodes
+from .joint import propose_mapping as propose_mapping
 from .joint import read_episode_mapping as read_episode_mapping
 from .joint import read_episodes as read_episodes
 from .readers import BlockMeans as BlockMeans

@@ -2,6 +2,7 @@ from .episode_files import Channels as Channels
 from .episode_files import EpisodeMapping as EpisodeMapping
 from .episode_files import read_episode_mapping as read_episode_mapping
 from .episode_files import read_episodes as read_episodes
+from .episode_formats import propose_mapping as propose_mapping
 from .episode_inspection import EpisodeInspection as EpisodeInspection
 from .episode_inspection import PressureAction as PressureAction
 from .episode_inspection import inspect_episodes as inspect_episodes

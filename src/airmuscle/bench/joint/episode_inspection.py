@@ -83,6 +83,7 @@ class EpisodeInspection:
         lines = [
             f"{len(e)} episodes of {min(lengths)} to {max(lengths)} rows at {1 / e.sample_time:.4g} Hz, {total:.4g} s; "
             f"{e.joints} joints, {e.muscles} pressures that lag the motion by {self.delay} rows",
+            *e.notes,
             *(_range_line(f"angle {i}", np.degrees(x), "deg") for i, x in enumerate(e.rows("angle").T, 1)),
             *(_range_line(f"pressure {i}", x / 1e3, "kPa") for i, x in enumerate(e.rows("pressure").T, 1)),
             *map(str, self.actions),

@@ -39,8 +39,7 @@ from ...physics.muscle.characteristic import ContractileSurface
 from ...physics.muscle.geometry import Geometry
 from ...recording import Recording
 from ...report.chapter import Chapter, Table
-from .braid import check_one_length, with_braid
-from .fit import WEAK, FitRequest
+from .fit import WEAK, FitRequest, check_one_length, with_braid
 
 Progress = Callable[[str, float], None]
 """Called with a step and the fraction done."""

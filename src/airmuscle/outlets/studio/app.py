@@ -15,10 +15,7 @@ from typing import Any
 
 from ...core.errors import AirmuscleError
 from ...files.library.files import LAWS, PLANTS, list_laws, list_plants, read_toml
-from ..requests.braid import BraidRequest
-from ..requests.declaration import RequestError, form_fields
-from ..requests.fit import FitRequest
-from ..requests.reading import ReadingRequest
+from ..requests import BraidRequest, FitRequest, JointFitRequest, ReadingRequest, RequestError, form_fields
 from .fit_routes import FitService
 from .joint_sheet import joint_names, sheet_of_joint
 from .page import MAX_PAGE_SHEETS, self_contained_page, server_page, web_files
@@ -96,7 +93,8 @@ def library_list() -> dict[str, Any]:
     kinds = {"laws": (LAWS, list_laws()), "plants": (PLANTS, list_plants()), "joints": (PLANTS, joint_names())}
     rows = {kind: [_row(folder, name) for name in names] for kind, (folder, names) in kinds.items()}
     requests = (ReadingRequest, BraidRequest, FitRequest)
-    forms = {"size": size_form(), "fit": [field for each in requests for field in form_fields(each)]}
+    forms = {"size": size_form(), "fit": [field for each in requests for field in form_fields(each)],
+             "arm": form_fields(JointFitRequest)}  # fmt: skip
     return {"version": metadata.version("airmuscle"), **rows, "forms": forms}
 
 

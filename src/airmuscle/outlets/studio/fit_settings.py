@@ -19,10 +19,8 @@ from ...bench.segment.outliers import Outlier, kept_rows, leave_out
 from ...core.errors import AirmuscleError
 from ...core.units import quantity
 from ...files.library.files import list_laws
-from ..requests import fit
-from ..requests.braid import BraidRequest, BraidSize
-from ..requests.declaration import RequestError, build, form_fields
-from ..requests.reading import ReadingRequest
+from ..requests import SPLITS as GROUPS
+from ..requests import BraidRequest, BraidSize, ReadingRequest, RequestError, build, form_fields
 
 MAX_RULES = 200
 """Maximum number of selections of rows (chosen)."""
@@ -38,7 +36,7 @@ FILE_FACTS = ("resting_length", "length", "specimen")
 """Facts that may be stated for one file."""
 COLUMN_CHOICES = (*am.recording.QUANTITIES, "resting_length", "ambient")
 """Quantities of a column."""
-SPLITS: Mapping[str, am.bench.GroupSplit | None] = {"": None, **fit.SPLITS}
+SPLITS: Mapping[str, am.bench.GroupSplit | None] = {"": None, **GROUPS}
 """Groups that are left out in turn; by default those that the data allow."""
 _UNITS = {
     "braid_radius": "m",

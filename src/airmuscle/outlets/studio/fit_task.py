@@ -33,10 +33,7 @@ from ...report.chapter import Chapter
 from ...report.data import as_json, as_sheet, in_words
 from ...report.formula import to_display_mathml
 from ...report.write import write_into
-from ..requests.braid import problem_of_lengths
-from ..requests.declaration import RequestError
-from ..requests.fit import FitRequest
-from ..requests.fitting import fit_requested
+from ..requests import FitRequest, RequestError, fit_requested, problem_of_lengths
 from .fit_hints import as_field_error, in_page_words
 from .fit_reading import read_set
 from .fit_settings import SPLITS, FitSettings, selected

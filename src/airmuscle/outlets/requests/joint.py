@@ -1,0 +1,103 @@
+"""Request of the identification of an arm from episodes, and its computation: the chapter and the scenarios."""
+
+import dataclasses
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+
+from ...bench.joint import (
+    ArmFit,
+    EpisodeInspection,
+    EpisodeMapping,
+    fit_joint,
+    inspect_episodes,
+    read_episode_mapping,
+    read_episodes,
+)
+from ...bench.joint.episode_formats import propose_mapping
+from ...control.laws import PID, Cascade, CoContraction, Decentralised
+from ...files.library.write import model_table, scenario_toml
+from ...files.scenario.plant_uncertainty import uncertainty_table
+from ...report.chapter import Chapter
+from .declaration import RequestError, option, request
+
+DURATION, STEP = 2.0, 0.15
+"""Duration [s] of the scenarios, and step of the controlled one relative to the range of the angle (chosen)."""
+
+
+@request
+class JointFitRequest:
+    """What the identification of a joint is asked for."""
+
+    mapping: Path | None = option(
+        "Mapping file (TOML): which column is what. Without it one is proposed, and nothing is fitted.", default=None
+    )
+    inspect: bool = option("State what the record contains; fit nothing.", default=False)
+    left_out: float = option(
+        "Share of the episodes that judges the fit.", default=0.1, metavar="SHARE", bounds=(0.01, 0.9),
+        label="Share of the episodes that judges the fit", example="0.1", filled="0.1",
+    )  # fmt: skip
+    horizon: int = option(
+        "Rows of the free run.", default=40, bounds=(5, 1000), metavar="ROWS", label="Rows of the free run",
+        example="40", filled="40",
+    )  # fmt: skip
+    seed: int = option("Seed of the order of the windows.", default=0)
+
+
+def inspect_requested(source: Path, request: JointFitRequest) -> EpisodeInspection:
+    """What the record contains. Raises RequestError without a mapping file, with a proposal."""
+    rules = _mapping(source, request)
+    return inspect_episodes(read_episodes(source, rules), rules.pairs)
+
+
+def _mapping(source: Path, request: JointFitRequest) -> EpisodeMapping:
+    if request.mapping is None:
+        raise RequestError(
+            f"a mapping file is needed, which states what the columns are. Proposal for {source.name}, to be corrected "
+            f"and given as --mapping arm.toml:\n\n{propose_mapping(source)}",
+            "mapping",
+        )
+    return read_episode_mapping(request.mapping)
+
+
+def fit_requested_arm(
+    source: Path, request: JointFitRequest, progress: Callable[[str], None]
+) -> tuple[Chapter, dict[str, str]]:
+    """The chapter of the fit, and the scenarios by the names of their files.
+
+    Raises RequestError without a mapping file, IdentificationError, ParameterError and others of the fit.
+    """
+    rules = _mapping(source, request)
+    fit = fit_joint(
+        read_episodes(source, rules), pairs=rules.pairs, axes=rules.axes, left_out=request.left_out,
+        rows=request.horizon, seed=request.seed, progress=progress,
+    )  # fmt: skip
+    title = f"Arm identified from {source.name}"
+    return dataclasses.replace(fit.chapter(), title=title), _scenarios(fit, title)
+
+
+def _scenarios(fit: ArmFit, title: str) -> dict[str, str]:
+    """The arm with a pressure regulator for each muscle: at constant set points, and with a PID controller of
+    each angle to be tuned, which commands half the difference of the pressures of its pair."""
+    names = [muscle.name for muscle in fit.arm.muscle]
+    middle = np.median(fit.inspection.episodes.rows("pressure"), axis=0)
+    levels = [max(float(middle[muscle - 1]), 0.0) for pair in fit.pairs for muscle in pair]
+    held = {f"{name}.setpoint": [[0.0, level]] for name, level in zip(names, levels, strict=True)}
+    run = {"duration": DURATION, "initial_state": {"pressure": float(np.mean(levels))}}
+    ranges = np.ptp(np.quantile(fit.inspection.episodes.rows("angle"), (0.01, 0.99), axis=0), axis=0).tolist()
+    laws, wanted = [], {}
+    for j, (c, range_) in enumerate(zip(fit.arm.mechanism.coordinates, ranges, strict=True)):
+        mean = float(np.mean(levels[2 * j : 2 * j + 2]))
+        pair = CoContraction((f"{names[2 * j]}.setpoint", f"{names[2 * j + 1]}.setpoint"), mean)
+        laws.append(Cascade(PID(c.name, "difference", mean / range_, 0.5), pair, (-mean,), (mean,)))
+        wanted[c.name] = [[0.0, 0.0], [0.1, STEP * range_]]
+    controller = {**model_table(Decentralised(tuple(laws))), "sample_time": 0.01, "setpoint": wanted}
+    note = "supply, orifices and volumes are chosen"
+    tuned = f"{note}, and so are the gains: airmuscle tune finds better ones"
+    return {
+        "scenario.toml": scenario_toml(
+            title, fit.plant(), held, run, note, {"uncertainty": uncertainty_table(fit.uncertainty())}
+        ),
+        "controlled.toml": scenario_toml(f"{title}, controlled", fit.plant(), {"controller": controller}, run, tuned),
+    }
