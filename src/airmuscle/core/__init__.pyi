@@ -110,7 +110,6 @@ from .short_repr import describe_model as describe_model
 from .system import add_prefix as add_prefix
 from .system import select_prefix as select_prefix
 from .system import with_prefix as with_prefix
-from .tree import continues_list as continues_list
 from .tree import with_ambient as with_ambient
 from .units import AMBIENT_PRESSURE as AMBIENT_PRESSURE
 from .units import bar as bar

@@ -5,7 +5,6 @@ from .characteristic.reynolds2003 import Reynolds2003Damper as Reynolds2003Dampe
 from .characteristic.reynolds2003 import Reynolds2003Spring as Reynolds2003Spring
 from .characteristic.serres2009 import Serres2009Damper as Serres2009Damper
 from .characteristic.serres2009 import Serres2009Spring as Serres2009Spring
-from .isobar_plot import parameter_rows as parameter_rows
 from .isobars import compute_isobars as compute_isobars
 from .muscle import INNER_CONTRACTION as INNER_CONTRACTION
 from .muscle import Muscle as Muscle

@@ -2,13 +2,13 @@
 
 import dataclasses
 import textwrap
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
-from ...core import Array, continues_list, given_axes, leaves, legend_outside, new_figure, plotting
-from ...core.display import contraction_text, in_display_unit, quantity_text
+from ...core import Array, given_axes, legend_outside, new_figure, plotting
+from ...core.display import contraction_text, quantity_text
 from ...recording import Recording
 from ...report.chapter import Plot, Table, TableColumn
 from .characteristic import Characteristic, ValidityRange, validity_range_of
@@ -144,21 +144,6 @@ def plot_isobars(
     draw_isobars(axes, curves, title)
     legend_outside(axes, title="gauge pressure")
     return shown
-
-
-def parameter_rows(parts: dict[str, Any], last: Sequence[str] = ()) -> list[tuple[str, ...]]:
-    """Rows of a table of the parameters of several components, in display units; those named in `last` follow."""
-    order = [*(part for part in parts if part not in last), *(part for part in parts if part in last)]
-    rows: list[tuple[str, ...]] = []
-    for part in order:
-        for leaf in leaves(parts[part]):
-            value, unit = in_display_unit(leaf.value, leaf.declared.unit)
-            name = f"{part}.{leaf.path}".lstrip(".")
-            rows.append(
-                (name, leaf.declared.symbol, f"{value:.4g}", "" if unit == "1" else unit, leaf.declared.meaning)
-            )
-    continued = continues_list([row[0] for row in rows])
-    return [(*row[:-1], "") if further else row for row, further in zip(rows, continued, strict=True)]
 
 
 def component_rows(muscle: Any) -> list[tuple[str, ...]]:
