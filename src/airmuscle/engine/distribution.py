@@ -11,7 +11,7 @@ from concurrent.futures import BrokenExecutor, Executor, Future, as_completed
 from pathlib import Path
 from typing import Any
 
-from ..core.errors import SimulationError
+from ..core import SimulationError
 from .processes import check_running
 
 HEARTBEAT = 1.5

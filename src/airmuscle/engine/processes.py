@@ -17,8 +17,7 @@ from collections.abc import Callable, Iterator
 from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from typing import IO, Any
 
-from ..core import AirmuscleError, InputError, current_units
-from ..core.arrays import BLAS_THREADS, one_thread
+from ..core import BLAS_THREADS, AirmuscleError, InputError, current_units, one_thread
 from ..core.display import display
 
 Workers = int | Executor

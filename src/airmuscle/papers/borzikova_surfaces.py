@@ -10,7 +10,7 @@ import airmuscle as am
 from ..bench.identify.statistics import CorrelationIndex, correlation_index
 from ..bench.identify.surface.basis import LoadRange
 from ..bench.identify.surface.monotonicity import fit_monotone
-from ..core.errors import AirmuscleWarning
+from ..core import AirmuscleWarning
 from ..files.library.entry_file import load_law
 from ..physics.muscle.characteristic.borzikova import SAM_30X290, PlaneCurves
 

@@ -10,7 +10,7 @@ import airmuscle as am
 from ..bench.identify.surface.basis import Basis, Chebyshev, LoadRange, Monomials, conditioning
 from ..bench.identify.surface.exponential import SurfaceFit, fit_linearised, fit_nonlinear
 from ..bench.identify.surface.monotonicity import find_monotonicity_violations
-from ..core.units import bar, percent
+from ..core import bar, percent
 from ..physics.muscle.characteristic.borzikova import PlaneCurves
 from ..report.chapter import Table
 from .borzikova_surfaces import (

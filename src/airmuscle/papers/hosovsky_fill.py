@@ -6,7 +6,7 @@ import numpy as np
 
 import airmuscle as am
 
-from ..core.plotting import BLACK, LINES, new_figure
+from ..core import BLACK, LINES, new_figure
 from ..report.chapter import Plot
 from .hosovsky_plant import DISCHARGING, DURATION, FILLING, MATRIX, SCHEDULE, UnpublishedParameters, hanging_load, plant
 

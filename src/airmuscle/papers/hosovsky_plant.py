@@ -5,7 +5,7 @@ import functools
 
 import airmuscle as am
 
-from ..core.reference import CHOSEN, Reference
+from ..core import CHOSEN, Reference
 from ..files.library import catalogue
 from ..report.formatting import format_number, format_quantity, typographic
 

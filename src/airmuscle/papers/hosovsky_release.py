@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 import airmuscle as am
 
-from ..core.plotting import DASHES, LINES, legend_below, new_figure
+from ..core import DASHES, LINES, legend_below, new_figure
 from ..report.chapter import Plot, Table
 from ..report.claims import AtLeast, AtMost, Claim, ClaimRow
 from ..report.formatting import format_unit

@@ -11,7 +11,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
-from ..core.atomic_output import check_writable
+from ..core import check_writable
 from ..engine.processes import process_pool
 from ..files.library.files import complete_name
 from ..report.chapter import Chapter

@@ -6,7 +6,7 @@ import numpy as np
 
 import airmuscle as am
 
-from ..core.plotting import BLACK, DASHES, LINES, legend_outside, new_figure
+from ..core import BLACK, DASHES, LINES, legend_outside, new_figure
 from ..physics.muscle.characteristic.saga2007 import RUBBER_TEST_STRAIN
 from ..report.chapter import Plot
 from ..report.formula import to_mathtext

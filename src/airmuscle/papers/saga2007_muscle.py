@@ -7,7 +7,7 @@ import numpy as np
 
 import airmuscle as am
 
-from ..core.errors import SolveError
+from ..core import SolveError
 from ..physics.muscle.characteristic.saga2007 import LINE_A, LINE_B
 
 PAPER = "saga2007"

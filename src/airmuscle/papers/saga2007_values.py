@@ -9,7 +9,7 @@ import numpy as np
 
 import airmuscle as am
 
-from ..core.errors import SolveError
+from ..core import SolveError
 from .saga2007_muscle import (
     DEFAULT,
     DIAMETER,

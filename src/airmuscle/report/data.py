@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core.errors import printable
+from ..core import printable
 from .chapter import Chapter, Table
 from .formula import to_plain
 from .shown import rows_of, shown_columns, value_text

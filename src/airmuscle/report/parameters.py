@@ -4,7 +4,7 @@ import math
 from collections.abc import Iterable, Sequence
 from typing import Any, Protocol
 
-from ..core.tree import Leaf, leaves
+from ..core import Leaf, leaves
 from .chapter import BY_ROW, Table, TableColumn
 
 MAX_VALUES = 30

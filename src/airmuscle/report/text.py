@@ -5,7 +5,7 @@ import textwrap
 import unicodedata
 from collections.abc import Iterator, Sequence
 
-from ..core.errors import printable
+from ..core import printable
 from .chapter import Chapter, NamedValue, Table
 from .formula import to_plain
 from .shown import ShownColumn, shown_columns, value_cells

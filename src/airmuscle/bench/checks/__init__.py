@@ -5,12 +5,10 @@ the recordings that yields a text with what was found, in which files, how much,
 reads files issues them as warnings, and every static fit repeats them in its notes.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 
-from ...core.errors import AirmuscleWarning
+from ...core import AirmuscleWarning
 from ...recording.recording import Recording
 from .contractions import (
     check_contraction_limit,

@@ -1,17 +1,14 @@
 """Rows of the recordings of a bench for its checks: joined columns, robust limits, lines of force over pressure."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from ...core.arrays import Array
+from ...core import Array
 from ...recording.recording import Recording
-from ..segment.interval import remembered
-from ..segment.sensor import estimate_sensors
+from ..segment import estimate_sensors, remembered
 
 MIN_FORCE = 0.05
 """Minimum force of a row that surely pulls, as a fraction of the maximum force (chosen)."""
@@ -51,11 +48,11 @@ class BenchRows(NamedTuple):
     force: Array
 
     @classmethod
-    def of(cls, recordings: Sequence[Recording]) -> BenchRows:
+    def of(cls, recordings: Sequence[Recording]) -> "BenchRows":
         """The rows of the recordings that have all three quantities."""
         return _rows_of(recordings)
 
-    def at(self, rows: npt.NDArray[np.bool_]) -> BenchRows:
+    def at(self, rows: npt.NDArray[np.bool_]) -> "BenchRows":
         """The rows of a mask (N,)."""
         return BenchRows(*(column[rows] for column in self))
 
@@ -65,12 +62,12 @@ class BenchRows(NamedTuple):
         return limits(self.force)[1] if self.force.size else 0.0
 
     @property
-    def shortened(self) -> BenchRows:
+    def shortened(self) -> "BenchRows":
         """The rows at the resting length and shorter."""
         return self.at(self.contraction > -MAX_ELONGATION)
 
     @property
-    def pulling(self) -> BenchRows:
+    def pulling(self) -> "BenchRows":
         """The rows whose force is above `MIN_FORCE`."""
         return self.at(self.force > MIN_FORCE * self.greatest)
 

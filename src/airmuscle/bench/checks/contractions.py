@@ -1,16 +1,12 @@
 """Checks of columns: codes of missing values, and the contraction with its sign, elongation, percent and limit."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from ...core.arrays import Array
-from ...core.errors import ColumnError, Hint, HintedText, UnitError
-from ...core.units import STANDARD_GRAVITY, conversion
+from ...core import STANDARD_GRAVITY, Array, ColumnError, Hint, HintedText, UnitError, conversion
 from ...recording.columns import quantity_of
 from ...recording.recording import Recording
 from ..readers.missing_values import DropMissing

@@ -1,13 +1,10 @@
 """Checks of pressure and force: absolute pressure in place of gauge, limits, sign and zero of the force."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from ...core.errors import Hint, HintedText, UnitError
-from ...core.units import AMBIENT_PRESSURE, conversion
+from ...core import AMBIENT_PRESSURE, Hint, HintedText, UnitError, conversion
 from ...recording.recording import Recording
 from .bench_rows import BenchRows, PressureLine, file_list, limits, pressure_lines, recordings_with
 

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from ...core.errors import Hint, HintedText
+from ...core import Hint, HintedText
 from ...recording import Recording
 from ...report.chapter import NamedValue
 from ..checks import find_suspicious, without_missing_codes

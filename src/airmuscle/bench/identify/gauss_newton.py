@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ...core.arrays import Array
+from ...core import Array
 from .problem import FitProblem
 
 BoolArray = npt.NDArray[np.bool_]

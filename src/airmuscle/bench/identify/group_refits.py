@@ -22,7 +22,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ...core.arrays import Array
+from ...core import Array
 from .gauss_newton import (
     MIN_EIGENVALUE,
     FirstStep,

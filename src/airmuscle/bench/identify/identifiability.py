@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from ...core.arrays import Array
+from ...core import Array
 
 MAX_RELATIVE_ERROR = 0.5
 """Relative standard error above which a combination of parameters counts as undetermined; chosen."""

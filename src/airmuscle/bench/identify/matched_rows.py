@@ -12,7 +12,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from ...core.arrays import Array
+from ...core import Array
 from ...recording import Recording
 from ...recording.columns import quantity_of
 from ..segment import branch_directions, find_branches, find_runs

@@ -18,7 +18,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ...core.arrays import Array
+from ...core import Array
 from .model_evidence import lag_one_autocorrelation, student_quantile
 
 ROWS, PARTS, RUNS, SPECIMENS = "rows", "parts", "runs", "specimens"

@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ...core.arrays import Array, as_slice
+from ...core import Array, as_slice
 from .model_evidence import student_quantile
 from .parameter_covariance import (
     LEAST_DEGREES_OF_FREEDOM,

@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ...core.arrays import Array
+from ...core import Array
 from .parameter_covariance import NORMAL_QUANTILE
 from .pooled_covariance import PooledCovariance, Sums
 from .variable_projection import shortened_step

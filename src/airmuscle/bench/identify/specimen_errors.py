@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...core.errors import AirmuscleError, Hint, HintedText
+from ...core import AirmuscleError, Hint, HintedText
 from ...physics.muscle.characteristic.base import Characteristic
 from ...recording import Recording
 from .candidate_scores import FoldScore, RankedModel

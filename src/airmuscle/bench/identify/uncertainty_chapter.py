@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.plotting import BLACK, BLUE, DASHES, LINES, RED, legend_below, legend_outside, new_figure
+from ...core import BLACK, BLUE, DASHES, LINES, RED, legend_below, legend_outside, new_figure
 from ...report.chapter import BY_ROW, Chapter, NamedValue, Plot, Table, TableColumn
 from ...report.formula import symbol_formula, to_mathtext
 from . import Bootstrap, Fit, LengthError, ProfileLikelihood, ShapeConstrainedFit

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ...core.arrays import Array
+from ...core import Array
 from .problem import FitProblem
 
 RANK_TOLERANCE = 1e-10

@@ -3,8 +3,6 @@
 Every file reader returns RawTables, and `interpret` converts them to Recordings.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -12,8 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ...core.arrays import Array
-from ...core.errors import ColumnError
+from ...core import Array, ColumnError
 from ...recording.heading import find_quantity_name, split_unit
 
 Cells = npt.NDArray[np.float64] | list[str]

@@ -1,7 +1,5 @@
 """Constants of a run, by the user, a comment or a column with one value, and division of a table by its specimens."""
 
-from __future__ import annotations
-
 import dataclasses
 import re
 from collections.abc import Mapping
@@ -10,9 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ...core.arrays import Array
-from ...core.errors import ColumnError
-from ...core.units import conversion, quantity
+from ...core import Array, ColumnError, conversion, quantity
 from .channels import Cells, RawTable
 
 SPECIMEN = "specimen"

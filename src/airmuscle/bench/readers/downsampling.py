@@ -1,7 +1,5 @@
 """Downsampling of very long recordings, reported in a note, and reading of long columns by pieces."""
 
-from __future__ import annotations
-
 import abc
 import dataclasses
 import math
@@ -11,8 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ...core.annotation import check_field_types
-from ...core.errors import ColumnError, ParameterError
+from ...core import ColumnError, ParameterError, check_field_types
 from ...recording.recording import RowNote
 from .channels import Cells, RawTable
 
@@ -96,7 +93,7 @@ class Reduction:
     step: int
 
     @classmethod
-    def of(cls, sizes: Iterable[int], downsampling: Downsampling) -> Reduction:
+    def of(cls, sizes: Iterable[int], downsampling: Downsampling) -> "Reduction":
         """That of columns of these sizes, by the longest one."""
         longest = max(sizes, default=0)
         return cls(longest, downsampling.step(longest) if longest else 1)

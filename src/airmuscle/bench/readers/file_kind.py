@@ -3,8 +3,6 @@
 A pipe or a device may have no end, and the contents of a binary file are no table.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import stat
@@ -12,7 +10,7 @@ import tomllib
 from pathlib import Path
 from typing import Any
 
-from ...core.errors import FileError
+from ...core import FileError
 
 _SIGNATURES = (
     (b"\x89PNG", "a PNG image"), (b"\xff\xd8\xff", "a JPEG image"), (b"GIF8", "a GIF image"), (b"BM", "a BMP image"),

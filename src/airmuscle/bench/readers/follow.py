@@ -1,7 +1,5 @@
 """Follower of a growing table: rows of a file, a pipe or a serial log as they arrive, in SI units."""
 
-from __future__ import annotations
-
 import contextlib
 import csv
 import time
@@ -11,9 +9,7 @@ from typing import Any, TextIO
 
 import numpy as np
 
-from ...core.annotation import abridged
-from ...core.errors import ColumnError, FileError, ParameterError
-from ...core.units import AMBIENT_PRESSURE, UnitConversion
+from ...core import AMBIENT_PRESSURE, ColumnError, FileError, ParameterError, UnitConversion, abridged
 from ...recording.columns import displacement_columns
 from ...recording.heading import find_quantity_name
 from .channels import RawTable

@@ -1,15 +1,12 @@
 """Quantities and units in headings, and values in the names of files by a pattern."""
 
-from __future__ import annotations
-
 import itertools
 import json
 import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from ...core.errors import ColumnError, Hint, UnitError
-from ...core.units import conversion
+from ...core import ColumnError, Hint, UnitError, conversion
 from ...recording.heading import parse_heading
 from .constants import CONSTANT_UNITS, parse_constant_name
 

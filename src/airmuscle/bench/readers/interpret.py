@@ -3,16 +3,13 @@
 Units are converted, absolute pressures become gauge pressures, and implausible values are rejected.
 """
 
-from __future__ import annotations
-
 import contextlib
 import difflib
 from collections.abc import Mapping
 
 import numpy as np
 
-from ...core.arrays import Array
-from ...core.errors import ColumnError, Hint, HintedText, UnitError, listed, suggestion
+from ...core import Array, ColumnError, Hint, HintedText, UnitError, listed, suggestion
 from ...core.units import AMBIENT_PRESSURE, STANDARD_GRAVITY, UnitConversion, conversion, quantity
 from ...recording.columns import QUANTITIES, displacement_columns, proposal
 from ...recording.heading import UNIT_SPELLINGS, Heading, find_quantity_name, parse_heading

@@ -25,15 +25,12 @@ temperature = "20 °C"
 spare = ""
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ...core.annotation import abridged, check_field_types
-from ...core.errors import AirmuscleError, ColumnError, ParameterError, listed, suggestion
+from ...core import AirmuscleError, ColumnError, ParameterError, abridged, check_field_types, listed, suggestion
 from ...recording.columns import QUANTITIES
 from ...recording.heading import parse_heading
 from .channels import RawTable

@@ -4,8 +4,6 @@ Of version 7.3, which is HDF5, at most a piece of one dataset is in memory at on
 variables are compressed as a whole, it is one variable where one is long; a struct is one variable.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import warnings
 from collections.abc import Mapping
@@ -14,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.arrays import Array
+from ...core import Array
 from .downsampling import Downsampling, Reduction, check_reduced_lengths, read_reduced
 from .raw_columnar import check_no_external_links, check_own_values
 from .separate_process import import_lab_package

@@ -4,8 +4,6 @@ MATLAB stores an object as an opaque variable, whose values are in a separate pa
 decodes it; without the package the variables are found by their headers.
 """
 
-from __future__ import annotations
-
 import struct
 import zlib
 from collections.abc import Iterator, Mapping, Sequence
@@ -14,7 +12,7 @@ from typing import IO, Any, NamedTuple
 
 import numpy as np
 
-from ...core.arrays import Array
+from ...core import Array
 from .separate_process import import_lab_package, is_installed
 
 READABLE = ("table", "timetable")

@@ -1,7 +1,5 @@
 """Missing values: cells that are empty, markers, stated codes or no numbers; refused, left out or interpolated."""
 
-from __future__ import annotations
-
 import abc
 import dataclasses
 import math
@@ -11,9 +9,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from ...core.annotation import check_field_types, one_line
-from ...core.arrays import Array
-from ...core.errors import ColumnError, Hint, HintedText
+from ...core import Array, ColumnError, Hint, HintedText, check_field_types, one_line
 from ...recording.heading import Heading
 from ...recording.recording import RowNote, list_rows
 from .channels import Cells, RawTable

@@ -3,8 +3,6 @@
 Two files with similar numbers under different units contradict each other: at least one of the units is wrong.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 import warnings
@@ -12,9 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from ...core.arrays import Array
-from ...core.errors import AirmuscleWarning, ColumnError, Hint, HintedText, UnitError
-from ...core.units import STANDARD_GRAVITY, conversion
+from ...core import STANDARD_GRAVITY, AirmuscleWarning, Array, ColumnError, Hint, HintedText, UnitError, conversion
 from ...recording.columns import quantity_of
 from ...recording.heading import Heading
 from ...recording.recording import Recording

@@ -1,7 +1,5 @@
 """Readers of Parquet and HDF5 files: columns with their names and units."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -10,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core.errors import FileError, suggestion
+from ...core import FileError, suggestion
 from .channels import Channel, RawTable, merge_channels
 from .downsampling import Decimation, Downsampling, Reduction, check_reduced_lengths, read_reduced, with_reduction
 from .separate_process import import_lab_package, read_in_separate_process, run_reader

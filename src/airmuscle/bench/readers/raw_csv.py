@@ -1,7 +1,5 @@
 """Reader of text tables: from bytes to an uninterpreted RawTable; large tables and streams are read in chunks."""
 
-from __future__ import annotations
-
 import codecs
 import itertools
 import re
@@ -11,8 +9,7 @@ from typing import BinaryIO
 
 import numpy as np
 
-from ...core.annotation import abridged
-from ...core.errors import ColumnError, FileError, Hint
+from ...core import ColumnError, FileError, Hint, abridged
 from ...recording.recording import list_rows
 from .channels import Cells, RawTable
 from .downsampling import Decimation, Downsampling, downsample

@@ -4,8 +4,6 @@ Also supported: a matrix next to a list of column names (`importdata` writes `da
 structure with time that Simulink saves; tables and timetables with the package mat-io.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -13,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.errors import ColumnError, FileError, Hint, suggestion
+from ...core import ColumnError, FileError, Hint, suggestion
 from ...recording.heading import parse_heading
 from .channels import Channel, RawTable, merge_channels
 from .downsampling import Decimation, Downsampling, Reduction, with_reduction

@@ -1,7 +1,5 @@
 """Readers of MDF 3 and 4 (ASAM) and of TDMS (LabVIEW): one table for each group of channels."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 from collections.abc import Iterator
@@ -10,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.arrays import Array
-from ...core.errors import FileError, listed, suggestion
+from ...core import Array, FileError, listed, suggestion
 from .channels import Channel, RawTable, merge_channels
 from .downsampling import Decimation, Downsampling, read_reduced
 from .separate_process import import_lab_package, read_in_separate_process, run_reader

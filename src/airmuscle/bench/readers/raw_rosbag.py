@@ -1,7 +1,5 @@
 """Reader of ROS bags: numbers of all topics as channels with the times of their messages, and the units of messages."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Iterator
 from pathlib import Path
@@ -9,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.errors import FileError
+from ...core import FileError
 from .channels import Channel, RawTable, merge_channels
 from .separate_process import import_lab_package, run_reader
 

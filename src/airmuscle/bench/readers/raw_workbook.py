@@ -1,14 +1,12 @@
 """Reader of workbooks (.xlsx, .xlsm, .xls, .ods): one table for each worksheet that contains one."""
 
-from __future__ import annotations
-
 import datetime
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ...core.errors import ColumnError, FileError, listed, suggestion
+from ...core import ColumnError, FileError, listed, suggestion
 from .channels import Cells, RawTable
 from .header import (
     COMMA_NUMBER,

@@ -1,15 +1,12 @@
 """Reader of laboratory files: one file, several files, a glob pattern or a folder; the extension gives the format."""
 
-from __future__ import annotations
-
 import dataclasses
 import glob
 import sys
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 
-from ...core.annotation import abridged
-from ...core.errors import FileError, ParameterError, printable
+from ...core import FileError, ParameterError, abridged, printable
 from ...recording.recording import Recording
 from ..checks import warn_of_suspicious_values
 from ..segment.outliers import without_outliers

@@ -1,7 +1,5 @@
 """Optional packages that read laboratory formats (extra `lab`), and a separate process for readers in native code."""
 
-from __future__ import annotations
-
 import importlib
 import importlib.util
 import threading
@@ -10,7 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
-from ...core.errors import AirmuscleError, FileError
+from ...core import AirmuscleError, FileError
 from ...engine.processes import Worker, WorkerError
 from .file_kind import check_regular_file
 

@@ -1,15 +1,12 @@
 """Text table format: encoding, delimiter, decimal sign, headings and units."""
 
-from __future__ import annotations
-
 import codecs
 import csv
 import dataclasses
 import re
 from collections.abc import Mapping
 
-from ...core.annotation import abridged
-from ...core.errors import FileError, ParameterError, listed
+from ...core import FileError, ParameterError, abridged, listed
 from .header import (
     are_headings,
     count_cells,
@@ -60,7 +57,7 @@ class TextFormat:
         sign = next((d for d in "\t;" if d in line), "|" if "|" in line and "," not in line else "")
         return self.delimiter or sign or (" " if _are_numbers_and_blanks(line) else ",")
 
-    def with_blanks(self, body: NumberedLines) -> TextFormat:
+    def with_blanks(self, body: NumberedLines) -> "TextFormat":
         """The format with blanks as the delimiter, if none is given and they separate the first numbers of a table."""
         if self.delimiter is None:
             for _, line in body:

@@ -3,8 +3,6 @@
 Loggers round time stamps: at 530 rows per second, stamps of 1 ms repeat. The rows themselves are then uniform in time.
 """
 
-from __future__ import annotations
-
 import abc
 import dataclasses
 import datetime
@@ -13,9 +11,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...core.annotation import check_field_types
-from ...core.arrays import Array
-from ...core.errors import ColumnError, Hint, HintedText
+from ...core import Array, ColumnError, Hint, HintedText, check_field_types
 from .channels import RawTable
 
 _GERMAN_DATE = re.compile(r"(\d{1,2})\.(\d{1,2})\.(\d{4})[ T](.+)")

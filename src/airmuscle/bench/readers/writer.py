@@ -1,7 +1,5 @@
 """Writer of recordings as CSV, Parquet and HDF5, by the extension, and conversion to and from pandas and xarray."""
 
-from __future__ import annotations
-
 import csv
 import json
 from collections.abc import Callable, Mapping, Sequence
@@ -10,9 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.annotation import abridged, one_line
-from ...core.atomic_output import atomic_file
-from ...core.errors import AirmuscleError, FileError, ParameterError
+from ...core import AirmuscleError, FileError, ParameterError, abridged, atomic_file, one_line
 from ...recording.heading import split_unit
 from ...recording.recording import Recording, column_heading
 from .channels import Cells, RawTable, to_cells

@@ -38,6 +38,7 @@ from .static_points import find_static_points as find_static_points
 # For the other rooms, not in __all__
 from .branches import branch_name as branch_name
 from .inspection_chapter import inspection_chapters as inspection_chapters
+from .interval import Mask as Mask
 from .interval import level_intervals as level_intervals
 from .interval import remembered as remembered
 from .interval import running_median as running_median

@@ -8,15 +8,13 @@ placed at the last row before the quantity leaves the level of the dwell. A bran
 `branch_column_agreement` compares it with the result.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 from collections.abc import Iterator
 
 import numpy as np
 
-from ...core.arrays import Array
+from ...core import Array
 from ...recording.recording import Recording
 from .interval import Interval, remembered, running_median
 from .runs import AT_REST, ISOBARIC, ISOMETRIC, ISOTONIC, Run, find_runs, moved_column

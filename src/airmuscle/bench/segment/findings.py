@@ -1,13 +1,11 @@
 """Findings: data-quality problems of a recording and their remedies."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from ...core.errors import ColumnError, Hint, HintedText
+from ...core import ColumnError, Hint, HintedText
 from ...recording.columns import ZERO_NOT_STATED, quantity_of
 from ...recording.recording import Recording
 from ..readers.time_base import UNIFORM, WITHOUT_TIME

@@ -1,16 +1,12 @@
 """Inspection: sampling, sensors, runs, branches, plateaus and data quality of a recording, before any fit."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from ...core.arrays import Array
-from ...core.plotting import BLUE, GREEN, ORANGE, PURPLE, RED, legend_below, new_figure
-from ...core.short_repr import ShortRepr
+from ...core import BLUE, GREEN, ORANGE, PURPLE, RED, Array, ShortRepr, legend_below, new_figure
 from ...recording.columns import display_scale
 from ...recording.recording import Recording
 from .branches import Branch, branch_column_agreement, find_branches

@@ -1,7 +1,5 @@
 """Report chapters: the inspection of recordings, each with its columns, runs, branches, plateaus and findings."""
 
-from __future__ import annotations
-
 import dataclasses
 import re
 from collections.abc import Iterator, Sequence
@@ -9,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.display import quantity_text
-from ...core.errors import HintedText
+from ...core import HintedText, quantity_text
 from ...recording.columns import display_scale, quantity_of
 from ...report.chapter import BY_ROW, Chapter, NamedValue, Plot, Table, TableColumn
 from ..readers.constants import CONSTANT_QUANTITIES

@@ -1,7 +1,5 @@
 """Intervals of consecutive rows in which a quantity stays within a band; results remembered with their recordings."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import weakref
@@ -11,7 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 import numpy.typing as npt
 
-from ...core.arrays import Array
+from ...core import Array
 from ...recording.recording import Recording
 
 Analysis = TypeVar("Analysis", bound=Callable[..., Any])

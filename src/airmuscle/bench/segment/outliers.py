@@ -5,15 +5,13 @@ of the sensor, while those rows agree with each other. The overshoot of a step i
 it are at another level. Nor is the turning point of a ramp, because it lies on a line through the rows before or after.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
 
-from ...core.arrays import Array
+from ...core import Array
 from ...recording.columns import display_scale
 from ...recording.recording import Recording, RowNote
 from .sensor import Sensor, estimate_sensors

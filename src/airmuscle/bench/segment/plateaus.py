@@ -5,14 +5,12 @@ A row is quasi-static if the pressure, and the length if measured, change within
 a muscle of usual size follows its pressure, and a change of 1 % is negligible for a static fit.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Collection, Iterator, Mapping, Sequence
 
 import numpy as np
 
-from ...core.arrays import Array
+from ...core import Array
 from ...recording.columns import MOVED
 from ...recording.recording import Recording
 from .interval import Interval, Mask, level_intervals, running_median, true_intervals

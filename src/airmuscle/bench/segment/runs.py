@@ -8,8 +8,6 @@ most rows. A pressure that oscillates within `RIPPLE_BAND` while the muscle is m
 counts as constant.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 from collections import deque
@@ -17,7 +15,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from ...core.arrays import Array
+from ...core import Array
 from ...recording.columns import MOVED
 from ...recording.recording import Recording
 from .interval import Interval, level_intervals, remembered

@@ -1,7 +1,5 @@
 """Sensors and sampling of a recording: resolution, noise and limits; sample time, jitter, gaps, repeated times."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
@@ -9,8 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from ...core.arrays import Array
-from ...core.errors import ParameterError
+from ...core import Array, ParameterError
 from ...recording.columns import quantity_of
 from ...recording.recording import Recording
 from .interval import Mask, remembered, true_intervals

@@ -1,13 +1,11 @@
 """Static points: a force map without time, whose rows are steady states at levels of pressure and of length."""
 
-from __future__ import annotations
-
 import dataclasses
 
 import numpy as np
 import numpy.typing as npt
 
-from ...core.arrays import Array
+from ...core import Array
 from ...recording.columns import MOVED
 from ...recording.recording import Recording
 from .interval import remembered

@@ -1,13 +1,11 @@
 """Values of state estimators: estimates, innovations, measured rows, and the arrays of a compiled filter."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-from ...core.arrays import Array
+from ...core import Array
 
 
 class StateEstimate(NamedTuple):

@@ -1,7 +1,5 @@
 """FiniteControlSet: model predictive control that chooses among the modes of on/off valves."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 from collections.abc import Mapping, Sequence
@@ -9,12 +7,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from ...core.annotation import check_field_types
-from ...core.arrays import Array
-from ...core.diagnostics import Status
-from ...core.errors import ParameterError, SolveError
-from ...core.reference import Reference
-from ...core.short_repr import ShortRepr
+from ...core import Array, ParameterError, Reference, ShortRepr, SolveError, Status, check_field_types
 from ...engine.compile.cache.kernel import Kernel
 from ...engine.compile.function import augmented_rates
 from ...engine.compile.program import compile_system

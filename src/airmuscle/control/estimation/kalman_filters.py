@@ -1,17 +1,12 @@
 """Nonlinear Kalman filters of a plant, extended and unscented, and their consistency."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 from typing import Any, ClassVar
 
 import numpy as np
 
-from ...core.annotation import check_whole
-from ...core.arrays import Array
-from ...core.errors import ParameterError
-from ...core.reference import Reference
+from ...core import Array, ParameterError, Reference, check_whole
 from ...engine.compile.cache.kernel import Kernel
 from ...recording.recording import Recording
 from .estimates import BoundFilter, StateEstimate

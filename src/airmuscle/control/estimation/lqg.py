@@ -1,15 +1,11 @@
 """Designs of a sampled state feedback with observer: linear-quadratic Gaussian, active disturbance rejection."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ...core.arrays import Array
-from ...core.errors import ParameterError
-from ...core.reference import Reference
+from ...core import Array, ParameterError, Reference
 from ...physics.analysis.linear_model import LinearModel
 from ...physics.analysis.sampled_model import held
 from ..laws.state_feedback import StateFeedback

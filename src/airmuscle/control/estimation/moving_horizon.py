@@ -1,19 +1,12 @@
 """Moving horizon estimation: the states of a window of samples with the least squared noise, within bounds."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from ...core.annotation import check_field_types
-from ...core.arrays import Array
-from ...core.diagnostics import Status
-from ...core.errors import ParameterError, SolveError
-from ...core.reference import Reference
-from ...core.short_repr import ShortRepr
+from ...core import Array, ParameterError, Reference, ShortRepr, SolveError, Status, check_field_types
 from ...engine.compile.cache.kernel import Kernel
 from ...recording.recording import Recording
 from .estimates import StateEstimate

@@ -1,18 +1,12 @@
 """NonlinearModelPredictive: model predictive control with the equations of the plant, solved by CasADi."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from ...core.annotation import check_field_types
-from ...core.arrays import Array
-from ...core.errors import ParameterError
-from ...core.reference import Reference
-from ...core.short_repr import ShortRepr
+from ...core import Array, ParameterError, Reference, ShortRepr, check_field_types
 from ...engine.compile.program import compile_system
 from ...engine.loop.controller import Measurement, MultivariableController, failure_notes
 from ...physics.analysis.linear_model import linearise

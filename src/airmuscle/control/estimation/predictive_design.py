@@ -1,13 +1,10 @@
 """Design of linear model predictive control for a linearised plant."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ...core.arrays import Array
-from ...core.errors import ParameterError
+from ...core import Array, ParameterError
 from ...physics.analysis.linear_model import LinearModel
 from ..laws.linear_model_predictive import CondensedProblem, LinearModelPredictive, ObserverModel, TargetMap
 from .riccati import (

@@ -1,15 +1,12 @@
 """Nonlinear programs of predictive control: target and plan of a plant as CasADi expressions, solved by Ipopt."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from ...core.arrays import Array
-from ...core.system import System
+from ...core import Array, System
 
 MAX_HORIZON = 200
 """Maximum number of samples of a horizon, and of steps of a sample (chosen)."""
@@ -46,7 +43,7 @@ class PredictiveProgram:
     substeps: int
     sample_time: float
 
-    def programs(self) -> Programs:
+    def programs(self) -> "Programs":
         """The solvers of both programs."""
         import casadi
 

@@ -1,13 +1,10 @@
 """Designs of linear controllers: checks of their arguments, sampled plants, steady states and gains."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from ...core.arrays import Array
-from ...core.errors import ParameterError, suggestion
+from ...core import Array, ParameterError, suggestion
 from ...physics.analysis.linear_model import LinearModel
 from ...physics.analysis.sampled_model import held
 

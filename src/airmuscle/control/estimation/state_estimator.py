@@ -1,7 +1,5 @@
 """State estimators of a plant: estimates, innovations, and the interface of the nonlinear Kalman filters."""
 
-from __future__ import annotations
-
 import abc
 import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
@@ -9,13 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core import tree
-from ...core.annotation import check_field_types
-from ...core.arrays import Array
-from ...core.diagnostics import Status
-from ...core.errors import ParameterError, SolveError
-from ...core.short_repr import ShortRepr
-from ...core.system import System
+from ...core import Array, ParameterError, ShortRepr, SolveError, Status, System, check_field_types, tree
 from ...engine.compile.cache.kernel import evaluate
 from ...engine.compile.function import AugmentedRates, augmented_rates, states_and_outputs
 from ...engine.compile.program import CompiledSystem, compile_system

@@ -1,17 +1,10 @@
 """Angle and stiffness of an antagonistic joint: inverse of its statics, and feedback of the angle."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import ClassVar
 
-from ...core import autodiff, ops
-from ...core.declaration import model, parameter
-from ...core.errors import ParameterError
-from ...core.ops import Value
-from ...core.reference import Reference
-from ...engine.loop.control_law import ControlLaw, Memory, Sampled
-from ...engine.loop.controller import Measurement
+from ...core import ParameterError, Reference, Value, autodiff, model, ops, parameter
+from ...engine.loop import ControlLaw, Measurement, Memory, Sampled
 from ...physics.mechanism.base import Mechanism
 from ...physics.muscle.characteristic.tondu_lopez2000 import TONDU_LOPEZ_2000
 from ...physics.muscle.muscle import Muscle

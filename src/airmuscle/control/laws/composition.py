@@ -1,20 +1,12 @@
 """Laws composed of laws: cascade, feed-forward beside feedback, scheduled parameters."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from ...core import ops
-from ...core.declaration import Parameter, model, parameter
-from ...core.errors import ParameterError
-from ...core.ops import Value
-from ...core.reference import Reference
+from ...core import Parameter, ParameterError, Reference, Value, leaves, model, ops, parameter, unflatten
 from ...core.system import select_prefix, united, with_prefix
-from ...core.tree import leaves, unflatten
-from ...engine.loop.control_law import ControlLaw, EnclosingLaw, Memory, Sampled
-from ...engine.loop.controller import Measurement, parameter_units
+from ...engine.loop import ControlLaw, EnclosingLaw, Measurement, Memory, Sampled, parameter_units
 from .pid import ASTROM_HAGGLUND1995
 
 

@@ -1,16 +1,10 @@
 """ComputedTorque: exact linearisation of an antagonistic joint by the pressures of its two muscles."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import ClassVar
 
-from ...core.declaration import model, parameter
-from ...core.errors import ParameterError
-from ...core.ops import Value
-from ...core.reference import Reference
-from ...engine.loop.control_law import ControlLaw, Memory, Sampled
-from ...engine.loop.controller import Measurement
+from ...core import ParameterError, Reference, Value, model, parameter
+from ...engine.loop import ControlLaw, Measurement, Memory, Sampled
 from .angle_and_stiffness import AntagonisticInverse
 
 SPONG2020 = Reference(

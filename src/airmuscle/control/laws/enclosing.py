@@ -1,18 +1,9 @@
 """Laws around another one: sampling, delays and limits of its signals, manual operation, and the fault of a valve."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
-from ...core import ops
-from ...core.declaration import model, parameter
-from ...core.errors import ParameterError, suggestion
-from ...core.ops import Value
-from ...core.reference import Reference
-from ...core.system import select_prefix, with_prefix
-from ...engine.loop.control_law import ControlLaw, EnclosingLaw, Memory, Sampled
-from ...engine.loop.controller import Measurement
-from ...engine.loop.sensors import LECUYER1999, STATE, drawn, seeded
+from ...core import ParameterError, Reference, Value, model, ops, parameter, select_prefix, suggestion, with_prefix
+from ...engine.loop import LECUYER1999, STATE, ControlLaw, EnclosingLaw, Measurement, Memory, Sampled, drawn, seeded
 from .pid import ASTROM_HAGGLUND1995
 from .state_feedback import FRANKLIN1998
 

@@ -1,19 +1,12 @@
 """Laws around another one that filter its signals: by a notch, the model of a dead time, or that of a period."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
 import numpy as np
 
-from ...core import ops
-from ...core.declaration import Parameter, model, parameter
-from ...core.errors import ParameterError
-from ...core.ops import Value
-from ...core.reference import Reference
-from ...core.system import select_prefix, with_prefix
+from ...core import Parameter, ParameterError, Reference, Value, model, ops, parameter, select_prefix, with_prefix
 from ...engine.loop.control_law import Commanded, ControlLaw, EnclosingLaw, Memory, Sampled, SplitRange, inputs_of
 from ...engine.loop.controller import Measurement, relative_unit
 from .enclosing import MAX_SAMPLES
@@ -51,14 +44,14 @@ class WithFilter(EnclosingLaw):
     @classmethod
     def notch(
         cls, law: ControlLaw, column: str, frequency: float, *, depth: float = 0.1, damping: float = 0.5
-    ) -> WithFilter:
+    ) -> "WithFilter":
         """A notch at a frequency [Hz], with the gain `depth` there and the damping ratio of its poles [1]."""
         omega = 2.0 * math.pi * frequency
         poles = (2.0 * damping / omega, 1.0 / omega**2)
         return cls(law, column, (depth * poles[0], poles[1]), poles, frequency)
 
     @classmethod
-    def lead_lag(cls, law: ControlLaw, column: str, lead_time: float, lag_time: float) -> WithFilter:
+    def lead_lag(cls, law: ControlLaw, column: str, lead_time: float, lag_time: float) -> "WithFilter":
         """(T_1 s + 1)/(T_2 s + 1) with the lead time T_1 and the lag time T_2 [s]."""
         return cls(law, column, (lead_time, 0.0), (lag_time, 0.0))
 

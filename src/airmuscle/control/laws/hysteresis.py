@@ -1,21 +1,13 @@
 """Compensation of hysteresis: modified Prandtl-Ishlinskii operator, its inverse, and a law behind it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
 import numpy as np
 
-from ...core import ops
-from ...core.arrays import Array
-from ...core.declaration import model, parameter
+from ...core import Array, Reference, Value, model, ops, parameter, select_prefix, with_prefix
 from ...core.errors import ParameterError, suggestion
-from ...core.ops import Value
-from ...core.reference import Reference
-from ...core.system import select_prefix, with_prefix
-from ...engine.loop.control_law import ControlLaw, EnclosingLaw, Memory, Sampled
-from ...engine.loop.controller import Measurement
+from ...engine.loop import ControlLaw, EnclosingLaw, Measurement, Memory, Sampled
 from ...physics.muscle.friction.prandtl_ishlinskii import KUHNEN2003
 
 
@@ -73,7 +65,7 @@ class HysteresisOperator:
         return [d for d, _ in pairs], [v for _, v in pairs]
 
     @property
-    def inverse(self) -> InverseHysteresisOperator:
+    def inverse(self) -> "InverseHysteresisOperator":
         """The inverse operator."""
         thresholds, weights = _inverted(self.thresholds, self.weights)
         sides = [_inverted([0.0, *d], [1.0, *v]) for d, v in (self._side(1.0), self._side(-1.0))]
@@ -88,7 +80,7 @@ class HysteresisOperator:
         return np.array([superposed(u, self.dead_zones, self.dead_zone_weights) for u in self.weights @ plays])
 
     @classmethod
-    def fitted(cls, path: Any, output: Any, thresholds: Sequence[float]) -> HysteresisOperator:
+    def fitted(cls, path: Any, output: Any, thresholds: Sequence[float]) -> "HysteresisOperator":
         """The operator without dead zones that reproduces outputs (N,) along a path (N,) by least squares.
 
         The thresholds begin with 0. Weights are not negative, so that there is an inverse (Kuhnen 2003).

@@ -1,17 +1,12 @@
 """IterativeLearning: norm-optimal improvement of a feed-forward signal from trial to trial."""
 
-from __future__ import annotations
-
 import functools
 from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
-from ...core.arrays import Array
-from ...core.declaration import model, parameter
-from ...core.errors import ParameterError
-from ...core.reference import Reference
+from ...core import Array, ParameterError, Reference, model, parameter
 
 AMANN1996 = Reference(
     key="amann-1996",
@@ -62,7 +57,7 @@ class IterativeLearning:
     @classmethod
     def from_step_response(
         cls, step_response: npt.ArrayLike, amplitude: float, sample_time: float, **further: float
-    ) -> IterativeLearning:
+    ) -> "IterativeLearning":
         """Learning from the response (N,) of y to a step of the feed-forward signal of this amplitude at sample 0.
 
         Element k is y, less its value without the step, k + 1 samples after the step. Raises ParameterError for

@@ -1,19 +1,13 @@
 """LinearLaw: the linearisation of a control law at a working point, between its samples."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core.arrays import Array
-from ...core.errors import ParameterError
-from ...core.short_repr import ShortRepr
-from ...core.tree import flatten
-from ...engine.loop import ColumnSensor, ControlLaw
-from ...engine.loop.control_law import rebuilt
+from ...core import Array, ParameterError, ShortRepr, flatten
+from ...engine.loop import ColumnSensor, ControlLaw, rebuilt
 from ...engine.run.compiled_law import TracedSample, trace_sample
 
 KINK = 1e-3

@@ -1,7 +1,5 @@
 """Linear control loops: a loop at a working point with hold, sensors and delays, and its margins."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Callable, Mapping, Sequence
@@ -10,9 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ...core.arrays import Array
-from ...core.errors import ParameterError, suggestion
-from ...core.system import System
+from ...core import Array, ParameterError, System, suggestion
 from ...engine.loop import ControlLaw, ControlLoop, ControlLoopState, designed_loop
 from ...physics.analysis import LinearModel, linearise
 from ...physics.analysis.sampled_model import SampledModel, bode_figure, checked_frequencies, nyquist_figure, sampled

@@ -1,7 +1,5 @@
 """Linear model predictive control: a quadratic program in the inputs alone, solved at each sample."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 from collections.abc import Mapping
@@ -10,10 +8,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ...core.arrays import Array
-from ...core.diagnostics import Status
-from ...core.reference import Reference
-from ...core.short_repr import ShortRepr
+from ...core import Array, Reference, ShortRepr, Status
 from ...engine.compile.cache.kernel import Kernel
 from ...engine.loop.controller import Measurement, MultivariableController, failure_notes
 

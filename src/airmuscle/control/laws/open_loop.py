@@ -1,18 +1,11 @@
 """Open-loop laws, whose commands follow from set points alone: signals, lead, and feed-forward of a motion."""
 
-from __future__ import annotations
-
 import abc
 from collections.abc import Mapping
 from typing import ClassVar
 
-from ...core import ops
-from ...core.declaration import Parameter, model, parameter
-from ...core.errors import ParameterError
-from ...core.ops import Value
-from ...core.reference import Reference
-from ...engine.loop.control_law import ControlLaw, Memory, Sampled
-from ...engine.loop.controller import Measurement
+from ...core import Parameter, ParameterError, Reference, Value, model, ops, parameter
+from ...engine.loop import ControlLaw, Measurement, Memory, Sampled
 from .pid import ASTROM_HAGGLUND1995
 
 

@@ -1,17 +1,10 @@
 """Controllers of one column: PID in standard form, two-position control, and a dead zone for two valves."""
 
-from __future__ import annotations
-
 import functools
 from typing import ClassVar
 
-from ...core import ops
-from ...core.declaration import model, parameter
-from ...core.errors import ParameterError
-from ...core.ops import Value
-from ...core.reference import Reference
-from ...engine.loop.control_law import Commanded, Memory, Sampled, SisoController, commands, range_of
-from ...engine.loop.controller import Measurement
+from ...core import ParameterError, Reference, Value, model, ops, parameter
+from ...engine.loop import Commanded, Measurement, Memory, Sampled, SisoController, commands, range_of
 from .sliding_mode import sliding_memory, sliding_variable
 
 ASTROM_HAGGLUND1995 = Reference(

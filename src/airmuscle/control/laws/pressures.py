@@ -1,18 +1,10 @@
 """Laws of several pressures: co-contraction of two muscles, proportional feedback, decentralised control."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import ClassVar
 
-from ...core import ops
-from ...core.declaration import model, parameter
-from ...core.errors import ParameterError
-from ...core.ops import Value
-from ...core.reference import Reference
-from ...core.system import select_prefix, united, with_prefix
-from ...engine.loop.control_law import Commanded, ControlLaw, Memory, Sampled, commands, inputs_of, range_of
-from ...engine.loop.controller import Measurement
+from ...core import ParameterError, Reference, Value, model, ops, parameter, select_prefix, united, with_prefix
+from ...engine.loop import Commanded, ControlLaw, Measurement, Memory, Sampled, commands, inputs_of, range_of
 from ...physics.muscle.characteristic.tondu_lopez2000 import TONDU_LOPEZ_2000
 from .open_loop import OpenLoopLaw
 from .pid import ASTROM_HAGGLUND1995

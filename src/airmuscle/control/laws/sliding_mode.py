@@ -1,16 +1,10 @@
 """Sliding-mode controllers: boundary layer and super-twisting, with their sliding variable."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import ClassVar
 
-from ...core import ops
-from ...core.declaration import model, parameter
-from ...core.ops import Value
-from ...core.reference import Reference
-from ...engine.loop.control_law import Commanded, Memory, Sampled, SisoController, commands, range_of
-from ...engine.loop.controller import Measurement
+from ...core import Reference, Value, model, ops, parameter
+from ...engine.loop import Commanded, Measurement, Memory, Sampled, SisoController, commands, range_of
 
 
 def sliding_memory() -> dict[str, float]:

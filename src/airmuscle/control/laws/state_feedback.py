@@ -1,17 +1,9 @@
 """StateFeedback: linear state feedback with an observer and integral action."""
 
-from __future__ import annotations
-
 from typing import ClassVar
 
-from ...core import ops
-from ...core.declaration import model, parameter
-from ...core.errors import ParameterError
-from ...core.ops import Value
-from ...core.reference import Reference
-from ...core.system import select_prefix, with_prefix
-from ...engine.loop.control_law import ControlLaw, Memory, Sampled
-from ...engine.loop.controller import Measurement, MultivariableController
+from ...core import ParameterError, Reference, Value, model, ops, parameter, select_prefix, with_prefix
+from ...engine.loop import ControlLaw, Measurement, Memory, MultivariableController, Sampled
 
 FRANKLIN1998 = Reference(
     key="franklin-1998",

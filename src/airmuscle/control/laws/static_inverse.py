@@ -1,17 +1,11 @@
 """Static inverse of a muscle: the pressure for a contraction and a tension, and feed-forward by it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import ClassVar
 
 import numpy as np
 
-from ...core import ops
-from ...core.declaration import model, parameter
-from ...core.errors import ParameterError
-from ...core.ops import Value
-from ...core.reference import Reference
+from ...core import ParameterError, Reference, Value, model, ops, parameter
 from ...physics.muscle.characteristic.base import ForceLaw
 from ...physics.muscle.geometry.meridian import SAGA_2007
 from ...physics.muscle.muscle import Muscle

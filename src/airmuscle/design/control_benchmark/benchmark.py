@@ -1,7 +1,5 @@
 """Control benchmark: contenders are tuned for a family of models and judged on truths, task by task."""
 
-from __future__ import annotations
-
 import dataclasses
 import enum
 import math
@@ -10,9 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core.arrays import Array
-from ...core.errors import ParameterError, PhysicsError, SimulationError
-from ...core.short_repr import ShortRepr
+from ...core import Array, ParameterError, PhysicsError, ShortRepr, SimulationError
 from ...engine.distribution import DistributedCalls
 from ...engine.loop import Controller
 from ...engine.processes import Workers, process_pool

@@ -1,15 +1,12 @@
 """Report chapter of the control benchmark: rankings of both groups, errors, searches, truths, figures."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from ...core.reference import Reference, cite
-from ...core.units import conversion
+from ...core import Reference, cite, conversion
 from ...report.chapter import Chapter, NamedValue, Table, TableColumn
 from ...report.write import write_report
 from .benchmark import REST_LIFE, REST_TASK, BenchmarkResult, Group

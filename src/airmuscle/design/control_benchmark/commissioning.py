@@ -1,7 +1,5 @@
 """Commissioning in the control benchmark: gains of a tuned controller, sought by runs on a truth with its sensors."""
 
-from __future__ import annotations
-
 import contextlib
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -9,9 +7,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from ...core.arrays import Array
-from ...core.errors import PhysicsError, SimulationError
-from ...core.tree import leaves
+from ...core import Array, PhysicsError, SimulationError, leaves
 from ...engine.loop import Controller, WithSensors
 from ...engine.run import simulate
 from ...recording import Recording

@@ -1,7 +1,5 @@
 """Standard contenders of the control benchmark: feedback laws beside one feed-forward, and two without it."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 

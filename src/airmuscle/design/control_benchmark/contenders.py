@@ -1,7 +1,5 @@
 """Contenders of the control benchmark: laws and called controllers, completed by sensors and pressure control."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 from collections.abc import Mapping
@@ -10,13 +8,8 @@ from typing import Any, ClassVar, NamedTuple
 
 from ...control.laws import Cascade, CoContraction, ProportionalFeedback, SetpointCommand
 from ...control.laws.pressures import DIFFERENCE
-from ...core.annotation import check_field_types, one_line
-from ...core.declaration import model
-from ...core.errors import ParameterError
-from ...core.ops import Value
-from ...core.tree import leaves
-from ...engine.loop import ControlLaw, Controller, Measurement, SigmaDelta, SplitRange, WithSensors
-from ...engine.loop.control_law import Memory, Sampled
+from ...core import ParameterError, Value, check_field_types, leaves, model, one_line
+from ...engine.loop import ControlLaw, Controller, Measurement, Memory, Sampled, SigmaDelta, SplitRange, WithSensors
 from ...engine.run.compiled_law import LawSample
 from ..tuning import load_scenario_loop
 from .joints import BenchmarkJoint
@@ -160,7 +153,7 @@ class Contender:
     law: Controller
     bounds: Bounds = dataclasses.field(default_factory=dict)
     commissioned: Bounds = dataclasses.field(default_factory=dict)
-    tuned_as: Contender | None = None
+    tuned_as: "Contender | None" = None
 
     def __post_init__(self) -> None:
         if not isinstance(self.law, Controller):

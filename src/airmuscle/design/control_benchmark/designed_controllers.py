@@ -1,7 +1,5 @@
 """Controllers of the benchmark that are designed for the linearised model: LQG, ADRC and model predictive."""
 
-from __future__ import annotations
-
 import functools
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, NamedTuple
@@ -13,13 +11,8 @@ from ...control.estimation.predictive_design import design_predictive
 from ...control.laws.linear_model_predictive import RAWLINGS2017, LinearModelPredictive
 from ...control.laws.pressures import DIFFERENCE
 from ...control.laws.state_feedback import FRANKLIN1998, StateFeedback
-from ...core.declaration import model, parameter
-from ...core.errors import ParameterError
-from ...core.ops import Value
-from ...core.reference import Reference
-from ...engine.loop.control_law import ControlLaw, EnclosingLaw, Memory, Sampled
-from ...engine.loop.control_loop import LawDesign
-from ...engine.loop.controller import Controller, Measurement
+from ...core import ParameterError, Reference, Value, model, parameter
+from ...engine.loop import ControlLaw, Controller, EnclosingLaw, LawDesign, Measurement, Memory, Sampled
 from ...physics.analysis.linear_model import LinearModel
 from .joints import ENCODER_STEP, BenchmarkJoint
 from .signals import angular_acceleration

@@ -1,17 +1,12 @@
 """Joints of the control benchmark: model of the controllers, its family, and truths on which they are judged."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from ...core.annotation import check_field_types
-from ...core.errors import ParameterError
-from ...core.short_repr import ShortRepr
-from ...core.tree import leaves
+from ...core import ParameterError, ShortRepr, check_field_types, leaves
 from ...engine.loop import ColumnSensor, Driver, SolenoidDriver
 from ...files.library.entry_file import load_law
 from ...physics.equilibrium import find_equilibrium

@@ -1,7 +1,5 @@
 """Iterative learning in the control benchmark: a task repeated on the truth, with a learned feed-forward signal."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import replace
@@ -9,10 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...control.laws.iterative_learning import IterativeLearning
-from ...core.arrays import Array
-from ...core.errors import ParameterError
-from ...core.short_repr import ShortRepr
-from ...core.tree import leaves
+from ...core import Array, ParameterError, ShortRepr, leaves
 from ...engine.loop import ControlLoop, Driver, WithSensors
 from ...engine.run import simulate
 from ...physics.plant.plant import Plant

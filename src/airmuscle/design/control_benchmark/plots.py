@@ -1,13 +1,11 @@
 """Figures of the control benchmark: errors of all tasks, runs of some tasks, learning curves."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from ...core.plotting import BLACK, DASHES, LINES, MARKERS, legend_below, new_figure
+from ...core import BLACK, DASHES, LINES, MARKERS, legend_below, new_figure
 from ...report.chapter import Plot
 from .benchmark import BenchmarkResult, Group, RunKey
 from .learning import LearningCurve

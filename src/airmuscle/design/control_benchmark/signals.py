@@ -1,7 +1,5 @@
 """Signals of a task, and the metrics of its run."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
@@ -13,13 +11,10 @@ import numpy.typing as npt
 from ...control.laws.angle_and_stiffness import AntagonisticInverse
 from ...control.laws.enclosing import WithStuckValve
 from ...control.laws.static_inverse import static_force
-from ...core.arrays import Array
-from ...core.errors import ParameterError, suggestion
-from ...core.reference import Reference
+from ...core import Array, ParameterError, Reference, suggestion
 from ...engine.loop import ControlLaw, Controller, ControlLoop, Driver, SampledSignal
 from ...physics.plant.plant import Plant
-from ...physics.pneumatics import FillDischarge, WithTubes, absolute_pressure
-from ...physics.pneumatics.gas import REFERENCE_DENSITY
+from ...physics.pneumatics import REFERENCE_DENSITY, FillDischarge, WithTubes, absolute_pressure
 from ...recording import Recording
 from .contenders import SensedController
 from .joints import BenchmarkJoint

@@ -1,16 +1,12 @@
 """Tasks of the control benchmark, with their motions."""
 
-from __future__ import annotations
-
 import abc
 import dataclasses
 import math
 
 import numpy as np
 
-from ...core.annotation import check_field_types
-from ...core.arrays import Array
-from ...core.errors import ParameterError, suggestion
+from ...core import Array, ParameterError, check_field_types, suggestion
 
 
 @dataclasses.dataclass(frozen=True)

@@ -1,7 +1,5 @@
 """Truths of the control benchmark: joints drawn at random from a stated family, of other classes than the model."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Mapping
@@ -10,11 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ...core import ops
-from ...core.declaration import model, parameter
-from ...core.ops import Value
-from ...core.reference import Reference
-from ...core.short_repr import ShortRepr
+from ...core import Reference, ShortRepr, Value, model, ops, parameter
 from ...engine.loop import Driver, SolenoidDriver
 from ...files.library.entry_file import load_law
 from ...physics.mechanism import AntagonisticJoint, JointWithExternalTorque

@@ -14,8 +14,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from ...core import Array, atomic_file, check_writable, program_fingerprint
-from ...core.errors import AirmuscleError, FileError, SimulationError
+from ...core import AirmuscleError, Array, FileError, SimulationError, atomic_file, check_writable, program_fingerprint
 from ...core.fingerprint import fingerprint
 from ...engine.distribution import DistributedCalls
 from ...engine.processes import check_running

@@ -1,7 +1,5 @@
 """Cases of a tuning: loops with gains, and the ranges of the gains."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
@@ -9,13 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from ...core.annotation import abridged
-from ...core.arrays import Array
+from ...core import Array, Leaf, ShortRepr, abridged, leaves, structure, with_parameters
 from ...core.errors import ParameterError, PhysicsError, suggestion
-from ...core.short_repr import ShortRepr
-from ...core.tree import Leaf, leaves, structure, with_parameters
-from ...engine.loop.control_loop import ControlLoop
-from ...engine.loop.controller import Controller
+from ...engine.loop import Controller, ControlLoop
 from ...physics.equilibrium import find_equilibrium
 from ...physics.plant.plant import Plant
 

@@ -1,17 +1,12 @@
 """Report chapter of a tuning, with its figures."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from ...core.errors import AirmuscleError
-from ...core.plotting import BLACK, BLUE, GREEN, LINES, ORANGE, RED, SKY, legend_below, new_figure
-from ...core.reference import cite
-from ...core.tree import leaves
+from ...core import BLACK, BLUE, GREEN, LINES, ORANGE, RED, SKY, AirmuscleError, cite, leaves, legend_below, new_figure
 from ...engine.loop.control_loop import SETPOINT, ControlLoop
 from ...engine.run import simulate
 from ...engine.run.integrators import Integrator

@@ -1,7 +1,5 @@
 """Evaluation of sets of gains: the loops of all cases in batches, and the metrics of their runs."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -9,12 +7,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ...core.arrays import Array
-from ...core.errors import AirmuscleError
-from ...core.tree import flatten, leaves, structure
+from ...core import AirmuscleError, Array, flatten, leaves, structure
 from ...engine.distribution import DistributedCalls
-from ...engine.loop.control_law import ControlLaw
-from ...engine.loop.control_loop import COMMAND, SETPOINT, ControlLoop, with_designed_laws
+from ...engine.loop import COMMAND, SETPOINT, ControlLaw, ControlLoop, with_designed_laws
 from ...engine.run.batch import BatchSolution, simulate_batch
 from ...engine.run.batch.loops import CONTROLLER
 from ...engine.run.batch.thread_pool import hidden_progress

@@ -1,7 +1,5 @@
 """Search for the gains with the smallest objective, by an evolution strategy."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
@@ -9,9 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.arrays import Array
-from ...core.errors import ParameterError, SimulationError
-from ...core.tree import leaves
+from ...core import Array, ParameterError, SimulationError, leaves
 from ...engine.distribution import DistributedCalls
 from ...engine.processes import Workers, process_pool
 from ...engine.run.integrators import Integrator

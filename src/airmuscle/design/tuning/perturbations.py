@@ -1,7 +1,5 @@
 """Perturbations of a plant and its loop: the family of cases for which gains are tuned."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 import re
@@ -10,14 +8,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core.annotation import abridged, check_field_types
-from ...core.errors import AirmuscleError, ParameterError
-from ...core.tree import Leaf, leaves, with_parameters
-from ...engine.loop.control_law import ControlLaw
-from ...engine.loop.control_loop import ControlLoop
-from ...engine.loop.sensors import MAX_DELAY, ColumnSensor, WithSensors
-from ...files.library.location import located_errors
-from ...files.library.uncertainty import ParameterUncertainty
+from ...core import AirmuscleError, Leaf, ParameterError, abridged, check_field_types, leaves, with_parameters
+from ...engine.loop import MAX_DELAY, ColumnSensor, ControlLaw, ControlLoop, WithSensors
+from ...files.library import ParameterUncertainty, located_errors
 from ...physics.plant.plant import Plant
 from ...physics.pneumatics import Valve, WithLeak
 from .case import LoopCase

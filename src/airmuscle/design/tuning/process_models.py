@@ -1,7 +1,5 @@
 """Process models of the step response: first order or integrator, with dead time, and their identification."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from typing import ClassVar
@@ -9,10 +7,7 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from ...core.annotation import check_field_types
-from ...core.arrays import Array
-from ...core.errors import ParameterError
-from ...core.reference import Reference
+from ...core import Array, ParameterError, Reference, check_field_types
 from .tracking import waveform_amplitude
 
 ASTROM_HAGGLUND1984 = Reference(

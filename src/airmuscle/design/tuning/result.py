@@ -1,7 +1,5 @@
 """Result of a tuning: gains, history of the search, and the objective that was minimised."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Callable, Mapping
@@ -9,11 +7,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 import numpy.typing as npt
 
-from ...core.annotation import check_field_types
-from ...core.arrays import Array
-from ...core.errors import ColumnError, ParameterError, suggestion
-from ...core.reference import Reference, cite
-from ...core.short_repr import ShortRepr
+from ...core import Array, ColumnError, ParameterError, Reference, ShortRepr, check_field_types, cite, suggestion
 from ...engine.loop.control_loop import ControlLoop
 from .case import GainRange, LoopCase, loop_with_gains
 from .tracking import TrackingIndex
@@ -48,7 +42,7 @@ class CaseMetrics(ShortRepr):
     def __len__(self) -> int:
         return len(self.index)
 
-    def part(self, rows: npt.NDArray[np.intp]) -> CaseMetrics:
+    def part(self, rows: npt.NDArray[np.intp]) -> "CaseMetrics":
         """The metrics of some of the sets of gains."""
         return CaseMetrics(self.index[rows], self.air[rows], self.travel[rows], self.completed[rows])
 

@@ -1,7 +1,5 @@
 """Tuning rules of PID controllers, and the sets of gains that they start a search with."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
@@ -10,13 +8,8 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from ...control.laws.pid import PID
-from ...core.annotation import check_field_types
-from ...core.arrays import Array
-from ...core.errors import AirmuscleError, ParameterError
-from ...core.reference import Reference
-from ...engine.loop.control_law import inputs_of, range_of
-from ...engine.loop.driver import WithDrivers
-from ...engine.loop.inputs import Schedule
+from ...core import AirmuscleError, Array, ParameterError, Reference, check_field_types
+from ...engine.loop import Schedule, WithDrivers, inputs_of, range_of
 from ...engine.run import simulate
 from ...engine.run.integrators import Integrator
 from .case import LoopCase

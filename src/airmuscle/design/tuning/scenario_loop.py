@@ -1,7 +1,5 @@
 """Scenario of a control loop: its cases, the default ranges of its gains, and the same file with other gains."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 import re
@@ -11,17 +9,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from ...core import Leaf, ShortRepr, conversion, leaves, quantity
 from ...core.errors import AirmuscleWarning, FileError, ParameterError, suggestion
-from ...core.short_repr import ShortRepr
-from ...core.tree import Leaf, leaves
-from ...core.units import conversion, quantity
-from ...engine.loop.control_loop import ControlLoop
-from ...engine.loop.controller import parameter_units
-from ...files.library.entry_file import load_law
+from ...engine.loop import ControlLoop, parameter_units
+from ...files.library import Location, ParameterUncertainty, load_law, located_errors, write_text
 from ...files.library.files import is_path, list_plants, read_toml
-from ...files.library.location import Location, located_errors
-from ...files.library.uncertainty import ParameterUncertainty
-from ...files.library.write import write_text
 from ...files.scenario.controller import path_keys, signal_units
 from ...files.scenario.scenario import Scenario, build_scenario
 from ...physics.plant.plant import Plant

@@ -1,7 +1,5 @@
 """Measures of runs: tracking indices, and the amplitude of a periodic waveform."""
 
-from __future__ import annotations
-
 import abc
 import dataclasses
 import math
@@ -10,10 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ...core.annotation import check_field_types
-from ...core.arrays import Array
-from ...core.errors import ParameterError, suggestion
-from ...core.reference import Reference
+from ...core import Array, ParameterError, Reference, check_field_types, suggestion
 from ...engine.loop.control_loop import SETPOINT
 
 MAX_HARMONICS, ROWS_PER_HARMONIC, SURE_HARMONICS = 15, 4, 5

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.arrays import Array
+from ...core import Array
 from .cache.kernel import evaluate
 from .cache.store import load_module
 from .functions import PARAMETERS, Printer

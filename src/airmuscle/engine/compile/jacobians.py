@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.arrays import Array
+from ...core import Array
 from .functions import PARAMETERS, Printer, TracedSystem
 from .ir import emission, jacobian
 from .ir.instructions import Code, Instruction, Operand, Operation, finished, recorded

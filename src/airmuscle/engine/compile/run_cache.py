@@ -4,7 +4,7 @@ import dataclasses
 from collections.abc import Hashable
 from typing import Any
 
-from ...core.arrays import Array
+from ...core import Array
 
 
 class Pool:

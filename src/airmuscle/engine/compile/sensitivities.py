@@ -10,7 +10,7 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ...core.system import SensitivitySystem
+from ...core import SensitivitySystem
 from .functions import PARAMETERS, ArraySizes, Printer, TracedSystem, trace_system
 from .ir.instructions import Code, Operand, finished, recorded
 from .ir.jacobian import ZERO, Tape, derivatives

@@ -29,16 +29,28 @@ from .sensors import WithSensors as WithSensors
 
 # isort: split
 # For the other rooms, not in __all__
+from .control_law import Commanded as Commanded
 from .control_law import EnclosingLaw as EnclosingLaw
 from .control_law import Memory as Memory
 from .control_law import Sampled as Sampled
+from .control_law import commands as commands
+from .control_law import inputs_of as inputs_of
+from .control_law import range_of as range_of
+from .control_law import rebuilt as rebuilt
 from .control_law import without_simulated as without_simulated
 from .control_loop import COMMAND as COMMAND
 from .control_loop import MEASURED as MEASURED
 from .control_loop import SETPOINT as SETPOINT
 from .control_loop import check_present as check_present
 from .controller import RELATIVE as RELATIVE
+from .controller import MultivariableController as MultivariableController
 from .controller import named_signal_units as named_signal_units
+from .controller import parameter_units as parameter_units
 from .inputs import check_input_names as check_input_names
 from .inputs import check_input_signal as check_input_signal
 from .piecewise_linear import FEW_SEGMENTS as FEW_SEGMENTS
+from .sensors import LECUYER1999 as LECUYER1999
+from .sensors import MAX_DELAY as MAX_DELAY
+from .sensors import STATE as STATE
+from .sensors import drawn as drawn
+from .sensors import seeded as seeded

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.arrays import Array
+from ...core import Array
 from ..compile.kernel_layout import DriverKind
 from ..loop.control_loop import ControlLoop, ControlLoopState
 from ..loop.driver import (

@@ -29,7 +29,7 @@ from ...bench.identify.prediction import RecordPrediction, predict_dynamic, pred
 from ...bench.identify.prediction.result import length_notes
 from ...bench.identify.problem import fitted_quantity_of
 from ...bench.readers.plausibility import CONTRACTION_RANGE
-from ...core.errors import ColumnError, Hint, ParameterError
+from ...core import ColumnError, Hint, ParameterError
 from ...engine.run import Integrator
 from ...physics.muscle.characteristic.base import ForceLaw
 from ...physics.muscle.muscle import LENGTH_TOLERANCE

@@ -14,7 +14,7 @@ import typing
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ...core.declaration import Parameter, parameters
+from ...core import Parameter, parameters
 from ...engine.loop import RELATIVE, Controller, Driver
 from ...physics.muscle import Muscle
 from ...physics.plant.plant import Plant

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ...core.errors import ParameterError
+from ...core import ParameterError
 from ...engine.loop import ControlLaw, ControlLoop, InputSignal, Periodic, SampledSignal, Schedule, WithDrivers
 from ..library import Location, model_table, tables_toml, write_text
 from .scenario import Scenario, build_scenario

@@ -9,7 +9,7 @@ import typer
 from ...bench.identify import ModelApproximation
 from ...bench.identify import approximate as approximate_law
 from ...bench.identify.approximation import GRID_POINTS, sample_on_grid
-from ...core.errors import ParameterError
+from ...core import ParameterError
 from ...files.library import Entry, find_initial_law, load_law, save
 from ...physics.muscle.characteristic import ValidityRange, validity_range_of
 from ..requests.declaration import option, request

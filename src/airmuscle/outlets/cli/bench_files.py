@@ -9,7 +9,7 @@ import typer
 
 from ...bench.readers import ColumnMapping, read
 from ...bench.segment import check_contents
-from ...core.errors import ParameterError
+from ...core import ParameterError
 from ...files.library.catalogue import load_data
 from ...recording import Recording
 from ...recording.recording import row_notes

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from ...core.errors import InputError, SimulationError, suggestion
+from ...core import InputError, SimulationError, suggestion
 from ...design.control_benchmark import (
     BenchmarkJoint,
     BenchmarkResult,

@@ -9,7 +9,7 @@ import typer
 from ...bench.readers import Decimation, read, write
 from ...bench.readers.reader import find_files
 from ...bench.readers.writer import EXTENSIONS
-from ...core.errors import FileError
+from ...core import FileError
 from ..requests import ReadingRequest, option, request
 from .bench_files import print_row_notes
 from .options import Json

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from ...core.atomic_output import atomic_folder
+from ...core import atomic_folder
 from ...report.chapter import Chapter
 from ...report.data import as_data, in_words
 from ...report.text import as_text

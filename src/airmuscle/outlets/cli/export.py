@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 import typer
 
-from ...core.atomic_output import check_writable
+from ...core import check_writable
 from ...engine.run.batch.lanes import Precision
 from ...files.library.entry_file import load_law
 from ...files.scenario.scenario import load_scenario

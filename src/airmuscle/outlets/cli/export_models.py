@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from ...core.atomic_output import check_writable
+from ...core import check_writable
 from ...files import list_plants
 from ...files.library import load_law, read_toml
 from ...files.scenario.scenario import load_scenario

@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from ...core.atomic_output import check_writable
+from ...core import check_writable
 from ...files.library.write import to_toml
 from ..requests import FitRequest, ReadingRequest, RequestError, fit_requested
 from .bench_files import Files, read_recordings

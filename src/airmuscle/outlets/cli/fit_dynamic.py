@@ -10,7 +10,7 @@ import typer
 from ...bench.identify.dynamic import DynamicFit
 from ...bench.identify.dynamic.dynamic_chapter import dynamic_chapters
 from ...bench.segment import inspect
-from ...core.atomic_output import check_writable
+from ...core import check_writable
 from ...files.scenario.identification import DynamicFitSetup, load_dynamic_fit
 from ...recording.recording import row_notes
 from ..requests import WEAK, option, request

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from ...bench.identify.dynamic import fit_regulator
 from ...bench.identify.dynamic.dynamic_chapter import regulator_chapters
-from ...core.atomic_output import check_writable
+from ...core import check_writable
 from ...files.library import list_files, part_toml, scenario_toml
 from ..requests import ReadingRequest, option, request
 from .bench_files import Files, read_recordings, reading_chapters

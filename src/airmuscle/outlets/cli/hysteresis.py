@@ -11,7 +11,7 @@ from ...bench.identify.hysteresis import find_loops, fit_jointly, fit_loop
 from ...bench.identify.hysteresis.hysteresis_chapter import hysteresis_chapters
 from ...bench.identify.hysteresis.joint import SelectedFriction, select_friction
 from ...bench.identify.hysteresis.loops import CURVE_DEGREE
-from ...core.atomic_output import check_writable
+from ...core import check_writable
 from ...files.library import Entry, load_law, part_toml, to_toml, without_parts
 from ...physics.muscle.characteristic.base import ForceLaw
 from ..requests import ReadingRequest, RequestError, Where, option, request

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 
 from ...bench.readers.missing_values import MISSING_VALUES
 from ...bench.readers.time_base import TIME_BASES
-from ...core.errors import Hint, HintedText
+from ...core import Hint, HintedText
 
 TIME_BASE_NAMES = {base: name for name, base in TIME_BASES.items()}
 """Names of the time bases of the option --time."""

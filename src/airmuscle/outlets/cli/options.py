@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from ...core.errors import suggestion
+from ...core import suggestion
 from ...files.library.files import list_data, list_laws, list_library, list_plants
 from .terminal import echo
 

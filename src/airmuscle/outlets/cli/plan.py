@@ -6,7 +6,7 @@ from pathlib import Path
 from ...bench.identify.dynamic import rank_records
 from ...bench.identify.experiment_design import BenchLimits, optimal_design
 from ...bench.readers import write
-from ...core.atomic_output import check_writable
+from ...core import check_writable
 from ...files.library import is_path, load_law, read_toml
 from ...files.scenario.identification import load_dynamic_fit
 from ...physics.muscle.characteristic import ValidityRange

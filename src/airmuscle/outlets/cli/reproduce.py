@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from ...core.errors import AirmuscleError
+from ...core import AirmuscleError
 from ...engine.processes import available_cores
 from ...papers.run import reproduce as reproduce_papers
 from ...papers.run import select_papers

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from ...core.atomic_output import atomic_folder
+from ...core import atomic_folder
 from ...files.scenario.schema import muscle_schema, scenario_schema
 from ...report.data import as_json
 from .terminal import echo, print_json

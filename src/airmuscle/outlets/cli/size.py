@@ -1,6 +1,6 @@
 """`airmuscle size`: muscles of the catalogue for a lift or a joint."""
 
-from ...core.atomic_output import check_writable
+from ...core import check_writable
 from ...design.sizing.chapter import sizing_chapter
 from ...design.sizing.scenario import sizing_scenario
 from ..requests.size import SizeRequest

@@ -10,7 +10,7 @@ from typing import Any
 
 import typer
 
-from ...core.errors import printable
+from ...core import printable
 from ...report.chapter import Table
 from ...report.data import as_json
 from ...report.text import table_lines

@@ -1,7 +1,5 @@
 """PlantEnv: one plant with a task as a Gymnasium environment. Gymnasium imports this module."""
 
-from __future__ import annotations
-
 import collections
 import math
 from typing import Any, ClassVar
@@ -10,7 +8,7 @@ import gymnasium
 import numpy as np
 import numpy.typing as npt
 
-from ...core.errors import ParameterError, SimulationError
+from ...core import ParameterError, SimulationError
 from ...engine.run import RungeKutta4, Stepper
 from ...physics.equilibrium import complete_inputs
 from ...recording import Recording

@@ -1,8 +1,6 @@
 """PlantVectorEnv: thousands of plants with a task in lanes, as a Gymnasium vector environment. Gymnasium imports this
 module."""
 
-from __future__ import annotations
-
 from typing import Any, ClassVar, NamedTuple
 
 import gymnasium
@@ -10,8 +8,7 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium.utils import seeding
 
-from ...core.arrays import Array
-from ...core.errors import ParameterError
+from ...core import Array, ParameterError
 from ...engine.run import RungeKutta4
 from ...engine.run.batch import Double, Precision
 from ...engine.run.batch.stepper import BatchStepper

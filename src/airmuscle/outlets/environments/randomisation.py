@@ -1,7 +1,5 @@
 """Randomisation of plants and tasks, and the episodes that begin with its draws."""
 
-from __future__ import annotations
-
 import abc
 import dataclasses
 import math
@@ -13,11 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ...bench.identify.prediction import PlantUncertainty
-from ...core import tree
-from ...core.annotation import abridged, check_field_types, one_line
-from ...core.arrays import Array
-from ...core.errors import ParameterError, suggestion
-from ...core.short_repr import ShortRepr
+from ...core import Array, ParameterError, ShortRepr, abridged, check_field_types, one_line, suggestion, tree
 from ...engine.run.batch.variations import Column
 from ...engine.run.integrators import RungeKutta4
 from ...files.library.uncertainty import ParameterUncertainty

@@ -1,10 +1,8 @@
 """Registration of the environments with Gymnasium."""
 
-from __future__ import annotations
-
 import importlib.util
 
-from ...core.errors import InputError
+from ...core import InputError
 
 ENVIRONMENTS = {"Joint": "joint", "JointOnOff": "on_off", "Lift": "lift", "Arm": "arm"}
 """Names of the registered environments and of the functions that make them; the identifiers are airmuscle/Joint-v0 and

@@ -1,7 +1,5 @@
 """Episodes of a policy in a task, distributed among processes and machines."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable
 from typing import Any
@@ -9,9 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ...core.annotation import check_whole
-from ...core.arrays import Array
-from ...core.short_repr import ShortRepr
+from ...core import Array, ShortRepr, check_whole
 from ...engine.distribution import DistributedCalls
 from ...engine.processes import Workers, process_pool
 from .plant_vector_env import PlantVectorEnv

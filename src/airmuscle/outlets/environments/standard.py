@@ -1,20 +1,13 @@
 """Standard environments: lift, joint and arm, with their default tasks."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 import math
 import warnings
 from collections.abc import Mapping
 
-from ...core import ops
-from ...core.declaration import model, parameter
-from ...core.errors import AirmuscleWarning, ParameterError
-from ...core.ops import Value
-from ...core.units import bar
-from ...files.library.catalogue import load
-from ...files.library.entry import Entry, PlantEntry, ValveEntry
+from ...core import AirmuscleWarning, ParameterError, Value, bar, model, ops, parameter
+from ...files.library import Entry, PlantEntry, ValveEntry, load
 from ...physics.mechanism import HangingMass
 from ...physics.muscle import LinearDamper
 from ...physics.plant import Plant

@@ -1,18 +1,12 @@
 """Tasks of learning environments: observations, reward, and actions as inputs of the plant."""
 
-from __future__ import annotations
-
 import abc
 import dataclasses
 import functools
 from collections.abc import Mapping, Sequence
 from typing import ClassVar, NamedTuple
 
-from ...core import ops
-from ...core.annotation import check_field_types
-from ...core.errors import ParameterError
-from ...core.ops import Value
-from ...core.system import Input, StateVariable, System
+from ...core import Input, ParameterError, StateVariable, System, Value, check_field_types, ops
 from ...physics.plant import Plant
 
 _FILL, _DISCHARGE = "fill", "discharge"

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 
 from ...control import LinearModelPredictive
-from ...core.arrays import Array
+from ...core import Array
 from ...engine.compile.kernel_text import CKernels
 from ...engine.loop.controller import Measurement
 from ...engine.run.sampled_loop import SampledLoop

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.errors import printable
+from ...core import printable
 from ...engine.compile.kernel_text import JavaScriptKernels, MatlabKernels
 from ...engine.compile.kernel_text.printer import KernelPrinter
 from ...engine.compile.text.programs import DEFINITION, JavaScriptLanguage, MatlabBody, MatlabLanguage

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from ...core.arrays import Array
+from ...core import Array
 from ...engine.compile.cache.kernel import Kernel
 from ...engine.compile.function import LANES, lanes_array
 from .joint_torque import QUANTITIES, TorqueFunction, TracedRow

@@ -3,7 +3,7 @@
 import numpy as np
 import numpy.typing as npt
 
-from ...core.arrays import Array
+from ...core import Array
 from .statics import Rows, Statics
 
 STARTS = 60

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ...core.arrays import Array
+from ...core import Array
 from .statics import Rows, Statics
 
 GOLDEN = 0.5 * (5.0**0.5 - 1.0)

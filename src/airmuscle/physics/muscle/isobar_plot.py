@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core import Array, given_axes, legend_outside, new_figure, plotting
-from ...core.display import contraction_text, quantity_text
+from ...core import Array, contraction_text, given_axes, legend_outside, new_figure, plotting, quantity_text
 from ...recording import Recording
 from ...report.chapter import Plot, Table, TableColumn
 from .characteristic import Characteristic, ValidityRange, validity_range_of

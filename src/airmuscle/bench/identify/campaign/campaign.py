@@ -1,16 +1,12 @@
 """Campaign: the identification of one muscle from all records of a rig, stage by stage."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from ....core.arrays import Array
-from ....core.errors import IdentificationError
-from ....core.short_repr import ShortRepr
+from ....core import Array, IdentificationError, ShortRepr
 from ....engine.processes import Workers, process_pool
 from ....physics.muscle import CreepElements, LinearDamper, Muscle
 from ....physics.muscle.characteristic.base import ForceLaw

@@ -1,12 +1,10 @@
 """Report chapters of a campaign: an overview of records, stages and next experiments, then one part for each stage."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 from typing import Any
 
-from ....core.arrays import Array
+from ....core import Array
 from ....physics.muscle import CreepElements
 from ....report.chapter import Chapter, Plot, Table, TableColumn
 from ....report.data import as_data

@@ -1,14 +1,11 @@
 """Plots of a campaign: characteristic, loops with their bands, residuals of the stages, fills and creep."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from ....core.errors import AirmuscleError
-from ....core.plotting import BLACK, BLUE, DASHES, LINES, RED, legend_below, new_figure
+from ....core import BLACK, BLUE, DASHES, LINES, RED, AirmuscleError, legend_below, new_figure
 from ....report.chapter import Plot
 from . import Campaign, CampaignRecord, CreepStage, FillStage, RecordKind, StaticStage
 

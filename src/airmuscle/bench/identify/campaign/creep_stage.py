@@ -1,15 +1,11 @@
 """Creep of holds after a motion, as Maxwell elements that all holds share."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
 
-from ....core.arrays import Array
-from ....core.errors import AirmuscleError, IdentificationError
-from ....core.short_repr import ShortRepr
+from ....core import AirmuscleError, Array, IdentificationError, ShortRepr
 from ....physics.muscle import CreepElements
 from ....recording import Recording
 from ..hysteresis import fit_creep
@@ -72,7 +68,7 @@ def fit_creep_stage(records: Sequence[CampaignRecord]) -> CreepStage | LeftOutSt
     return fit_held_rows([(record.origin, HeldRows.from_record(record)) for record in records])
 
 
-def fit_held_rows(named_holds: Sequence[tuple[str, HeldRows]]) -> CreepStage | LeftOutStage:
+def fit_held_rows(named_holds: "Sequence[tuple[str, HeldRows]]") -> CreepStage | LeftOutStage:
     """Fit Maxwell elements to named holds, as `fit_creep_stage`."""
     holds = [hold for _, hold in named_holds]
     try:
@@ -93,14 +89,14 @@ class HeldRows:
     held: Array
 
     @classmethod
-    def from_record(cls, record: CampaignRecord) -> HeldRows:
+    def from_record(cls, record: CampaignRecord) -> "HeldRows":
         """The rows after the single motion of a record."""
         motion = find_motion(record.recording)
         assert motion is not None
         return cls.after(record.recording, motion.end)
 
     @classmethod
-    def after(cls, whole: Recording, end_of_motion: float) -> HeldRows:
+    def after(cls, whole: Recording, end_of_motion: float) -> "HeldRows":
         """The rows after a dead time from the end of the motion [s] to the end of the recording.
 
         Raises IdentificationError where there are none.

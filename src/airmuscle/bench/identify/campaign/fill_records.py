@@ -1,8 +1,6 @@
 """Fills and discharges of a campaign as experiments: plant of a held muscle, valve commands, initial pressure, and the
 unknowns of both valves."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping, Sequence
 
@@ -13,8 +11,7 @@ from ....physics.mechanism import Isometric
 from ....physics.muscle import Muscle
 from ....physics.muscle.geometry import Vessel
 from ....physics.plant.plant import Plant
-from ....physics.pneumatics import FillDischarge, Supply, Tank, Valve
-from ....physics.pneumatics.gas import EnergyBalance
+from ....physics.pneumatics import EnergyBalance, FillDischarge, Supply, Tank, Valve
 from ...baselines import ARX, PERSISTENCE, TimedRecord, baseline_errors, skill
 from ..dynamic import (
     CommandInstants,
@@ -50,7 +47,7 @@ class ValveUnknowns:
     sinks: bool = False
 
     @classmethod
-    def of(cls, records: Sequence[CampaignRecord], common_ratio: str = "", sinks: bool = False) -> ValveUnknowns:
+    def of(cls, records: Sequence[CampaignRecord], common_ratio: str = "", sinks: bool = False) -> "ValveUnknowns":
         """The valves through which the air of these records flows."""
         changes = [step.change for record in records for step in record.steps]
         return cls(any(change > 0 for change in changes), any(change < 0 for change in changes), common_ratio, sinks)

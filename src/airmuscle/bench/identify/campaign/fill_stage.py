@@ -1,15 +1,11 @@
 """Valve and enclosed volume of a campaign: a joint fit of all fills and discharges of the rig."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from ....core.arrays import Array
-from ....core.errors import AirmuscleError
-from ....core.short_repr import ShortRepr
+from ....core import AirmuscleError, Array, ShortRepr
 from ....engine.loop.inputs import Schedule
 from ....physics.muscle.geometry import Geometry
 from ....physics.plant.plant import Plant
@@ -183,7 +179,7 @@ class _RelativeFit:
     records: tuple[CampaignRecord, ...]
 
     @classmethod
-    def of(cls, records: Sequence[CampaignRecord]) -> _RelativeFit:
+    def of(cls, records: Sequence[CampaignRecord]) -> "_RelativeFit":
         def fitted(experiments: Sequence[Experiment], valves: ValveUnknowns) -> DynamicFit:
             free = [*valves.shared, *([f"{DISCHARGE}.{CONDUCTANCE}"] if valves.both else [])]
             return fit_pressure(records, experiments, free, (VOLUME,))

@@ -1,7 +1,5 @@
 """Friction of all loops of a campaign together, with its dependence on the pressure, and the force along a record."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
@@ -9,9 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ....core.arrays import Array
-from ....core.errors import AirmuscleError
-from ....core.short_repr import ShortRepr
+from ....core import AirmuscleError, Array, ShortRepr
 from ....engine.distribution import DistributedCalls
 from ....physics.muscle import CreepElements
 from ....physics.muscle.friction import Friction, NoFriction

@@ -1,15 +1,11 @@
 """Creep elements of a muscle from the holds of any recordings, at a held length or under a constant load."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
 
-from ....core.arrays import Array
-from ....core.errors import AirmuscleError, IdentificationError
-from ....core.short_repr import ShortRepr
+from ....core import AirmuscleError, Array, IdentificationError, ShortRepr
 from ....physics.muscle import CreepElements
 from ....physics.muscle.characteristic.base import ForceLaw
 from ....recording import Recording

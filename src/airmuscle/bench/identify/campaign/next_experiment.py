@@ -1,15 +1,12 @@
 """Records of a campaign as a whole: check that they are of one rig, and the next experiments."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 from collections.abc import Sequence
 
 import numpy as np
 
-from ....core.errors import AirmuscleError, IdentificationError
-from ....core.short_repr import ShortRepr
+from ....core import AirmuscleError, IdentificationError, ShortRepr
 from ....physics.muscle.characteristic.validity_range import ValidityRange
 from ..dynamic import rank_records
 from ..dynamic.record_ranking import MIN_GAIN

@@ -1,7 +1,5 @@
 """Records of a campaign and their kinds: static points, slow runs, fills, creep and release."""
 
-from __future__ import annotations
-
 import dataclasses
 import enum
 import itertools
@@ -10,8 +8,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from ....core.arrays import Array
-from ....core.short_repr import ShortRepr
+from ....core import Array, ShortRepr
 from ....recording import Recording
 from ...segment import (
     AT_REST,

@@ -1,21 +1,16 @@
 """Damping of a campaign: a dynamic fit of the quick releases of a hanging load."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Sequence
 
 import numpy as np
 
-from ....core.errors import AirmuscleError
-from ....core.short_repr import ShortRepr
-from ....core.units import STANDARD_GRAVITY
+from ....core import STANDARD_GRAVITY, AirmuscleError, ShortRepr
 from ....engine.loop.inputs import Schedule
 from ....physics.mechanism import HangingMass, WithLatch
 from ....physics.muscle import LinearDamper, Muscle
 from ....physics.plant.plant import Plant
-from ....physics.pneumatics import ClosedChamber
-from ....physics.pneumatics.gas import Polytropic
+from ....physics.pneumatics import ClosedChamber, Polytropic
 from ..dynamic import DynamicFit, Experiment, InitialConditions, StartTime, fit_dynamic, stated_ambient
 from .record import CampaignRecord
 from .transient import LeftOutStage, displacement, find_motion, thin

@@ -1,16 +1,12 @@
 """Static characteristic of a campaign: model selection on rows freed of friction and creep, and its error bands."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 
 import numpy as np
 
-from ....core.arrays import Array
-from ....core.errors import AirmuscleError
-from ....core.short_repr import ShortRepr
+from ....core import AirmuscleError, Array, ShortRepr
 from ....physics.muscle import CreepElements
 from ....physics.muscle.friction import Friction
 from ....recording import Recording

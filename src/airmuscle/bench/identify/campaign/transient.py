@@ -1,19 +1,14 @@
 """Transients of a record, steps of the pressure and the motion of a release, and its rows for fits."""
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ....core.arrays import Array
+from ....core import Array
 from ....recording import Recording
-from ...segment import Sensor, quasi_static_rows
-from ...segment.interval import Mask, running_median
-from ...segment.runs import CONTRACTION_BAND
-from ...segment.sensor import estimate_noise
+from ...segment import CONTRACTION_BAND, Mask, Sensor, estimate_noise, quasi_static_rows, running_median
 
 
 @dataclasses.dataclass(frozen=True)

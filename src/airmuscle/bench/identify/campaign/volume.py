@@ -1,14 +1,11 @@
 """Enclosed volume over contraction: its change from the static characteristic by virtual work, its value from fills."""
 
-from __future__ import annotations
-
 import dataclasses
 from typing import Any
 
 import numpy as np
 
-from ....core.arrays import Array
-from ....core.errors import PhysicsError
+from ....core import Array, PhysicsError
 from ....physics.muscle.characteristic.base import ForceLaw
 from ....physics.muscle.geometry import ChebyshevGeometry
 

@@ -16,7 +16,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....core.arrays import Array
+from ....core import Array
 
 Residuals = Callable[[Array], tuple[Array, Array] | None]
 """Residuals (R,) and Jacobian (R, P) at unknowns (P,); None where they cannot be computed."""

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-from ....core.arrays import Array
+from ....core import Array
 from ..result import Estimate
 
 SAME_COST = 1e-3

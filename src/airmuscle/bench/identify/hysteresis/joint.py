@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ....core.arrays import Array
+from ....core import Array
 from ....engine.distribution import DistributedCalls
 from ....engine.processes import Workers, process_pool
 from ....physics.muscle.friction import Friction, IdentifiedFriction, PressureScaledFriction

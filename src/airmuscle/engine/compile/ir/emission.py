@@ -4,7 +4,7 @@ import abc
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-from ....core.errors import TraceError
+from ....core import TraceError
 from .instructions import Code, Instruction, Operand, Operation
 from .scheduling import ConditionalBlock, Item
 from .skipped_blocks import COMMANDED, STEADY, VARYING, skipping

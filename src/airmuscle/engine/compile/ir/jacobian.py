@@ -10,7 +10,7 @@ Reference: Griewank, A., Walther, A., Evaluating Derivatives, 2nd ed., SIAM 2008
 import heapq
 from collections.abc import Callable, Iterable, Sequence
 
-from ....core.errors import TraceError
+from ....core import TraceError
 from .instructions import Instruction, Operand, Operation
 
 Row = dict[Operand, Operand]

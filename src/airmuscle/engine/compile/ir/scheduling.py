@@ -4,7 +4,7 @@ import dataclasses
 import heapq
 from collections.abc import Iterable, Sequence
 
-from ....core.errors import TraceError
+from ....core import TraceError
 from .instructions import CALLED, Code, Instruction, Operand
 
 Gates = tuple[Operand, ...]

@@ -7,7 +7,7 @@ from typing import Any
 
 import numba
 
-from ....core.diagnostics import Status
+from ....core import Status
 from .calls import PART, invoke, pointer
 from .matrices import exponential_step
 

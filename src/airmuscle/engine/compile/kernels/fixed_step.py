@@ -10,7 +10,7 @@ from typing import Any
 import numba
 import numpy as np
 
-from ....core.diagnostics import Status
+from ....core import Status
 from .calls import CONTRACTED_PART, invoke, pointer
 from .record import set_inputs, write_present
 

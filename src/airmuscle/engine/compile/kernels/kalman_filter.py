@@ -5,7 +5,7 @@ from typing import Any
 
 import numba
 
-from ....core.diagnostics import Status
+from ....core import Status
 from .calls import PART, invoke, pointer
 from .matrices import cholesky, exponential_step, multiply, solve_row
 

@@ -11,7 +11,7 @@ from typing import Any
 import numba
 import numpy as np
 
-from ....core.diagnostics import Status
+from ....core import Status
 from .calls import PART, invoke, pointer
 
 DONE, NOT_FINITE, INTERRUPTED = Status.DONE.value, Status.NOT_FINITE.value, Status.INTERRUPTED.value

@@ -3,7 +3,7 @@
 from math import sqrt
 from typing import Any
 
-from ....core.diagnostics import Status
+from ....core import Status
 from .calls import PART, invoke, pointer
 
 DONE, NOT_FINITE, SINGULAR = Status.DONE.value, Status.NOT_FINITE.value, Status.SINGULAR.value

@@ -4,7 +4,7 @@ from typing import Any
 
 import numba
 
-from ....core.diagnostics import Status
+from ....core import Status
 from .calls import PART, invoke, pointer
 
 DONE, SINGULAR = Status.DONE.value, Status.SINGULAR.value

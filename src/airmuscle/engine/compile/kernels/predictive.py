@@ -5,7 +5,7 @@ from typing import Any
 
 import numba
 
-from ....core.diagnostics import Status
+from ....core import Status
 from .calls import CONTRACTED_PART, PART
 from .matrices import solve_factor
 

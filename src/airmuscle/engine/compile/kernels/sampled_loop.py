@@ -4,7 +4,7 @@ from typing import Any
 
 import numba
 
-from ....core.diagnostics import Status
+from ....core import Status
 from ..kernel_layout import Progress, Waiting
 from .calls import PART, call_kernel, invoke, pointer
 from .driven_inputs import apply_drivers, is_full, load_columns, merge_inputs

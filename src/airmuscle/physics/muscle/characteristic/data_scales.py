@@ -7,7 +7,7 @@ from typing import NoReturn, Self
 
 import numpy as np
 
-from ....core.errors import IdentificationError
+from ....core import IdentificationError
 from ....recording import Recording
 from ..geometry.braid import Braid
 

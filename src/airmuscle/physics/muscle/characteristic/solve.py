@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ....core.errors import AirmuscleWarning, SolveError, TraceError
+from ....core import AirmuscleWarning, SolveError, TraceError
 
 INTERVALS = 256
 """Intervals of the search grid; a pair of roots within 1/256 of the search range is not resolved."""
