@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 import pickle
+import re
 import warnings
 from pathlib import Path
 
@@ -145,6 +146,14 @@ def test_a_force_zero_is_named(tmp_path, tables, text):
     assert "zero of the force sensor" in notes
 
 
+def test_a_negative_force_zero_is_named_unless_it_is_the_limit_of_the_sensor(tmp_path):
+    """A slack muscle reads the same negative force at several lengths; a sensor that ends there reads no more."""
+    low = changed(ramps(), FORCE, lambda f: f - 25.0)
+    assert re.search(r"-2\d(\.\d)? N at zero pressure.*zero of the force sensor is wrong", notes_of(tmp_path, low))
+    ended = changed(ramps(), FORCE, lambda f: np.maximum(f, 4.0) - 25.0)
+    assert "zero of the force sensor" not in notes_of(tmp_path / "ended", ended)
+
+
 def test_a_length_in_cm_under_mm_is_refused(tmp_path):
     with pytest.raises(
         ColumnError, match=r"pulls at a contraction of 90 to 92\.4 %, but no pneumatic muscle pulls bey"
@@ -242,7 +251,8 @@ def test_a_fit_states_the_scatter_of_its_data_and_a_law_that_does_not_follow_the
     assert 1.0 < good.scatter.repeatability < 2.0, "noise of force, pressure and length, and the distance of the rows"
     assert "noise of the data" in str(good)
     assert not any("does not follow" in note for note in good.notes)
-    assert any("times the scatter of the data" in note and "does not follow" in note for note in poor.notes)
+    (misfit,) = [note for note in poor.notes if "does not follow" in note]
+    assert re.search(r"times the scatter of the data \(noise of the data [\d.]+ N, difference of repeated runs", misfit)
 
 
 def test_a_comparison_states_the_remarks_of_a_fit(tmp_path):

@@ -165,7 +165,7 @@ def check_force_signs(recordings: Sequence[Recording]) -> Iterator[str]:
 
 def _is_compressed(recordings: Sequence[Recording], low: float) -> bool:
     """Whether the forces at zero pressure vary with the length, as those of a muscle that is pushed together do."""
-    slack = BenchRows.of(recordings_with(recordings, *BenchRows._fields)).slack_forces
+    slack = BenchRows.of(recordings_with(recordings, *BenchRows._fields)).slack.force
     return bool(slack.size and np.ptp(slack) > COMPRESSED * -low)
 
 
@@ -198,7 +198,8 @@ _REMEDY = "Subtract the reading of the slack muscle at zero pressure from the co
 
 
 def check_force_zero(recordings: Sequence[Recording]) -> Iterator[str]:
-    """A sensor that reads a force at zero pressure, measured there or extrapolated to it.
+    """A sensor that reads a force at zero pressure, measured there or extrapolated to it, or the same negative force at
+    several lengths of the slack muscle.
 
     The force at zero gauge pressure is at most 0 at each contraction: the wall resists contraction and does not pull
     (Chou and Hannaford, IEEE Trans. Robot. Autom. 12 (1996), with elastic wall: Tondu and Lopez 2000).
@@ -207,10 +208,11 @@ def check_force_zero(recordings: Sequence[Recording]) -> Iterator[str]:
     rows = BenchRows.of(given)
     if not rows.force.size or not rows.greatest > 0:
         return
-    slack = rows.slack_forces
-    if slack.size >= MIN_ROWS:
-        reading = float(np.median(slack))
-        if reading > MAX_ZERO * rows.greatest:
+    slack = rows.slack
+    if slack.force.size >= MIN_ROWS:
+        reading = float(np.median(slack.force))
+        low = -MAX_OFFSET * rows.greatest <= reading < -MAX_ZERO * rows.greatest and _is_constant(slack)
+        if reading > MAX_ZERO * rows.greatest or low:
             yield (
                 f"{file_list([each.origin for each in given])}: the force is {reading:.3g} N at zero pressure and "
                 "shortened length, where a muscle is slack: the zero of the force sensor is wrong, and all forces by "
@@ -224,6 +226,13 @@ def check_force_zero(recordings: Sequence[Recording]) -> Iterator[str]:
             "where a muscle does not pull: the zero of the force sensor, or that of the pressure, is probably wrong. "
             f"{_REMEDY}"
         )
+
+
+def _is_constant(slack: BenchRows) -> bool:
+    """Whether a slack muscle reads the same negative force at several lengths, and not the limit of the sensor."""
+    low, high = limits(slack.force)
+    at_limit = float(np.mean(slack.force == np.min(slack.force))) > 0.5
+    return not at_limit and high - low < COMPRESSED * -low and float(np.ptp(slack.contraction)) > MIN_RANGE
 
 
 def extrapolated_offset(lines: Sequence[PressureLine]) -> float:

@@ -60,8 +60,9 @@ class Scatter:
         expected = max([*known, 0.5 * self.branches], default=0.0)
         if not known or rmse <= MAX_MISFIT * expected or rmse <= MIN_MISFIT * greatest:
             return []
+        parts = ", ".join(f"{each.name} {each.value:.3g} N" for each in self.values())
         return [
-            f"The rms error, {rmse:.3g} N, is {rmse / expected:.2g} times the scatter of the data ({self}): the "
+            f"The rms error, {rmse:.3g} N, is {rmse / expected:.2g} times the scatter of the data ({parts}): the "
             "law does not follow them. "
             + (f"It is one law for {lengths} resting lengths. " if lengths > 1 else "")
             + "Compare other laws, and check the remarks on contradicting or suspicious data."

@@ -51,8 +51,9 @@ def _time(hint: Hint) -> str:
 
 def _missing(hint: Hint) -> str:
     """The name of a treatment of missing values, with its codes."""
-    codes = "".join(f" --missing-code '{code}'" for code in hint.value.codes)
-    return f"use --missing {MISSING_NAMES[type(hint.value)]}{codes}"
+    codes = [f"{code:g}" if isinstance(code, float) else code for code in hint.value.codes]
+    options = "".join(f" --missing-code '{code}'" for code in codes)
+    return f"use --missing {MISSING_NAMES[type(hint.value)]}{options}"
 
 
 _FILES: Mapping[str, Instruction] = {
