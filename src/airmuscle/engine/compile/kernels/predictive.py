@@ -42,13 +42,23 @@ def extend_factor(m: Any, order: Any, count: Any, row: Any, factor: Any) -> Any:
 
 
 @PART
-def release(m: Any, order: Any, count: Any, place: Any, factor: Any, multipliers: Any, active: Any) -> None:
-    """Remove the active row at a place, of `count`."""
+def release(order: Any, count: Any, place: Any, factor: Any, multipliers: Any, active: Any) -> None:
+    """Remove the active row at a place, of `count`; rotations make its factor triangular again."""
     active[order[place]] = 0.0
     for k in range(place, count - 1):
         order[k] = order[k + 1]
         multipliers[k] = multipliers[k + 1]
-        extend_factor(m, order, k, order[k], factor)
+        for j in range(k + 2):
+            factor[k, j] = factor[k + 1, j]
+    for k in range(place, count - 1):
+        length = sqrt(factor[k, k] ** 2 + factor[k, k + 1] ** 2)
+        along = factor[k, k] / length
+        across = factor[k, k + 1] / length
+        factor[k, k] = length
+        for i in range(k + 1, count - 1):
+            value = factor[i, k]
+            factor[i, k] = along * value + across * factor[i, k + 1]
+            factor[i, k + 1] = along * factor[i, k + 1] - across * value
 
 
 @PART
@@ -136,7 +146,7 @@ def exchange(
     if possible:
         for k in range(count):
             multipliers[k] -= side * least * change[k]
-        release(m, order, count, place, factor, multipliers, active)
+        release(order, count, place, factor, multipliers, active)
         possible = extend_factor(m, order, count - 1, row, factor)
         order[count - 1] = row
         multipliers[count - 1] = side * least
@@ -195,7 +205,7 @@ def shortest_vector(
         for k in range(count):
             multipliers[k] += share * change[k]
         if place >= 0:
-            release(m, order, count, place, factor, multipliers, active)
+            release(order, count, place, factor, multipliers, active)
             count -= 1
             continue
         vector_of(m, order, count, multipliers, w)
