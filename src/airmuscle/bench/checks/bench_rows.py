@@ -72,7 +72,7 @@ class BenchRows(NamedTuple):
         return self.at(self.force > MIN_FORCE * self.greatest)
 
     @property
-    def slack(self) -> BenchRows:
+    def slack(self) -> "BenchRows":
         """The rows at zero pressure and shortened length, where a muscle is slack."""
         without = np.abs(self.pressure) < NO_PRESSURE * np.max(self.pressure, initial=0.0)
         return self.at(without & (self.contraction > MAX_ELONGATION))
