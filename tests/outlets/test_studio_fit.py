@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import math
 import os
@@ -20,9 +21,12 @@ from studio_tasks import WorkerHere, fail, write_slowly
 
 pytest.importorskip("starlette", reason="needs starlette")
 
+from arm_episodes import made_episodes
+
 import airmuscle as am
 from airmuscle.bench import Candidate, ColumnMapping, LevelSplit, compare, read, standard_candidates
 from airmuscle.bench.identify import model_selection
+from airmuscle.errors import IdentificationError
 from airmuscle.outlets.studio import (
     FIT_WORKERS,
     MAX_SETTINGS,
@@ -32,6 +36,7 @@ from airmuscle.outlets.studio import (
     FitService,
     LimitedWorker,
     UploadStore,
+    arm_task,
     check_file_name,
     create_app,
     fit_queue,
@@ -39,6 +44,7 @@ from airmuscle.outlets.studio import (
     run_fit,
     self_contained_page,
 )
+from airmuscle.report import Chapter, Plot, Table
 
 LAW = am.load("dmsp-20-300").characteristic
 COLUMNS = {"Zeit": {"quantity": "time", "unit": "s"}, "Druck": {"quantity": "pressure", "unit": "bar"}}
@@ -685,3 +691,114 @@ def test_outliers_are_left_out_as_by_the_command_line(app, tmp_path):
     assert recording["outliers"] == len(left_out) > 5
     assert recording["left_out"] == list(left_out)
     assert recording["used"] == 78 - len({*left_out, *range(70, 78)})
+
+
+# Episodes of an arm
+
+MADE = made_episodes(20)
+
+
+def csv(run):
+    rows = np.column_stack([np.degrees(run.angle), np.degrees(run.speed), run.pressure / 1e3])
+    lines = [",".join(f"{value:.7g}" for value in row) for row in rows]
+    return "angle,speed,pressure1,pressure2\n" + "\n".join(lines)
+
+
+def archive(folder="episodes/"):
+    data = io.BytesIO()
+    with zipfile.ZipFile(data, "w") as file:
+        for number, run in enumerate(MADE.runs):
+            file.writestr(f"{folder}{number:02d}.csv", csv(run))
+    return data.getvalue()
+
+
+def sheet_of(app, name, content, **settings):
+    """The identifier of the set, and what was understood of its episodes."""
+    files = upload(app, name, content).json()["set"]
+    return files, post(app, "read", set=files, settings={"record": "arm", **settings})
+
+
+@pytest.mark.parametrize("folder", ["episodes/", "a/b/", ""])
+def test_an_archive_of_episodes_is_read_by_the_mapping_that_is_proposed(app, folder):
+    _, answer = sheet_of(app, "episodes.zip", archive(folder))
+    sheet = answer.json()
+    assert sheet["ready"], sheet["problems"]
+    assert 'columns = ["pressure1", "pressure2"]\nscale = "1 kPa"' in sheet["mapping"]
+    text = " ".join(sheet["lines"])
+    assert text.startswith("20 episodes of 95 to 95 rows at 100")
+    assert "pressure 1 raises angle 1 (t = " in text
+
+
+def test_several_files_are_a_folder_of_episodes(app):
+    files = upload(app, "00.csv", csv(MADE.runs[0]).encode()).json()["set"]
+    for number, run in enumerate(MADE.runs[1:], start=1):
+        upload(app, f"{number:02d}.csv", csv(run).encode(), files)
+    sheet = post(app, "read", set=files, settings={"record": "arm"}).json()
+    assert sheet["ready"]
+    assert "20 episodes from 20 files (.csv)" in sheet["lines"]
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "settings", "field", "text"),
+    [
+        ("a.zip", b"PK no archive", {}, "mapping", "a.zip: cannot be read as a ZIP archive"),
+        ("a.zip", None, {"mapping": "[angles]\n"}, "mapping", "no table [pressures]; name its columns"),
+        ("a.zip", None, {"mapping": 'sample_time = "10 ms"\n[angles]\ncolumns = "q"\n[pressures]\ncolumns = "p"'},
+         "mapping", "00.csv: no column 'q'; there are angle, speed, pressure1, pressure2"),
+        ("a.zip", None, {"mapping": "x" * 30_000}, "mapping", "must be a text of at most 20000 characters"),
+        ("a.zip", None, {"horizon": "2"}, "horizon", "horizon is 2; allowed range: 5 to 1000"),
+    ],
+)  # fmt: skip
+def test_an_impossible_record_names_the_field(app, name, content, settings, field, text):
+    _, answer = sheet_of(app, name, archive() if content is None else content, **settings)
+    found = problems(answer) if answer.status == 200 else {answer.json()["field"]: answer.json()["error"]}
+    assert text in found[field]
+    assert "/tmp" not in found[field]
+
+
+def test_what_forbids_a_fit_is_a_problem_of_the_mapping(app):
+    mapping = 'sample_time = "10 ms"\n[angles]\ncolumns = "angle"\nunit = "deg"\n[pressures]\ncolumns = {}\n[arm]\npairs = [[2, 1]]'
+    columns = '["pressure1", "pressure2"]'
+    _, answer = sheet_of(app, "a.zip", archive(), mapping=mapping.replace("{}", columns))
+    assert "muscles are exchanged: the mapping says that pressure 1 lowers angle 1" in problems(answer)["mapping"]
+
+
+def fitted(source, asked, progress):
+    """In place of the fit, which takes a minute: a chapter of the same form, from the same request."""
+    from matplotlib.figure import Figure
+
+    progress("delay of the pressures: 0 rows")
+    count = len(list(source.iterdir()))
+    table = Table("joint-errors", "Errors", {"prediction by": ["model"], "joint 1": [0.1]})
+    plots = (Plot("horizon", "Error against the horizon", Figure),)
+    values = {"summary": f"{count} files, horizon {asked.horizon}", "tables": (table,), "plots": plots}
+    return Chapter(name="joint", title="Identified arm", notes=("not separated",), **values), {
+        "scenario.toml": "a = 1\n"
+    }
+
+
+def test_the_fit_is_that_of_the_command_and_offers_its_files(app, monkeypatch):
+    monkeypatch.setattr(arm_task, "fit_requested_arm", fitted)
+    files, answer = sheet_of(app, "episodes.zip", archive())
+    settings = {"record": "arm", "mapping": answer.json()["mapping"], "horizon": "30"}
+    task = post(app, "start", set=files, settings=settings).json()["task"]
+    assert finished(app, task)["state"] == "done"
+    result = request(app, "GET", f"/api/fit/task/{task}/result.json").json()
+    assert result["arm"]["paragraphs"] == ["20 files, horizon 30"]
+    assert result["arm"]["notes"] == ["not separated"]
+    assert result["figures"][0]["src"].startswith("data:image/svg+xml;base64,")
+    assert result["files"] == ["report.html", "scenario.toml", "report.zip"]
+    assert request(app, "GET", f"/api/fit/task/{task}/scenario.toml").body == b"a = 1\n"
+
+
+def test_an_error_of_the_fit_is_shown_at_the_fit(app, monkeypatch):
+    def refuse(source, asked, progress):
+        raise IdentificationError("no episode is as long as a window")
+
+    monkeypatch.setattr(arm_task, "fit_requested_arm", refuse)
+    files, answer = sheet_of(app, "episodes.zip", archive())
+    settings = {"record": "arm", "mapping": answer.json()["mapping"]}
+    status = finished(app, post(app, "start", set=files, settings=settings).json()["task"])
+    assert (status["state"], status["field"]) == ("failed", "fit")
+    assert "no episode is as long as a window" in status["error"]
+    assert json.loads(json.dumps(status))["text"]

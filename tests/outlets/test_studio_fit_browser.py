@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import base64
 import contextlib
+import io
 import time
+import zipfile
 
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ import airmuscle as am
 
 pytest.importorskip("starlette", reason="needs starlette")
 pytest.importorskip("playwright.sync_api", reason="needs the package playwright")
+from arm_episodes import made_episodes
 from studio_browser import WAIT, address, browser, opened
 
 __all__ = ["address", "browser"]
@@ -177,3 +180,36 @@ def test_the_tab_fits_every_width(browser, address, width, scheme):
     with fit_tab(browser, address, width=width, scheme=scheme) as page:
         drop(page, "bench with a long name of many words in it.csv", table().replace(b"pressure", b"pressure [bar]"))
         assert page.evaluate("document.documentElement.scrollWidth") <= width
+
+
+def test_a_user_identifies_an_arm_from_an_archive_of_episodes(browser, address):
+    """Drop, look at what the record contains and at the proposed mapping, cancel, fit, look at the result."""
+    data = io.BytesIO()
+    with zipfile.ZipFile(data, "w") as file:
+        for number, run in enumerate(made_episodes(20).runs):
+            rows = [",".join(f"{v:.7g}" for v in row) for row in np.column_stack([run.angle, run.pressure / 1e3])]
+            file.writestr(f"{number:02d}.csv", "angle,p1,p2\n" + "\n".join(rows))
+    with fit_tab(browser, address) as page:
+        drop(page, "episodes.zip", data.getvalue())
+        assert "pressure 1 raises angle 1" in panel_text(page)
+        mapping = page.get_by_label("Mapping (TOML)")
+        assert 'columns = ["p1", "p2"]' in mapping.input_value()
+        correct_lines, count = mapping.input_value().replace('"angle"', '"angel"'), reads(page)
+        mapping.fill(correct_lines)
+        mapping.blur()
+        wait_for_read(page, count)
+        assert "no column 'angel'" in panel_text(page)
+        count = reads(page)
+        mapping.fill(correct_lines.replace("angel", "angle"))
+        mapping.blur()
+        wait_for_read(page, count)
+        start = page.get_by_role("button", name="Identify the arm")
+        start.click()
+        page.get_by_role("button", name="Cancel").click(timeout=WAIT)
+        page.wait_for_selector("#panel-fit[data-task=cancelled]", timeout=WAIT)
+        start.click()
+        page.wait_for_selector("#panel-fit[data-task=done]", timeout=FIT)
+        assert "Skill, 1 - error/error of the best baseline: joint 1: 0." in panel_text(page)
+        assert "What the record does not separate" in panel_text(page)
+        assert page.get_by_alt_text("Root mean square error against the horizon").is_visible()
+        assert page.get_by_role("link", name="Arm (TOML)").is_visible()

@@ -6,9 +6,38 @@ Where Gymnasium is installed, `import airmuscle.environments` registers them, al
 
 import importlib.util
 
+from ...core.errors import InputError
 from ...core.stubs import attach_stub
-from .registration import register_environments
 
 __getattr__, __dir__, __all__ = attach_stub(__name__, __file__)
+__all__ += ["register_environments"]
+ENVIRONMENTS = {"Joint": "joint", "JointOnOff": "on_off", "Lift": "lift", "Arm": "arm"}
+"""Names of the registered environments and of the functions that make them; the identifiers are airmuscle/Joint-v0 and
+so on."""
+EPISODE_PERIODS = 500
+"""Periods after which an episode of a registered environment is truncated."""
+
+
+def register_environments() -> None:
+    """Register airmuscle/Joint-v0, JointOnOff-v0, Lift-v0 and Arm-v0 with Gymnasium, once.
+
+    `gymnasium.make("airmuscle/Joint-v0")` and `gymnasium.make_vec(..., num_envs=N)` then return them. Gymnasium 1.0
+    and later call this for no package by themselves. Raises InputError if Gymnasium is not installed.
+    """
+    if importlib.util.find_spec("gymnasium") is None:
+        raise InputError("learning environments need the package gymnasium. Install it: pip install airmuscle[sim]")
+    from gymnasium.envs import registration
+
+    for name, make in ENVIRONMENTS.items():
+        identifier = f"airmuscle/{name}-v0"
+        if identifier not in registration.registry:
+            registration.register(
+                identifier,
+                entry_point=f"airmuscle.outlets.environments.plant_env:make_{make}",
+                vector_entry_point=f"airmuscle.outlets.environments.plant_vector_env:make_{make}_vector",
+                max_episode_steps=EPISODE_PERIODS,
+            )
+
+
 if importlib.util.find_spec("gymnasium") is not None:
     register_environments()

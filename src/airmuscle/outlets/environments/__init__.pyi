@@ -6,7 +6,6 @@ from .randomisation import FactorRange as FactorRange
 from .randomisation import FitUncertainty as FitUncertainty
 from .randomisation import Randomisation as Randomisation
 from .randomisation import ValueRange as ValueRange
-from .registration import register_environments as register_environments
 from .rollouts import Rollouts as Rollouts
 from .rollouts import roll_out as roll_out
 from .standard import ArmReaching as ArmReaching
@@ -17,3 +16,7 @@ from .standard import joint_task as joint_task
 from .standard import lift_task as lift_task
 from .task import EnvironmentTask as EnvironmentTask
 from .task import Observation as Observation
+
+EPISODE_PERIODS: int
+
+def register_environments() -> None: ...

@@ -12,9 +12,9 @@ from ...core import Array, ParameterError
 from ...engine.run import RungeKutta4
 from ...engine.run.batch import Double, Precision
 from ...engine.run.batch.stepper import BatchStepper
+from . import EPISODE_PERIODS
 from .plant_env import STEP, action_space, observation_space, with_on_off_valves
 from .randomisation import EpisodeDraw, Randomisation, whole_steps
-from .registration import EPISODE_PERIODS
 from .standard import arm_task, joint_task, lift_task
 from .task import EnvironmentTask
 

@@ -10,9 +10,9 @@ import numpy.typing as npt
 from ...core import Array, ShortRepr, check_whole
 from ...engine.distribution import DistributedCalls
 from ...engine.processes import Workers, process_pool
+from . import EPISODE_PERIODS
 from .plant_vector_env import PlantVectorEnv
 from .randomisation import Randomisation
-from .registration import EPISODE_PERIODS
 from .task import EnvironmentTask
 
 EPISODES_OF_A_TASK = 256

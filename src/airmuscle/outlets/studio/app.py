@@ -50,6 +50,14 @@ LONG_TASKS = (sheet_of_joint, size_sheet)
 """Tasks that leave the workers of the other sheets free."""
 
 
+SHEETS: Mapping[str, tuple[str, Callable[[], Any], Callable[[str], dict[str, Any]]]] = {
+    "law": ("muscle or law", list_laws, sheet_of_law),
+    "plant": ("plant", list_plants, sheet_of_library_plant),
+    "joint": ("joint", joint_names, sheet_of_joint),
+}
+"""Sheets of the library by their address: what they are, their names, and the task that makes one."""
+
+
 class Sheets:
     """The sheets that were requested last, by their identifier."""
 
@@ -123,11 +131,9 @@ def create_app(
         Route("/web/{name:path}", handlers.web),
         Route("/program/{name}", handlers.program),
         Route("/api/library", handlers.library),
-        Route("/api/law/{name}", handlers.law),
         Route("/api/law", handlers.own_law, methods=["POST"]),
-        Route("/api/plant/{name}", handlers.plant),
         Route("/api/plant", handlers.own_plant, methods=["POST"]),
-        Route("/api/joint/{name}", handlers.joint),
+        *(Route(f"/api/{kind}/{{name}}", handlers.of_library(kind)) for kind in SHEETS),
         Route("/api/size", handlers.size, methods=["POST"]),
         Route("/api/page", handlers.save_page, methods=["POST"]),
         *(fits or FitService(pool)).routes(),
@@ -180,36 +186,27 @@ class Handlers:
         """Names of the library, and the sheets with which the page begins."""
         return json_answer({**self._library, "opened": [_without_script(sheet) for sheet in self._opened]})
 
-    async def law(self, request: Any) -> Any:
-        """The sheet of a law of the library."""
-        name = request.path_params["name"]
-        if name not in list_laws():
-            raise BadRequest(f"the library has no muscle or law '{name[:80]}'.", 404)
-        return await self._computed(self._sheets.of_library, sheet_of_law, name)
+    def of_library(self, kind: str) -> Callable[[Any], Any]:
+        """The handler of the sheets of a law, a plant or a joint of the library."""
+        what, names, task = SHEETS[kind]
+
+        async def handle(request: Any) -> Any:
+            name = request.path_params["name"]
+            if name not in names():
+                raise BadRequest(f"the library has no {what} '{name[:80]}'.", 404)
+            return await self._computed(self._sheets.of_library, task, name)
+
+        return handle
 
     async def own_law(self, request: Any) -> Any:
         """The sheet of a text of a user."""
         text = decoded(await limited_body(request, MAX_TEXT))
         return await self._computed(self._sheets.of_text, sheet_of_law_text, text)
 
-    async def plant(self, request: Any) -> Any:
-        """The sheet of a plant that the page offers."""
-        name = request.path_params["name"]
-        if name not in list_plants():
-            raise BadRequest(f"there is no plant '{name[:80]}'.", 404)
-        return await self._computed(self._sheets.of_library, sheet_of_library_plant, name)
-
     async def own_plant(self, request: Any) -> Any:
         """The sheet of a scenario of a user."""
         text = decoded(await limited_body(request, MAX_TEXT))
         return await self._computed(self._sheets.of_text, sheet_of_scenario_text, text)
-
-    async def joint(self, request: Any) -> Any:
-        """The sheet of a joint of the library."""
-        name = request.path_params["name"]
-        if name not in joint_names():
-            raise BadRequest(f"the library has no joint '{name[:80]}'.", 404)
-        return await self._computed(self._sheets.of_library, sheet_of_joint, name)
 
     async def size(self, request: Any) -> Any:
         """The sheet of a sizing."""

@@ -14,6 +14,7 @@ from __future__ import annotations
 import json
 from typing import Any
 
+from .arm_task import ArmSettings, read_arm_settings, sheet_of_episodes
 from .fit_queue import DONE, FitQueue
 from .fit_settings import FitSettings, read_settings
 from .fit_sheet import sheet_of_files
@@ -72,7 +73,8 @@ class FitService:
 
         wanted = await _content(request)
         folder, settings = self._uploads.folder(_name(wanted, "set")), _settings(wanted)
-        sheet = await run_in_threadpool(self._pool.call, sheet_of_files, str(folder), settings, limit=READING_LIMIT)
+        task = sheet_of_episodes if isinstance(settings, ArmSettings) else sheet_of_files
+        sheet = await run_in_threadpool(self._pool.call, task, str(folder), settings, limit=READING_LIMIT)
         return json_answer(sheet)
 
     async def start(self, request: Any) -> Any:
@@ -104,8 +106,12 @@ class FitService:
         return FileResponse(path, media_type=kind, filename=shown)
 
 
-def _settings(wanted: dict[str, Any]) -> FitSettings:
-    return read_settings(wanted.get("settings", {}))
+def _settings(wanted: dict[str, Any]) -> FitSettings | ArmSettings:
+    """The settings of measurement files of a muscle, or of episodes of an arm."""
+    given = wanted.get("settings", {})
+    return (
+        read_arm_settings(given) if isinstance(given, dict) and given.get("record") == "arm" else read_settings(given)
+    )
 
 
 def _name(wanted: dict[str, Any], key: str) -> str:

@@ -34,12 +34,15 @@ from ...report.data import as_json, as_sheet, in_words
 from ...report.formula import to_display_mathml
 from ...report.write import write_into
 from ..requests import FitRequest, RequestError, fit_requested, problem_of_lengths
+from .arm_task import ArmSettings, run_arm_fit
 from .fit_hints import as_field_error, in_page_words
 from .fit_reading import read_set
 from .fit_settings import SPLITS, FitSettings, selected
 
 Report = Callable[[float, str], None]
-DOWNLOADS = ("report.html", "muscle.toml", "report.zip", "friction.html", "friction.toml")
+DOWNLOADS = (
+    "report.html", "muscle.toml", "scenario.toml", "controlled.toml", "report.zip", "friction.html", "friction.toml"
+)  # fmt: skip
 """Files of a result that the page offers."""
 RESULT = "result.json"
 SHARES = (0.05, 0.75, 0.95)
@@ -57,11 +60,14 @@ MAX_PARITY_POINTS = 4000
 """Maximum number of points of the parity chart; of more rows every n-th one is shown (chosen)."""
 
 
-def run_fit(folder: str, out: str, settings: FitSettings, report: Report) -> None:
+def run_fit(folder: str, out: str, settings: FitSettings | ArmSettings, report: Report) -> None:
     """Fit the selected rows of a set of files, and write result.json, report and muscle into `out`.
 
     Raises RequestError for input of the page that is not possible.
     """
+    if isinstance(settings, ArmSettings):
+        run_arm_fit(folder, out, settings, report, _pack)
+        return
     report(0.0, "reading the files")
     recordings, names = _recordings(Path(folder), settings)
     report(SHARES[0], "comparison of the laws")

@@ -26,7 +26,7 @@ MAX_FILE = 32 * 10**6
 """Largest size of a measurement file [bytes] (chosen)."""
 MAX_SET = 64 * 10**6
 """Largest size of all files of a set [bytes] (chosen)."""
-MAX_FILES = 60
+MAX_FILES = 400
 """Maximum number of files of a set (chosen)."""
 MAX_SETS = 40
 """Maximum number of sets that the server keeps (chosen)."""
@@ -36,6 +36,8 @@ may be removed at once."""
 MAX_NAME = 120
 """Maximum length of the name of a file (chosen)."""
 FILES = "files"
+ACCEPTED = (*EXTENSIONS, ".npz", ".json", ".jsonl", ".zip")
+"""Extensions of measurement files and of episodes."""
 _PREFIX = "airmuscle-studio-"
 _IDENTIFIER = re.compile(r"[A-Za-z0-9_-]{22}")
 _FORBIDDEN = set('<>:"/\\|?*')
@@ -49,8 +51,8 @@ def check_file_name(name: str) -> str:
         raise BadRequest(f"'{shown}' is no name of a file; rename it, without folders and special characters.")
     if len(name.encode()) > MAX_NAME:
         raise BadRequest(f"'{shown}…': the name of the file has more than {MAX_NAME} bytes; shorten it.")
-    if Path(name).suffix.lower() not in EXTENSIONS:
-        raise BadRequest(f"'{shown}' is of no supported format; supported extensions are {', '.join(EXTENSIONS)}.")
+    if Path(name).suffix.lower() not in ACCEPTED:
+        raise BadRequest(f"'{shown}' is of no supported format; supported extensions are {', '.join(ACCEPTED)}.")
     return name
 
 

@@ -41,6 +41,7 @@ SCRIPTS = (
     "scripts/fit-source.js",
     "scripts/fit-scatter.js",
     "scripts/fit-data.js",
+    "scripts/fit-arm.js",
     "scripts/fit-files.js",
     "scripts/fit-result.js",
     "scripts/fit-tab.js",

@@ -4,6 +4,7 @@
 (() => {
   const { element, shortText } = airmuscle;
   const QUANTITIES = ["time", "pressure", "contraction", "length", "shortening", "elongation", "force", "position", "branch", "volume", "temperature", "speed", "angle", "resting_length", "ambient"];
+  const MOST = 12;  /* files of an arm that are listed */
   const SPECIAL = { resting_length: "resting length (constant)", ambient: "ambient pressure (constant)" };
 
   const problemOf = (texts) => (texts?.length ? element("p.message.error", {}, texts.join(" ")) : null);
@@ -13,13 +14,13 @@
     const choose = element("input", { type: "file", multiple: true, "aria-label": "Measurement files" });
     choose.addEventListener("change", async () => { const files = [...choose.files]; choose.value = ""; await receive(files); });
     const drop = element("div.drop", {}, element("p", {}, "Drop measurement files here, or choose them:"), choose,
-      element("p.small.soft", {}, "CSV, Excel, MAT, TDMS, MDF, Parquet, HDF5 and others with pressure, length or contraction, and force. They stay on the machine of the server."));
+      element("p.small.soft", {}, "A muscle: CSV, Excel, MAT, TDMS, MDF, Parquet, HDF5 and others with pressure, length or contraction, and force. An arm: its episodes, a folder, a ZIP archive or one file (NPZ, CSV, JSON, HDF5, Parquet). They stay on the machine of the server."));
     for (const name of ["dragenter", "dragover"]) drop.addEventListener(name, (event) => { event.preventDefault(); drop.classList.add("over"); });
     drop.addEventListener("dragleave", () => drop.classList.remove("over"));
     drop.addEventListener("drop", async (event) => {
       event.preventDefault();
       drop.classList.remove("over");
-      await receive([...event.dataTransfer.files]);
+      await receive(await airmuscle.droppedFiles(event.dataTransfer));
     });
     return drop;
   }
@@ -27,14 +28,16 @@
   class FileList {
     constructor(host, { remove, stated }) { Object.assign(this, { host, remove, stated }); }
 
-    /* names: of the files on the server; sheet: what was understood, or null; facts: what the user states for each file */
+    /* names: of the files on the server; sheet: what was understood, or null; facts: what the user states for each file, null for episodes */
     show(names, sheet, facts, problems) {
       const kept = document.activeElement?.dataset?.fact;
-      this.host.replaceChildren(...names.map((name) => this.item(name, sheet, facts[name] ?? {}, problems.get(`file:${name}`))));
+      const shown = facts ? names : names.slice(0, MOST), further = names.length - shown.length;
+      this.host.replaceChildren(...shown.map((name) => this.item(name, sheet, facts?.[name] ?? {}, problems.get(`file:${name}`), facts !== null)));
+      if (further) this.host.append(element("li.file.small.soft", {}, `and ${further} more`));
       if (kept) [...this.host.querySelectorAll("[data-fact]")].find((field) => field.dataset.fact === kept)?.focus();
     }
 
-    item(name, sheet, facts, problems) {
+    item(name, sheet, facts, problems, muscle) {
       const read = sheet?.recordings.filter((r) => r.file === name) ?? [];
       const field = (key, label, example) => {
         const made = element("input", { type: "text", value: facts[key] ?? "", placeholder: example, "aria-label": `${label} of ${name}`, "data-fact": `${name} ${key}`, autocomplete: "off" });
@@ -45,7 +48,7 @@
         element("div.facts-of-file", {}, field("resting_length", "Resting length", "300 mm"), field("length", "Held length", "285 mm"), field("specimen", "Specimen", "A")));
       return element("li.file", {},
         element("div.row", {}, element("strong.grow", {}, name), element("button", { type: "button", "aria-label": `Remove ${name}`, onclick: () => this.remove(name) }, "×")),
-        ...read.map((recording) => this.recording(recording, read.length > 1)), problemOf(problems), own);
+        ...read.map((recording) => this.recording(recording, read.length > 1)), problemOf(problems), muscle ? own : null);
     }
 
     recording(recording, several) {

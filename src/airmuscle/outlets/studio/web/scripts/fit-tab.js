@@ -1,11 +1,12 @@
-/* Tab Fit: from measurement files to a muscle. The server reads and fits; the page may be closed meanwhile. */
+/* Tab Fit: from measurement files to a muscle, or from episodes to an arm. The server reads and fits; the page may be closed meanwhile. */
 "use strict";
 
 (() => {
   const { element, source, fitSource, say, problemOf } = airmuscle;
   const PAUSE = 800;
   const SHOWN = ["resting_length", "outliers", "braid_radius", "braid_angle"];
-  const empty = (names) => ({ columns: {}, files: {}, rules: [], entry: "", leave_out: "", hysteresis: false, ...Object.fromEntries(names.map((name) => [name, ""])) });
+  const ARM = ["record", "mapping", "left_out", "horizon"];
+  const empty = (names) => ({ columns: {}, files: {}, rules: [], entry: "", leave_out: "", hysteresis: false, ...Object.fromEntries([...names, ...ARM].map((name) => [name, ""])) });
 
   class FitTab {
     constructor(host, stateChanged) {
@@ -39,8 +40,8 @@
     }
 
     build(library) {
-      this.form = Object.fromEntries(library.forms.fit.map((field) => [field.name, field]));
-      this.texts = Object.keys(this.form).filter((name) => name !== "leave_out");
+      this.texts = library.forms.fit.map((field) => field.name).filter((name) => name !== "leave_out");
+      this.form = Object.fromEntries([...library.forms.fit, ...library.forms.arm].map((field) => [field.name, field]));
       this.settings = empty(this.texts);
       const card = (title, ...children) => element("section.card", {}, element("h2", {}, title), ...children);
       const hosts = { files: element("ul.files"), columns: element("div"), data: element("div") };
@@ -57,20 +58,44 @@
       this.dataCard = card("Measured rows", this.declared("outliers"), hosts.data);
       this.columnsCard = card("Columns", element("p.small.soft", {}, "What each column was read as. Correct the quantity or the unit where it is wrong."), hosts.columns);
       this.resultHost = element("div.stack");
+      this.found = element("div");
+      this.foundCard = card("What the record contains", this.found);
       this.further = element("details", {}, element("summary", {}, "More on the files"),
         ...this.texts.filter((name) => !SHOWN.includes(name)).map((name) => this.declared(name)));
       this.host.append(element("div.columns", {},
         element("div.stack", {},
-          card("Files", airmuscle.dropArea((files) => this.upload(files)), this.message, this.places.files, hosts.files),
-          card("Muscle", this.declared("resting_length"), this.declared("braid_radius"), this.declared("braid_angle"), this.choice("entry", "Also compare an entry of the library", laws), this.further),
-          card("Fit", this.declared("leave_out"), element("label.row", { for: "fit-hysteresis" }, this.fields.hysteresis, "Friction from both branches (takes longer)"),
+          card("Files", this.choice("record", "They are a record of", [["", "a muscle at a test rig"], ["arm", "an arm: episodes of its angles and pressures"]]), airmuscle.dropArea((files) => this.upload(files)), this.message, this.places.files, hosts.files),
+          this.muscleCard = card("Muscle", this.declared("resting_length"), this.declared("braid_radius"), this.declared("braid_angle"), this.choice("entry", "Also compare an entry of the library", laws), this.further),
+          this.mappingCard = card("Mapping", element("p.small.soft", {}, "What the columns of the episodes are, as in a mapping file (TOML). It is proposed from their names and sizes: check it."), this.mappingField()),
+          card("Fit", this.ofMuscle = element("div", {}, this.declared("leave_out"), element("label.row", { for: "fit-hysteresis" }, this.fields.hysteresis, "Friction from both branches (takes longer)")),
+            this.ofArm = element("div", {}, ...library.forms.arm.map((field) => this.declared(field.name))),
             this.places.fit, element("div.row", {}, this.startButton, this.cancelButton), this.bar, this.progressText)),
-        element("div.stack", {}, this.columnsCard, this.dataCard, this.resultHost)));
+        element("div.stack", {}, this.foundCard, this.columnsCard, this.dataCard, this.resultHost)));
       this.list = new airmuscle.FileList(hosts.files, { remove: (name) => this.remove(name), stated: (name, key, value) => { this.settings.files[name] = { ...this.settings.files[name], [key]: value }; this.read(); } });
       this.columns = new airmuscle.ColumnTable(hosts.columns, (key, value) => { if (value) this.settings.columns[key] = value; else delete this.settings.columns[key]; this.read(); });
       this.data = new airmuscle.FitData(hosts.data, () => { this.settings.rules = this.data.rules; this.read(300); });
       this.places.rules = this.data.problem;
       this.columnsCard.hidden = this.dataCard.hidden = true;
+      this.showRecord();
+    }
+
+    mappingField() {
+      const made = element("textarea", { id: "fit-mapping", rows: 18, spellcheck: false, "aria-label": "Mapping (TOML)" });
+      made.addEventListener("change", () => { this.settings.mapping = made.value.trim() ? made.value : ""; this.read(); });
+      this.fields.mapping = made;
+      this.places.mapping = element("div", { role: "alert" });
+      return element("div.field", {}, made, this.places.mapping);
+    }
+
+    get arm() { return this.settings.record === "arm"; }
+
+    /* The cards of a muscle, or of an arm. */
+    showRecord() {
+      for (const part of [this.muscleCard, this.ofMuscle]) part.hidden = this.arm;
+      for (const part of [this.mappingCard, this.ofArm]) part.hidden = !this.arm;
+      this.foundCard.hidden = !this.arm || !this.sheet?.lines?.length;
+      this.fields.record.value = this.settings.record;
+      this.startButton.textContent = this.arm ? "Identify the arm" : "Fit and compare all laws";
     }
 
     async start(library, state) {
@@ -87,9 +112,9 @@
       const given = state.settings ?? {}, table = (value) => (value && typeof value === "object" && !Array.isArray(value) ? value : {});
       const rules = (Array.isArray(given.rules) ? given.rules : []).filter((rule) => Array.isArray(rule?.recordings) && (Array.isArray(rule.rows) || (rule.ranges && typeof rule.ranges === "object")));
       this.settings = { ...empty(this.texts), columns: table(given.columns), files: table(given.files), rules, hysteresis: given.hysteresis === true };
-      for (const name of [...this.texts, "entry", "leave_out"]) if (typeof given[name] === "string") this.settings[name] = given[name];
+      for (const name of [...this.texts, ...ARM, "entry", "leave_out"]) if (typeof given[name] === "string") this.settings[name] = given[name];
       Object.assign(this, { set: state.set, task: typeof state.task === "string" ? state.task : "", names: [] });
-      for (const name of [...this.texts, "entry", "leave_out"]) this.fields[name].value = this.settings[name];
+      for (const name of [...this.texts, ...ARM, "entry", "leave_out"]) this.fields[name].value = this.settings[name];
       this.fields.hysteresis.checked = this.settings.hysteresis;
       this.further.open = this.texts.some((name) => !SHOWN.includes(name) && this.settings[name]);
       this.data.rules = this.settings.rules;
@@ -117,6 +142,7 @@
         }
       }
       this.host.removeAttribute("aria-busy");
+      if (airmuscle.areEpisodes(this.names)) this.settings.record = "arm";
       this.complain(failed.join(" "));
       if (this.set) await this.read(0);
     }
@@ -151,7 +177,12 @@
       this.host.removeAttribute("aria-busy");
       if (sheet) { this.sheet = sheet; this.names = sheet.files.map((file) => file.name); }
       this.showProblems(problems);
-      this.list.show(this.names, this.sheet, this.settings.files, this.problems);
+      this.list.show(this.names, this.sheet, this.arm ? null : this.settings.files, this.problems);
+      this.showRecord();
+      if (this.arm && this.sheet?.lines) {
+        airmuscle.showInspection(this.found, this.sheet.lines);
+        if (document.activeElement !== this.fields.mapping || !this.settings.mapping) this.fields.mapping.value = this.sheet.mapping;
+      }
       const known = Boolean(this.sheet?.files.some((file) => file.columns.length));
       this.columnsCard.hidden = !known;
       this.dataCard.hidden = !this.sheet?.recordings.length;
@@ -183,6 +214,7 @@
 
     async start_() {
       this.showProblems([]);
+      if (this.arm) this.settings.mapping = this.fields.mapping.value;  /* as it is seen, also where it was proposed */
       this.startButton.disabled = true;
       try { this.task = (await fitSource.start(this.set, this.settings)).task; } catch (error) {
         this.showProblems([{ field: error.field || "fit", text: error.message }]);
@@ -226,7 +258,7 @@
       if (status.state === "failed") { this.ended(status.error, "", "failed", status.field); return; }
       try {
         const result = await fitSource.result(task);
-        airmuscle.showResult(this.resultHost, task, result);
+        if (result.arm) airmuscle.showArm(this.resultHost, task, result); else airmuscle.showResult(this.resultHost, task, result);
         this.ended("", "The fit is complete.", "done");
       } catch (error) { this.ended(error.message, "", "failed"); }
     }

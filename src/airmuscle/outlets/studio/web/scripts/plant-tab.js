@@ -19,7 +19,7 @@
       const card = (title, order, ...children) => element(`section.card${order}`, {}, element("h2", {}, title), ...children);
       const button = (text, action) => element("button", { type: "button", onclick: () => this.run && action() }, text);
       this.select = element("select", { "aria-label": "Plant of the library" });
-      this.select.addEventListener("change", () => this.choose(this.select.value));
+      this.select.addEventListener("change", () => this.select.value && this.choose(this.select.value));
       this.message = element("p", { role: "alert" });
       this.own = airmuscle.textField("Scenario (TOML)", "Read this scenario", async (text) => { this.open(await source.ownText("plant", text)); say("The scenario was read."); });
       this.playButton = button("Play", () => this.togglePlay());
@@ -114,7 +114,13 @@
         ...loop.figures.map((src, i) => element("img", { src, alt: i ? "Nyquist plot of the open loop" : "Bode plot of the open loop" })));
     }
 
-    nameSelected() { this.select.value = this.sheet.own_text ? "" : this.sheet.name; }
+    /* The list names what is shown: an entry of the library, or the own scenario. */
+    nameSelected() {
+      this.ownOption?.remove();
+      this.ownOption = this.sheet.own_text ? element("option", { value: "" }, `own scenario – ${this.sheet.title}`) : null;
+      if (this.ownOption) this.select.prepend(this.ownOption);
+      this.select.value = this.sheet.own_text ? "" : this.sheet.name;
+    }
 
     buildInputs() {
       const first = this.run.program.run.segments.values[0] ?? [];

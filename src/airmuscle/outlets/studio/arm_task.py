@@ -1,0 +1,136 @@
+"""Task of the tab Fit on episodes of an arm: what the record contains, and the fit, report and scenarios of the arm.
+
+The computation is that of `airmuscle fit-joint`. A ZIP archive is a folder of episodes. A mapping is proposed.
+"""
+
+import contextlib
+import dataclasses
+import tempfile
+import zipfile
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+from ...bench import propose_mapping
+from ...core.atomic_output import atomic_folder
+from ...core.errors import AirmuscleError, FileError
+from ...report.data import as_json, as_sheet
+from ...report.write import write_into
+from ..requests import JointFitRequest, RequestError, build, fit_requested_arm, inspect_requested
+from .fit_reading import without_folder
+from .fit_uploads import FILES
+from .plant_sheet import svg_uri
+
+ARCHIVE, MAPPING = ".zip", "mapping.toml"
+MAX_UNPACKED, MAX_ENTRIES = 512 * 10**6, 20_000
+"""Largest size [bytes] and number of the files of an archive (chosen)."""
+MAX_MAPPING = 20_000
+"""Largest size of a mapping [characters] (chosen)."""
+
+
+@dataclasses.dataclass(frozen=True)
+class ArmSettings:
+    """What the user states about episodes: the text of the mapping file, or "", and the texts of the request."""
+
+    mapping: str
+    left_out: str = ""
+    horizon: str = ""
+
+    def request(self, folder: Path) -> JointFitRequest:
+        """The request, whose mapping file is written to a folder."""
+        path = folder / MAPPING
+        path.write_text(self.mapping, encoding="utf-8")
+        given = {"mapping": path, "left_out": self.left_out, "horizon": self.horizon}
+        return build(JointFitRequest, given, lambda name: name.replace("_", " "))
+
+
+def read_arm_settings(data: dict[str, Any]) -> ArmSettings:
+    """The settings in a request of the page. Raises RequestError."""
+    values = {field.name: data.get(field.name, "") for field in dataclasses.fields(ArmSettings)}
+    for name, value in values.items():
+        if not isinstance(value, str) or len(value) > MAX_MAPPING:
+            raise RequestError(f"{name} must be a text of at most {MAX_MAPPING} characters.", name)
+    return ArmSettings(**values)
+
+
+def sheet_of_episodes(folder: str, settings: ArmSettings) -> dict[str, Any]:
+    """What was understood of the episodes of a set; problems are part of the sheet, and no exception."""
+    names = sorted(path.name for path in (Path(folder) / FILES).iterdir())
+    sheet: dict[str, Any] = {
+        "files": [{"name": name, "columns": []} for name in names], "recordings": [], "remarks": [], "problems": [],
+        "mapping": settings.mapping, "lines": [], "ready": False,
+    }  # fmt: skip
+    try:
+        with _opened(Path(folder)) as (source, place):
+            sheet["mapping"] = settings.mapping or propose_mapping(source)
+            request = dataclasses.replace(settings, mapping=sheet["mapping"]).request(place)
+            found = inspect_requested(source, request)
+            sheet["lines"] = [line for line in str(found).splitlines() if not line.startswith("error: ")]
+            sheet["problems"] = [{"field": "mapping", "text": text} for text in found.errors]
+    except RequestError as error:
+        sheet["problems"] = [{"field": error.field or "mapping", "text": error.message}]
+    sheet["ready"] = not sheet["problems"]
+    return sheet
+
+
+def run_arm_fit(
+    folder: str, out: str, settings: ArmSettings, report: Callable[[float, str], None],
+    pack: Callable[[Path], list[str]],
+) -> None:  # fmt: skip
+    """Fit an arm to the episodes of a set, and write its result into `out`; `pack` returns the files that are offered.
+
+    Raises RequestError.
+    """
+    report(0.0, "reading the episodes")
+    lines: list[str] = []
+
+    def progress(text: str) -> None:
+        lines.append(text)
+        report(1.0 - 0.9 ** len(lines) ** 1.5, text)  # the number of joints is not known before
+
+    with _opened(Path(folder), "fit") as (source, place):
+        chapter, files = fit_requested_arm(source, settings.request(place), progress)
+    report(0.95, "report")
+    with atomic_folder(out) as staging:
+        write_into(staging, [chapter], title="Identified arm")
+        for name, text in files.items():
+            (staging / name).write_text(text, encoding="utf-8")
+        figures = [{"src": svg_uri(plot.draw()), "caption": plot.caption} for plot in chapter.plots]
+        sheet = {"arm": as_sheet(chapter), "figures": figures, "files": pack(staging)}
+        (staging / "result.json").write_text(as_json(sheet), encoding="utf-8")
+
+
+@contextlib.contextmanager
+def _opened(folder: Path, field: str = "mapping") -> Iterator[tuple[Path, Path]]:
+    """The file or the folder of the episodes of a set, and a folder for the mapping; errors do not name them."""
+    files = sorted((folder / FILES).iterdir())
+    with tempfile.TemporaryDirectory(dir=folder) as made:
+        place = Path(made)
+        try:
+            if not files:
+                raise RequestError("there is no file; drop the episodes first.", "files")
+            source = files[0] if len(files) == 1 else folder / FILES
+            yield (_unpacked(source, place / "episodes") if source.suffix.lower() == ARCHIVE else source), place
+        except AirmuscleError as error:
+            text = without_folder(without_folder(str(error.message), place), folder / FILES)
+            own = getattr(error, "field", "") or ("mapping" if MAPPING in text else field)
+            raise RequestError(text, own) from None
+
+
+def _unpacked(archive: Path, folder: Path) -> Path:
+    """The folder of the files of an archive: the innermost one that alone holds all. Raises FileError."""
+    try:
+        with zipfile.ZipFile(archive) as file:
+            entries = file.infolist()
+            if len(entries) > MAX_ENTRIES or sum(each.file_size for each in entries) > MAX_UNPACKED:
+                raise FileError(
+                    f"{archive.name}: the archive holds more than {MAX_ENTRIES} files or {MAX_UNPACKED // 10**6} MB; "
+                    "give fewer episodes."
+                )
+            file.extractall(folder)  # names that lead out of the folder are changed
+    except (zipfile.BadZipFile, OSError, RuntimeError, NotImplementedError) as reason:
+        raise FileError(f"{archive.name}: cannot be read as a ZIP archive ({reason}). Write it again.") from None
+    inner = list(folder.iterdir())
+    while len(inner) == 1 and inner[0].is_dir() and not (inner[0] / "metadata.yaml").exists():
+        folder, inner = inner[0], list(inner[0].iterdir())
+    return folder
