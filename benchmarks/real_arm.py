@@ -1,6 +1,6 @@
 """Free run of an arm identified from measured episodes, beside persistence and ARX.
 
-    python benchmarks/real_arm.py EPISODES.npz MAPPING.toml [--left-out 300] [--figure horizon.png]
+    python benchmarks/real_arm.py EPISODES.npz MAPPING.toml [--left-out 300] [--residual] [--figure horizon.png]
 
 The episodes are read by `read_episodes`; the last ones judge. Windows of 40 rows begin at rows 10, 50, ... of each
 episode; a model is given angles and speeds at their start and the pressures until their end. Errors are rms over all
@@ -27,6 +27,7 @@ def main() -> None:
     parser.add_argument("mapping", type=Path)
     parser.add_argument("--left-out", type=int, default=300)
     parser.add_argument("--uncoupled", action="store_true", help="ignore the axes of the mapping file")
+    parser.add_argument("--residual", action="store_true", help="fit a hybrid law to what physics leaves")
     parser.add_argument("--figure", type=Path)
     parser.add_argument("--pickle", type=Path, help="file for the fit itself (pickle)")
     parser.add_argument("--keep", type=Path, help="file for the errors of every window (NPZ)")
@@ -40,7 +41,7 @@ def main() -> None:
     episodes = am.bench.read_episodes(given.episodes, mapping)
     fit = am.bench.fit_joint(
         episodes, pairs=mapping.pairs, axes=() if given.uncoupled else mapping.axes,
-        left_out=given.left_out / len(episodes), progress=say,
+        left_out=given.left_out / len(episodes), residual=given.residual, progress=say,
     )  # fmt: skip
     print(fit)
     wall, used = time.perf_counter() - start, time.process_time() - spent

@@ -41,9 +41,9 @@ def known_arm(joints=1):
     return PressureDriven(tuple(muscles), mechanism, (0.03,) * (2 * joints))
 
 
-def made_episodes(count=40, joints=1, seed=0, noise=5e-4, delay=0, rows=ROWS):
+def made_episodes(count=40, joints=1, seed=0, noise=5e-4, delay=0, rows=ROWS, arm=None):
     """Episodes under pressures that wander between 0 and 3 bar, with a noise of the angles [rad]."""
-    rng, arm = np.random.default_rng(seed), known_arm(joints)
+    rng, arm = np.random.default_rng(seed), arm or known_arm(joints)
     knots = np.linspace(0.0, STEP * (rows + delay), 12)
     levels = rng.uniform(0.2e5, 3e5, (count, 2 * joints, len(knots)))
     names = [f"m{i}.measured_pressure" for i in range(2 * joints)]

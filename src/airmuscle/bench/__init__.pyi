@@ -109,9 +109,11 @@ from .joint import EpisodeMapping as EpisodeMapping
 from .joint import Episodes as Episodes
 from .joint import PressureAction as PressureAction
 from .joint import RegulatorLag as RegulatorLag
+from .joint import ResidualGain as ResidualGain
 from .joint import estimate_angles as estimate_angles
 from .joint import fit_joint as fit_joint
 from .joint import fit_regulator_lags as fit_regulator_lags
+from .joint import fit_residual as fit_residual
 from .joint import inspect_episodes as inspect_episodes
 from .joint import propose_mapping as propose_mapping
 from .joint import read_episode_mapping as read_episode_mapping

@@ -19,6 +19,7 @@ from .mechanism import ConstantRadius as ConstantRadius
 from .mechanism import Coordinate as Coordinate
 from .mechanism import CrankProfile as CrankProfile
 from .mechanism import ExternalLoad as ExternalLoad
+from .mechanism import GaussianResidual as GaussianResidual
 from .mechanism import HangingMass as HangingMass
 from .mechanism import HuntCrossley as HuntCrossley
 from .mechanism import Isometric as Isometric
@@ -44,6 +45,7 @@ from .mechanism import WithEndStops as WithEndStops
 from .mechanism import WithLatch as WithLatch
 from .mechanism import WithOffsets as WithOffsets
 from .mechanism import WithStickSlip as WithStickSlip
+from .mechanism import friction_load as friction_load
 from .muscle import INNER_CONTRACTION as INNER_CONTRACTION
 from .muscle import CreepElements as CreepElements
 from .muscle import CubicSeriesSpring as CubicSeriesSpring

@@ -10,7 +10,9 @@ from .episodes import Episode as Episode
 from .episodes import Episodes as Episodes
 from .fit import fit_joint as fit_joint
 from .free_run import RegulatorLag as RegulatorLag
+from .free_run import ResidualGain as ResidualGain
 from .free_run import fit_regulator_lags as fit_regulator_lags
+from .free_run import fit_residual as fit_residual
 from .result import AngleEstimate as AngleEstimate
 from .result import ArmFit as ArmFit
 from .result import ArmParameter as ArmParameter

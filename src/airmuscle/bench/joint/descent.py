@@ -15,7 +15,7 @@ from ...core.declaration import model
 from ...core.ops import Value, Values
 from ...core.system import StateVariable, System
 from ...engine import BatchSolution, RungeKutta4, WithSensitivities, sensitivity, simulate_batch
-from ...physics import PressureDriven, SerialArm, WithStickSlip
+from ...physics import PressureDriven, SerialArm, WithStickSlip, friction_load
 from .episodes import HISTORY, Windows, WindowSignal, start_of
 
 SUBSTEPS = 3
@@ -34,7 +34,7 @@ LOW = {"presliding_angle": 1.5e-3, "lags": 2e-3, "rotor_inertia": 1e-3, "stribec
 SIZES = {
     "damping": 0.3, "coulomb_torque": 0.5, "load_arms": 4e-3, "presliding_angle": 2e-3, "lags": 0.01, "mass": 1.0,
     "static_excess": 0.3, "stribeck_speed": 1.0, "zero_angle": 1.0, "rotor_inertia": 0.03, "centre": 0.2,
-    "slack_width": 5.0, "inertia": 0.03,
+    "slack_width": 5.0, "inertia": 0.03, "energies": 1.0, "friction_logs": 0.3,
 }  # fmt: skip
 """Typical sizes [SI] of parameters that may start at 0 (chosen)."""
 
@@ -57,7 +57,8 @@ class Descent:
     paths: Mapping[int, Sequence[str]]
     seed: int = 0
     prior: Mapping[str, float] = dataclasses.field(default_factory=dict)
-    """Values towards which parameters are drawn that the record hardly determines, by path."""
+    """Values towards which parameters are drawn that the record hardly determines, by path; with `ridge` as weight."""
+    ridge: float = PRIOR
 
     def __post_init__(self) -> None:
         leaves = {leaf.path: leaf for leaf in tree.leaves(self.arm)}
@@ -128,7 +129,7 @@ class Descent:
         return normal, slope
 
     def _step(self, normal: Array, slope: Array, rate: float) -> None:
-        pull = np.array([PRIOR * (name in self.prior) for name in self.names]) / self.sizes**2
+        pull = np.array([self.ridge * (name in self.prior) for name in self.names]) / self.sizes**2
         slope = slope + pull * (self.values - [self.prior.get(name, 0.0) for name in self.names])
         normal = normal + np.diag(pull)
         scale = np.sqrt(np.diag(normal))
@@ -275,9 +276,10 @@ class OneJoint(System):
         ]
         others = {mechanism.coordinates[i].name: inputs[mechanism.coordinates[i].acceleration] for i in self.others}
         needed = mechanism.inverse_dynamics(place, place, {**others, c.name: 0.0})[c.name]
-        torque = mechanism.generalised_forces(place, tensions, lengths)[c.name]
-        element = cast(WithStickSlip, self.arm.mechanism).elements[self.joint]
-        load = sum((mu * tension for mu, tension in zip(element.load_arms, tensions, strict=False)), 0.0)
+        outer = cast(WithStickSlip, self.arm.mechanism)
+        read = {f"{prefix}pressure": p for prefix, p in zip(self.arm.prefixes, pressures, strict=True)}
+        forces = outer.generalised_forces({**place, **read}, tensions, lengths)
+        torque, load, element = forces[c.name], forces[friction_load(c)], outer.elements[self.joint]
         bristle = state[self.states[2].name]
         friction = element.torque(bristle, load, state[c.speed])
         rates = {

@@ -237,3 +237,27 @@ def _lagged(reading: Array, lag: float, sample_time: float) -> Array:
         slope = (after - before) / sample_time
         p = after - slope * lag + (p - before + slope * lag) * share
     return p
+
+
+# Errors over windows
+
+COVERAGE = 0.95
+"""Share of the errors that a band holds."""
+
+
+def rms(errors: Array, axis: tuple[int, ...] = (0, 1)) -> Array:
+    """Root mean square of errors (N, rows, J) over windows and rows, per joint."""
+    return np.asarray(np.sqrt(np.mean(errors**2, axis=axis)))
+
+
+def band(errors: Array) -> Array:
+    """Half-width (rows, J) of the band that holds COVERAGE of these errors at every row, growing with the horizon."""
+    level = min(1.0, COVERAGE * (1 + 1 / len(errors)))  # so that it holds for one further window, too
+    return np.asarray(np.maximum.accumulate(np.quantile(np.abs(errors), level, axis=0, method="higher"), axis=0))
+
+
+def coverage(errors: Array, episode: Array) -> Array:
+    """Share (J,) of errors inside a band that comes from the other half of the episodes, both ways."""
+    odd = np.searchsorted(np.unique(episode), episode) % 2 == 1
+    held = [np.abs(errors[part]) <= band(errors[~part]) for part in (odd, ~odd)]
+    return np.asarray(np.mean(np.concatenate(held), axis=(0, 1)))

@@ -18,8 +18,8 @@ from ...report import Chapter, NamedValue, Plot, Table, TableColumn
 from ..identify.prediction import PlantUncertainty
 from ..reported import Reported
 from .episode_inspection import EpisodeInspection
-from .episodes import Episode, Episodes, in_pairs
-from .free_run import COVERAGE, RegulatorLag, angles, coverage, rms
+from .episodes import COVERAGE, Episode, Episodes, coverage, in_pairs, rms
+from .free_run import RegulatorLag, ResidualGain, angles
 
 SUPPLY = 6e5
 """Gauge pressure [Pa] of the supply of the plant (chosen)."""
@@ -46,11 +46,11 @@ class ArmFit(Reported):
     band         (rows, J) half-width of the band of the free run that holds 95 % of these errors [rad]
     estimates    parameters with their standard errors
     remarks      what the record does not separate, and what the fit left out
-    fitted       number of the episodes, the first ones, to which the arm is fitted
+    fitted       number of the episodes, the first ones, of the fit
     regulators   of the muscles of `arm`, between command and pressure; empty where the episodes have no commands
     commanded    errors as `errors`, of the free run from the commands alone, or None
-    covariance   (P, P) of `estimates` [SI] along what the record separates; other combinations of them are not varied,
-                 because the arm moves alike with any of them
+    covariance   (P, P) of `estimates` [SI] along what the record separates; with others the arm moves alike
+    gain         errors of the physics alone and of the hybrid law, where one was asked for, or None
     """
 
     arm: PressureDriven
@@ -66,6 +66,7 @@ class ArmFit(Reported):
     regulators: tuple[RegulatorLag, ...] = ()
     commanded: Array | None = None
     covariance: Array = dataclasses.field(default_factory=lambda: np.zeros((0, 0)))
+    gain: ResidualGain | None = None
 
     @property
     def rms(self) -> Array:
@@ -82,8 +83,7 @@ class ArmFit(Reported):
     @property
     def skill(self) -> Array:
         """1 - error/error of the best baseline (J,): 1 for a perfect prediction, 0 for none beyond the baseline."""
-        best = np.min([rms(errors) for errors in self.by_baseline.values()], axis=0)
-        return np.asarray(1.0 - self.rms / best)
+        return np.asarray(1.0 - self.rms / np.min([rms(errors) for errors in self.by_baseline.values()], axis=0))
 
     @property
     def coverage(self) -> Array:
@@ -146,17 +146,18 @@ class ArmFit(Reported):
         )
 
     def _error_table(self) -> Table:
-        found = {"model": self.errors} | ({} if self.commanded is None else {"model, from commands": self.commanded})
-        rows = {name: rms(errors) for name, errors in {**self.by_baseline, **found}.items()}
+        found = {**self.by_baseline, "model": self.errors, "model, from commands": self.commanded}
+        if self.gain is not None:
+            found |= {"physics alone": self.gain.physics, "hybrid law": self.gain.hybrid}
+        rows = {name: rms(errors) for name, errors in found.items() if errors is not None}
         columns: dict[str, Any] = {"prediction by": list(rows)}
         for j in range(self.errors.shape[2]):
             columns[f"joint {j + 1}"] = TableColumn([values[j] for values in rows.values()], "rad", "deg", 3)
         return Table("joint-errors", "Root mean square error of the free run", columns, brief=len(rows))
 
     def _joint_table(self) -> Table:
-        count = len(self.pairs)
         columns: dict[str, Any] = {
-            "joint": list(range(1, count + 1)),
+            "joint": list(range(1, len(self.pairs) + 1)),
             "raised by muscle": [raising for raising, _ in self.pairs],
             "lowered by muscle": [lowering for _, lowering in self.pairs],
             "skill": TableColumn(self.skill, digits=3),
@@ -164,7 +165,7 @@ class ArmFit(Reported):
             "95 % band at the horizon ±": TableColumn(self.band[-1], "rad", "deg", 3),
             "share inside the band": TableColumn(self.coverage, "1", "%", 3, short="inside"),
         }
-        return Table("joints", "Joints", columns, brief=count)
+        return Table("joints", "Joints", columns, brief=len(self.pairs))
 
     def _band_table(self) -> Table:
         columns: dict[str, Any] = {"horizon": TableColumn(self.horizon, "s")}

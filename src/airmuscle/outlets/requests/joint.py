@@ -42,6 +42,9 @@ class JointFitRequest:
         "Rows of the free run.", default=40, bounds=(5, 1000), metavar="ROWS", label="Rows of the free run",
         example="40", filled="40",
     )  # fmt: skip
+    residual: bool = option(
+        "Fit a hybrid law to what physics leaves, used for joints that gain by it on episodes held back.", default=False
+    )
     seed: int = option("Seed of the order of the windows.", default=0)
 
 
@@ -71,7 +74,7 @@ def fit_requested_arm(
     rules = _mapping(source, request)
     fit = fit_joint(
         read_episodes(source, rules), pairs=rules.pairs, axes=rules.axes, left_out=request.left_out,
-        rows=request.horizon, seed=request.seed, progress=progress,
+        rows=request.horizon, residual=request.residual, seed=request.seed, progress=progress,
     )  # fmt: skip
     title = f"Arm identified from {source.name}"
     return dataclasses.replace(fit.chapter(), title=title), _scenarios(fit, title)

@@ -24,8 +24,10 @@ from .pulley_profile import PolynomialProfile as PolynomialProfile
 from .pulley_profile import PulleyProfile as PulleyProfile
 from .serial_arm import SerialArm as SerialArm
 from .serial_arm import SpatialLink as SpatialLink
+from .stick_slip import GaussianResidual as GaussianResidual
 from .stick_slip import StickSlip as StickSlip
 from .stick_slip import WithStickSlip as WithStickSlip
+from .stick_slip import friction_load as friction_load
 from .wrapper import JointWithExternalTorque as JointWithExternalTorque
 from .wrapper import JointWithFriction as JointWithFriction
 from .wrapper import MechanismWrapper as MechanismWrapper

@@ -55,15 +55,74 @@ class StickSlip:
 
 
 @model
+class GaussianResidual:
+    """Torques and friction that physics leaves, as Gaussian functions of angles and pressures, which fade out.
+
+        phi_k = exp(-sum_i (x_i/s_i - c_ki)^2/(2 d)),   tau_j = -dV/dtheta_j,   V = sum_k E_k phi_k,
+        T_j = f_j T_j,physics,   f_j = exp(sum_k g_jk phi_k)
+
+    x the J angles of a mechanism and the gauge pressures `pressures` (names in a plant, `m0.pressure`), d their number.
+    Passive by construction: at constant pressures V is a bounded potential of the angles, whose torques give no energy
+    in a closed cycle, and the friction, multiplied by a positive factor, takes some. Pressures that change may change
+    V, as they change the force of a muscle. Far from all centres tau is 0 and f is 1: the physics alone. A caller who
+    gives angles without pressures has the residual at the mean of its centres. The form is chosen.
+    """
+
+    pressures: tuple[str, ...]
+    angle_scales: tuple[float, ...] = parameter("rad", "s_i", "scale of each angle", bounds=(1e-6, 1e3), fitted=False)
+    pressure_scales: tuple[float, ...] = parameter(
+        "Pa", "s_i", "scale of each pressure", bounds=(1.0, 1e8), fitted=False
+    )
+    centres: tuple[float, ...] = parameter(
+        "1", "c_ki", "centres relative to the scales, one after the other", bounds=(-1e3, 1e3), fitted=False
+    )
+    energies: tuple[float, ...] = parameter("J", "E_k", "energy of each centre", bounds=(-1e4, 1e4))
+    friction_logs: tuple[float, ...] = parameter(
+        "1", "g_jk", "logarithmic factor of the friction of each centre, joint after joint", bounds=(-10.0, 10.0)
+    )
+
+    def check(self) -> None:
+        count, joints = len(self.energies), len(self.angle_scales)
+        wanted = (len(self.pressures), count * (joints + len(self.pressures)), count * joints)
+        found = (len(self.pressure_scales), len(self.centres), len(self.friction_logs))
+        if found != wanted or not count:
+            raise ParameterError(
+                f"GaussianResidual: {count} energies, {joints} angle_scales and {len(self.pressures)} pressures need "
+                f"{wanted[0]} pressure_scales, {wanted[1]} centres and {wanted[2]} friction_logs; there are "
+                f"{found[0]}, {found[1]} and {found[2]}."
+            )
+
+    def evaluate(self, angles: Sequence[Value], q: Values) -> tuple[list[Value], list[Value]]:
+        """Torque [N m] on every joint and the factor of its friction, at its angles [rad] and the pressures in q."""
+        size, joints = len(self.angle_scales) + len(self.pressures), len(angles)
+        own = [angle / scale for angle, scale in zip(angles, self.angle_scales, strict=True)]
+        means = [sum(self.centres[i::size]) / len(self.energies) for i in range(joints, size)]
+        own += [
+            q[name] / scale if name in q else mean
+            for name, scale, mean in zip(self.pressures, self.pressure_scales, means, strict=True)
+        ]
+        torques: list[Value] = [0.0] * joints
+        logs: list[Value] = [0.0] * joints
+        for k, energy in enumerate(self.energies):
+            away = [x - c for x, c in zip(own, self.centres[size * k : size * (k + 1)], strict=True)]
+            level = ops.exp(-sum(a * a for a in away) / (2.0 * size))
+            for j, scale in enumerate(self.angle_scales):
+                torques[j] = torques[j] + energy * level * away[j] / (size * scale)
+                logs[j] = logs[j] + self.friction_logs[j * len(self.energies) + k] * level
+        return torques, [ops.exp(log) for log in logs]
+
+
+@model
 class WithStickSlip(MechanismWrapper):
     """Mechanism whose joints have the friction of `elements`, one for each of its angles; the bristles are states.
 
     Equilibria are those with relaxed bristles. A caller of `acceleration` who gives torques alone has the friction
-    without load.
+    without load. A `residual` adds its torques to those of the muscles and multiplies the friction.
     """
 
     inner: Mechanism
     elements: tuple[StickSlip, ...]
+    residual: GaussianResidual | None = None
 
     def check(self) -> None:
         check_structure(self)
@@ -72,6 +131,11 @@ class WithStickSlip(MechanismWrapper):
             raise ParameterError(
                 f"WithStickSlip: {owner} has {len(angles)} angles and {len(self.elements)} elements are given; give "
                 "one for each angle."
+            )
+        if self.residual is not None and len(self.residual.angle_scales) != len(angles):
+            raise ParameterError(
+                f"WithStickSlip: the residual has {len(self.residual.angle_scales)} angles, {owner} has {len(angles)}; "
+                "give one scale for each angle."
             )
         for element in self.elements:
             if element.load_arms and self.muscle_count not in (None, len(element.load_arms)):
@@ -99,12 +163,18 @@ class WithStickSlip(MechanismWrapper):
     def generalised_forces(
         self, q: Values, tensions: Sequence[Value], resting_lengths: Sequence[Value]
     ) -> dict[str, Value]:
-        """Those of the inner mechanism, and for each angle the load of its friction [N m]."""
-        loads = {
-            _load(c): sum((mu * tension for mu, tension in zip(element.load_arms, tensions, strict=False)), 0.0)
-            for c, element in zip(self._angles, self.elements, strict=True)
-        }
-        return {**self.inner.generalised_forces(q, tensions, resting_lengths), **loads}
+        """Those of the inner mechanism, and for each angle the load of its friction [N m]; with the residual."""
+        forces = dict(self.inner.generalised_forces(q, tensions, resting_lengths))
+        for c, element in zip(self._angles, self.elements, strict=True):
+            forces[friction_load(c)] = sum((mu * t for mu, t in zip(element.load_arms, tensions, strict=False)), 0.0)
+        if self.residual is not None:
+            further = zip(*self.residual.evaluate([q[c.name] for c in self._angles], q), strict=True)
+            for c, element, (torque, factor) in zip(self._angles, self.elements, further, strict=True):
+                forces[c.name] = forces[c.name] + torque
+                forces[friction_load(c)] = (
+                    factor * (element.coulomb_torque + forces[friction_load(c)]) - element.coulomb_torque
+                )
+        return forces
 
     def acceleration(self, q: Values, v: Values, forces: Values, inputs: Values) -> Values:
         return self.inner.acceleration(q, v, {**forces, **self._with_friction(q, v, forces)}, inputs)
@@ -114,7 +184,7 @@ class WithStickSlip(MechanismWrapper):
 
     def _friction(self, q: Values, v: Values, forces: Values) -> list[tuple[Coordinate, Value]]:
         return [
-            (c, element.torque(q.get(_bristle(c), 0.0), forces.get(_load(c), 0.0), v[c.speed]))
+            (c, element.torque(q.get(_bristle(c), 0.0), forces.get(friction_load(c), 0.0), v[c.speed]))
             for c, element in zip(self._angles, self.elements, strict=True)
         ]
 
@@ -127,5 +197,6 @@ def _bristle(coordinate: Coordinate) -> str:
     return f"{coordinate.name.removesuffix('angle')}friction_bristle"
 
 
-def _load(coordinate: Coordinate) -> str:
+def friction_load(coordinate: Coordinate) -> str:
+    """Name, among the generalised forces, of the load of the friction of an angle [N m]."""
     return f"{coordinate.name}.friction_load"

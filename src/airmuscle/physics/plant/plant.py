@@ -170,7 +170,8 @@ class Plant(PlantDisplay, StaticPlant):
     def evaluate(self, state: Values, inputs: Values) -> PlantEvaluation:
         """Muscles, circuits, forces and accelerations at a state."""
         muscles = self.muscle_states(state, inputs)
-        forces = self.mechanism.generalised_forces(state, [m.tension for m in muscles], self.resting_lengths)
+        place = {**state, **{f"{p}pressure": m.pressure for p, m in zip(self.prefixes, muscles, strict=True)}}
+        forces = self.mechanism.generalised_forces(place, [m.tension for m in muscles], self.resting_lengths)
         accelerations = self.mechanism.acceleration(state, state, forces, inputs)
         return PlantEvaluation(muscles, self.circuit_flows(muscles, state, inputs), forces, accelerations)
 
