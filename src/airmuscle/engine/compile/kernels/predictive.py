@@ -11,9 +11,9 @@ from .matrices import solve_factor
 
 DONE, SINGULAR, NOT_CONVERGED = Status.DONE.value, Status.SINGULAR.value, Status.NOT_CONVERGED.value
 ITERATIONS, FEASIBLE, ACCURATE, DEPENDENT = 10, 1e-9, 1e-6, 1e-12
-"""Iterations for each row; permitted violation of a limit of a row of length 1; permitted error of
-a limit that is active, before the refinement; square of the distance of such a row
-from the space of the active ones up to which it depends on them (chosen)."""
+"""Iterations for each row; permitted violation of a limit of a row of length 1; permitted error of a limit that is
+active, before the refinement; square of the distance of such a row from the space of the active ones up to which it
+depends on them (chosen)."""
 
 
 @CONTRACTED_PART
@@ -52,13 +52,11 @@ def release(order: Any, count: Any, place: Any, factor: Any, multipliers: Any, a
             factor[k, j] = factor[k + 1, j]
     for k in range(place, count - 1):
         length = sqrt(factor[k, k] ** 2 + factor[k, k + 1] ** 2)
-        along = factor[k, k] / length
-        across = factor[k, k + 1] / length
-        factor[k, k] = length
-        for i in range(k + 1, count - 1):
-            value = factor[i, k]
-            factor[i, k] = along * value + across * factor[i, k + 1]
-            factor[i, k + 1] = along * factor[i, k + 1] - across * value
+        along, across = factor[k, k] / length, factor[k, k + 1] / length
+        for i in range(k, count - 1):
+            near, far = factor[i, k], factor[i, k + 1]
+            factor[i, k] = along * near + across * far
+            factor[i, k + 1] = along * far - across * near
 
 
 @PART
@@ -97,8 +95,7 @@ def solve_active(
 @PART
 def blocking_place(order: Any, count: Any, active: Any, multipliers: Any, change: Any) -> Any:
     """Where a multiplier would first change its sign, on the way to multipliers + change (-1: nowhere)."""
-    place = -1
-    least = 1.0
+    place, least = -1, 1.0
     for k in range(count):
         side = active[order[k]]
         if side * (multipliers[k] + change[k]) < 0.0:
@@ -133,8 +130,7 @@ def exchange(
     for k in range(count):
         change[k] = add_product(m[row], m[order[k]], m.shape[1], 0.0)
     solve_factor(factor, count, change)
-    place = -1
-    least = 0.0
+    place, least = -1, 0.0
     for k in range(count):
         slope = side * active[order[k]] * change[k]
         if slope > 1e-9:
@@ -274,7 +270,7 @@ def predictive_sample(
     rest              (m, N + q + m) the inputs of the target by the point
     m, of_input, scale, fixed_low, fixed_high, by_point   rows (r, n) of length 1, input or -1, scale, limits
     plan_by_w, plan_by_point    (N_h m, n), (N_h m, N + q + m)
-    predicted         (N,); plan (N_h m,); inputs (m,) those of the last sample; active (r,)
+    predicted, plan, active    (N,), (N_h m,), (r,); inputs (m,) those of the last sample
     counts            (2,): samples since the plan was found, -1 without one; failures so far
 
     Without a solution the next input of the last plan is applied, after its end that of the target.
