@@ -183,6 +183,12 @@ class Statement:
     cases: tuple[Claim, ...]
 
     @property
+    def common_note(self) -> str:
+        """The note of several cases that have the same one; otherwise empty."""
+        notes = {case.note for case in self.cases}
+        return notes.pop() if len(notes) == 1 < len(self.cases) else ""
+
+    @property
     def reproduced(self) -> list[float]:
         """The values of the cases that have the expected value and the unit of the first one."""
         first = self.cases[0]

@@ -16,7 +16,7 @@ from .ir.instructions import Code, Operand, finished, recorded
 from .ir.jacobian import ZERO, Tape, derivatives
 from .ir.sparse_lu import Factors
 from .llvm.emit import FunctionBody
-from .llvm.vectors import LlvmValue, loaded, packed
+from .llvm.exact import LlvmValue, loaded, packed
 
 POINT = ("x", "u", PARAMETERS)
 """The arguments that rates and outputs depend on."""

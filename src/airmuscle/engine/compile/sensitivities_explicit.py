@@ -7,7 +7,7 @@ from .ir import emission
 from .ir.instructions import Code, Instruction, Operand, finished
 from .ir.scheduling import Item
 from .llvm.emit import FunctionBody
-from .llvm.vectors import LlvmValue, loaded
+from .llvm.exact import LlvmValue, loaded
 from .sensitivities import POINT, DirectionalDerivative, TangentSystem, Values, stored
 
 

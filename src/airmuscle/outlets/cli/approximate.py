@@ -14,8 +14,7 @@ from ...files.library import Entry, find_initial_law, load_law, save
 from ...physics.muscle.characteristic import ValidityRange, validity_range_of
 from ..requests.declaration import option, request
 from .delivery import print_result
-from .options import Json, Name, complete_law
-from .request_options import with_requests
+from .options import Json, Name, complete_law, with_requests
 
 LIMIT = "Limit of the validity range; default: that of the muscle."
 LIMITS = ("min_pressure", "max_pressure", "min_contraction", "max_contraction")

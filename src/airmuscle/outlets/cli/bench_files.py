@@ -10,7 +10,7 @@ import typer
 from ...bench.readers import ColumnMapping, read
 from ...bench.segment import check_contents
 from ...core import ParameterError
-from ...files.library.catalogue import load_data
+from ...files.library import load_data
 from ...recording import Recording
 from ...recording.recording import row_notes
 from ...report.chapter import Chapter

@@ -24,8 +24,7 @@ from ...files.library.files import is_path
 from ..requests.declaration import option, request
 from .delivery import deliver
 from .execution import Execution
-from .options import Folder, Json
-from .request_options import with_requests
+from .options import Folder, Json, with_requests
 from .terminal import counted_progress
 
 DEFAULT_BUDGET = 60

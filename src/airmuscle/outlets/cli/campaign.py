@@ -34,8 +34,7 @@ from .bench_files import print_row_notes, reading_chapters
 from .delivery import deliver
 from .execution import Execution
 from .option_hints import in_options
-from .options import Folder, Json
-from .request_options import with_requests
+from .options import Folder, Json, with_requests
 from .terminal import computation_progress, echo, reading_progress
 
 OMITTED_ROOMS = ("outlets", "papers", "report", "design", "files", "control")

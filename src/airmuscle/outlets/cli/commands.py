@@ -14,7 +14,7 @@ import typer
 from typer.core import TyperGroup
 
 from ...core import AirmuscleError, AirmuscleWarning, exclusive_folders, quotable, suggestion
-from .interruption import INTERRUPTED, check_interrupted, deferred_sigint
+from .entry_point import INTERRUPTED, check_interrupted, deferred_sigint
 from .option_hints import in_options
 from .options import install_completion_classes, print_completion_script
 from .terminal import echo
@@ -49,12 +49,12 @@ COMMANDS = (
     CommandRow("hysteresis", "hysteresis", "hysteresis", "Fit friction models to hysteresis loops."),
     CommandRow("fit-dynamic", "fit_dynamic", "fit_dynamic", "Identify plant parameters from transient records."),
     CommandRow(
-        "fit-regulator", "fit_regulator", "fit_regulator_command", "Identify a pressure regulator from its response."
+        "fit-regulator", "fit_dynamic", "fit_regulator_command", "Identify a pressure regulator from its response."
     ),
     CommandRow("fit-joint", "fit_joint", "fit_joint_command", "Identify a joint or an arm from its episodes."),
     CommandRow("campaign", "campaign", "campaign", "Identify a muscle from all files of a test rig."),
     CommandRow("predict", "predict", "predict", "Predict further records by an identified muscle or plant."),
-    CommandRow("fit-volume", "fit_volume", "fit_volume_command", "Fit the volume of a muscle over its contraction."),
+    CommandRow("fit-volume", "fit", "fit_volume_command", "Fit the volume of a muscle over its contraction."),
     CommandRow("plan", "plan", "plan", "Design the most informative experiments."),
     CommandRow("fit-live", "fit_live", "fit_live", "Fit a surface while rows arrive; name the next point."),
     CommandRow("size", "size", "size", "Size muscles of the catalogue for a lift or a joint."),

@@ -12,8 +12,7 @@ from ...bench.readers.writer import EXTENSIONS
 from ...core import FileError
 from ..requests import ReadingRequest, option, request
 from .bench_files import print_row_notes
-from .options import Json
-from .request_options import with_requests
+from .options import Json, with_requests
 from .terminal import echo, print_json
 
 EVERY_ROW = 2**62

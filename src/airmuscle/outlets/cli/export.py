@@ -38,8 +38,7 @@ from ..export.identifiers import make_identifier
 from ..export.robot_description import WRITERS
 from ..requests.declaration import RequestError, Where, option, request
 from .export_models import export_actuator, export_fmu, export_modelica, export_mujoco, export_robot
-from .options import Folder, Json, complete_entry
-from .request_options import with_requests
+from .options import Folder, Json, complete_entry, with_requests
 from .terminal import echo, print_json
 
 TARGETS: dict[str, Target] = {"c": C99(), "js": JavaScript(), "octave": Octave()}

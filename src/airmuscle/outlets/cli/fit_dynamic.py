@@ -1,4 +1,4 @@
-"""`airmuscle fit-dynamic`: identification of plant parameters from transient records."""
+"""`airmuscle fit-dynamic` and `airmuscle fit-regulator`: parameters of plants and regulators from transient records."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -7,16 +7,17 @@ from typing import Annotated
 
 import typer
 
-from ...bench.identify.dynamic import DynamicFit
-from ...bench.identify.dynamic.dynamic_chapter import dynamic_chapters
+from ...bench.identify.dynamic import DynamicFit, fit_regulator
+from ...bench.identify.dynamic.dynamic_chapter import dynamic_chapters, regulator_chapters
 from ...bench.segment import inspect
 from ...core import check_writable
+from ...files.library import list_files, part_toml, scenario_toml
 from ...files.scenario.identification import DynamicFitSetup, load_dynamic_fit
 from ...recording.recording import row_notes
-from ..requests import WEAK, option, request
+from ..requests import WEAK, ReadingRequest, option, request
+from .bench_files import Files, read_recordings, reading_chapters
 from .delivery import deliver
-from .options import Folder, Json
-from .request_options import with_requests
+from .options import Folder, Json, with_requests
 from .terminal import echo
 
 Study = Annotated[
@@ -86,3 +87,50 @@ def _profiled_names(fit: DynamicFit, names: Sequence[str]) -> list[str]:
     weak = [name for each in fit.identifiability.undetermined for name, _ in each.shares]
     requested = [*(weak if WEAK in names else []), *(name for name in names if name != WEAK)]
     return [fit[name].name for name in dict.fromkeys(requested)]
+
+
+@request
+class RegulatorRequest:
+    """What the fit of a regulator is asked for."""
+
+    supply: float = option("Gauge pressure of the supply: '6 bar'.", unit="Pa")
+    volume: float = option("Volume of air behind the regulator.", unit="m3", default="0.1 dm3")
+    noise: float = option("Standard deviation of the sensor.", unit="Pa", default="1 kPa")
+    starts: int = option("Number of initial guesses.", default=8, bounds=(1, 10_000))
+
+
+@with_requests
+def fit_regulator_command(
+    files: Files,
+    request: RegulatorRequest,
+    reading: ReadingRequest,
+    out: Folder = Path("regulator"),
+    json: Json = False,
+) -> None:
+    """Identify a pressure regulator from its response.
+
+    \b
+    FILES have the columns time, setpoint (the command as a pressure) and pressure (at the outlet). The parameters of a
+    PressureRegulator are estimated as by fit-dynamic. What the records excite too little is named, with the command
+    that would determine it. Writes DIR/report.html, DIR/regulator.toml (the circuit) and DIR/scenario.toml.
+
+    \b
+    Examples:
+      airmuscle fit-regulator steps.csv sines.csv --supply "5.8 bar" --out regulator
+    """
+    check_writable(out)
+    recordings = read_recordings(files, reading)
+    result = fit_regulator(
+        recordings, supply_pressure=request.supply, starts=request.starts, volume=request.volume, noise=request.noise
+    )
+    title = f"Regulator fitted to {list_files([f.name for f in files])}"
+    low, high = (float(edge(recordings[0]["setpoint"])) for edge in (min, max))
+    step = {"setpoint": [[0.0, low], [0.5, high], [1.5, low]]}
+    run = {"duration": 2.5, "initial_state": {"pressure": low}}
+    of_scenario = "a step over the range of the first record"
+    contents = {
+        "regulator.toml": part_toml("circuit", result.regulator),
+        "scenario.toml": scenario_toml(title, result.plant, step, run, of_scenario),
+    }
+    chapters = [*regulator_chapters(result, title), *reading_chapters(recordings)]
+    deliver("fit-regulator", chapters, json=json, out=out, title="Pressure regulator", files=contents)

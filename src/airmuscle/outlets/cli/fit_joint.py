@@ -8,8 +8,7 @@ import typer
 from ...core.atomic_output import check_writable
 from ..requests import JointFitRequest, fit_requested_arm, inspect_requested
 from .delivery import deliver
-from .options import Folder, Json
-from .request_options import with_requests
+from .options import Folder, Json, with_requests
 from .terminal import echo
 
 

@@ -14,8 +14,7 @@ from ...core import ColumnError, IdentificationError, atomic_folder, check_writa
 from ...files.library import Entry, save
 from ...physics.muscle.characteristic import ValidityRange
 from ..requests import Pairs, ReadingRequest, option, request
-from .options import Json, OptionalFolder
-from .request_options import with_requests
+from .options import Json, OptionalFolder, with_requests
 from .terminal import echo
 
 QUANTITIES = ("pressure", "contraction", "force")

@@ -17,8 +17,7 @@ from ...physics.muscle.characteristic.base import ForceLaw
 from ..requests import ReadingRequest, RequestError, Where, option, request
 from .bench_files import Files, read_recordings, reading_chapters
 from .delivery import deliver
-from .options import Folder, Json
-from .request_options import with_requests
+from .options import Folder, Json, with_requests
 from .terminal import echo
 
 

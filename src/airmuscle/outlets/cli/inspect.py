@@ -8,8 +8,7 @@ from ...bench.readers import ColumnMapping, RecordedTime, read
 from ...bench.segment import inspect_all, inspection_chapters
 from ..requests.reading import ReadingRequest
 from .delivery import deliver
-from .options import Json, OptionalFolder
-from .request_options import with_requests
+from .options import Json, OptionalFolder, with_requests
 from .terminal import reading_progress
 
 UNORDERED = ColumnMapping(time=RecordedTime(ordered=False))

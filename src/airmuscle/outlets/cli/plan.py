@@ -13,8 +13,7 @@ from ...physics.muscle.characteristic import ValidityRange
 from ...report.write import save_table
 from ..requests.declaration import RequestError, option, request
 from .delivery import deliver
-from .options import Json, Name, OptionalFolder
-from .request_options import with_requests
+from .options import Json, Name, OptionalFolder, with_requests
 
 PLAN_FILE = "plan.csv"
 

@@ -14,8 +14,7 @@ from ...files.scenario.prediction import load_plant_model, predict_with_entry
 from ..requests import ReadingRequest, RequestError, Where, option, request
 from .bench_files import read_recordings, reading_chapters
 from .delivery import deliver
-from .options import Folder, Json, complete_model
-from .request_options import with_requests
+from .options import Folder, Json, complete_model, with_requests
 
 Model = Annotated[
     str,

@@ -14,8 +14,7 @@ from ...recording import Recording
 from ...report.chapter import Chapter
 from ..requests import option, read_pair, request
 from .delivery import Files, deliver, write_result
-from .options import Folder, Json, complete_plant
-from .request_options import with_requests
+from .options import Folder, Json, complete_plant, with_requests
 from .terminal import echo
 
 

@@ -5,8 +5,7 @@ from ...design.sizing.chapter import sizing_chapter
 from ...design.sizing.scenario import sizing_scenario
 from ..requests.size import SizeRequest
 from .delivery import deliver
-from .options import Json, OptionalFolder
-from .request_options import with_requests
+from .options import Json, OptionalFolder, with_requests
 from .terminal import computation_progress
 
 SCENARIO_FILE = "scenario.toml"

@@ -10,8 +10,7 @@ from ..requests.declaration import option, request
 from ..studio import export_page, serve
 from ..studio.page import open_sheets
 from ..studio.server import warning_of
-from .options import complete_law
-from .request_options import with_requests
+from .options import complete_law, with_requests
 from .terminal import echo
 
 

@@ -16,8 +16,7 @@ from ...engine.processes import process_pool
 from ...report.write import REPORT_FILE
 from .delivery import print_result
 from .execution import Execution, contributions
-from .options import Folder, Json
-from .request_options import with_requests
+from .options import Folder, Json, with_requests
 from .terminal import counted_progress, echo
 
 

@@ -14,7 +14,7 @@ from ...core import printable
 from ...report.chapter import Table
 from ...report.data import as_json
 from ...report.text import table_lines
-from .interruption import check_interrupted
+from .entry_point import check_interrupted
 
 WIDE = 160
 """Width [characters] of a table that is written to a file or to another program."""

@@ -1,20 +1,10 @@
-"""Exact arithmetic of values in lanes, and with it the power with an exponent that is the same for a whole run.
-
-Sums and products with their rounding errors, and operations on bits; the power is that of the polytropic process:
-
-    x**y = 2**(y log2 x),   x = 2**n m,   log2 m = (2/ln 2) artanh((m - 1)/(m + 1)),   2**r by its Taylor series
-
-Without the second part of the logarithm, with which `pow` rounds correctly. The relative error against `pow` is at most
-1e-12 (in single precision 2e-6): the logarithm errs by a unit of the last place, and |y log2 x| is limited. Where it is
-greater, and at zero, negative and non-finite bases, a lane takes the value of `pow`; whether it does depends on
-this lane alone.
-"""
+"""Arithmetic of scalars and LLVM vectors, exact sums and products, and powers with an exponent common to all lanes."""
 
 import dataclasses
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
-from .emit import STEADY_POWER, FunctionBody, LlvmType, function_of_values
+from .emit import FLAGS, STEADY_POWER, FunctionBody, LlvmType, function_of_values
 
 
 class ExactBody(FunctionBody):
@@ -168,3 +158,64 @@ def _otherwise(block: ExactBody, usual: str, value: str) -> str:
         f"  %result = phi {number.text} [ {value}, %0 ], [ %mixed, %unusual ]",
     ]
     return "%result"
+
+
+@dataclasses.dataclass(frozen=True)
+class LlvmValue:
+    """The name of a value in a block: one `double`, or with `lanes` a vector `<lanes x double>`.
+
+    A scalar operand of a vector is broadcast to its lanes, whose number need not be a power of two.
+    """
+
+    block: FunctionBody
+    name: str
+    lanes: int = 0
+
+    @property
+    def kind(self) -> str:
+        """LLVM name of the type."""
+        return f"<{self.lanes} x double>" if self.lanes else "double"
+
+    def spread(self, lanes: int) -> "LlvmValue":
+        """The scalar in every lane; a vector is returned unchanged."""
+        if self.lanes or not lanes:
+            return self
+        kind = f"<{lanes} x double>"
+        first = self.block.put(f"insertelement {kind} poison, double {self.name}, i32 0")
+        places = f"<{lanes} x i32> zeroinitializer"
+        return LlvmValue(self.block, self.block.put(f"shufflevector {kind} {first}, {kind} poison, {places}"), lanes)
+
+    def _with(self, operation: str, other: "LlvmValue") -> "LlvmValue":
+        a, b = self.spread(other.lanes), other.spread(self.lanes)
+        result = self.block.put(f"{operation} {FLAGS} {a.kind} {a.name}, {b.name}")
+        return dataclasses.replace(a, name=result)
+
+    def __add__(self, other: "LlvmValue") -> "LlvmValue":
+        return self._with("fadd", other)
+
+    def __sub__(self, other: "LlvmValue") -> "LlvmValue":
+        return self._with("fsub", other)
+
+    def __mul__(self, other: "LlvmValue") -> "LlvmValue":
+        return self._with("fmul", other)
+
+    def store(self, array: str, index: int) -> None:
+        """Write the value to array elements from `index` on."""
+        place = self.block.put(f"getelementptr inbounds double, ptr %{array}, i64 {index}")
+        self.block.lines.append(f"  store {self.kind} {self.name}, ptr {place}, align 8")
+
+
+def loaded(block: FunctionBody, array: str, index: int, lanes: int = 0) -> LlvmValue:
+    """The value of array elements from `index` on."""
+    if not lanes:
+        return LlvmValue(block, block.load(array, index))
+    place = block.put(f"getelementptr inbounds double, ptr %{array}, i64 {index}")
+    return LlvmValue(block, block.put(f"load <{lanes} x double>, ptr {place}, align 8"), lanes)
+
+
+def packed(block: FunctionBody, values: Mapping[int, str], lanes: int) -> LlvmValue:
+    """A vector with these scalars in their lanes and zero in all others."""
+    name = "zeroinitializer"
+    for lane, value in values.items():
+        name = block.put(f"insertelement <{lanes} x double> {name}, double {value}, i32 {lane}")
+    return LlvmValue(block, name, lanes)

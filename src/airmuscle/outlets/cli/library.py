@@ -6,8 +6,7 @@ from ...physics.muscle.isobar_plot import describe_point, isobar_table
 from ...report.write import rendered_figure, save_table
 from ..requests import EntryRequest, RequestError, Where, option, request
 from .delivery import print_result, write_result
-from .options import Json, Name, OptionalFolder
-from .request_options import with_requests
+from .options import Json, Name, OptionalFolder, with_requests
 from .terminal import echo
 
 
