@@ -1,10 +1,10 @@
 from .campaign import KeptStages as KeptStages
-from .cite import as_bibtex as as_bibtex
 from .commands import COMMANDS as COMMANDS
 from .commands import app as app
 from .entry_point import check_interrupted as check_interrupted
 from .entry_point import deferred_sigint as deferred_sigint
 from .entry_point import main as main
+from .library import as_bibtex as as_bibtex
 from .option_hints import INSTRUCTIONS as INSTRUCTIONS
 from .option_hints import in_options as in_options
 from .options import SHELLS as SHELLS

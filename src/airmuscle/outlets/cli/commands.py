@@ -38,10 +38,10 @@ class CommandRow(NamedTuple):
 
 COMMANDS = (
     CommandRow("reproduce", "reproduce", "reproduce", "Reproduce three papers and test each of their claims."),
-    CommandRow("list", "list", "list_entries", "List muscles, laws, valves, plants, products and data sets."),
-    CommandRow("show", "evaluate", "show", "Show parameters, sources and checks of a library entry."),
-    CommandRow("cite", "cite", "cite", "Print the references of a library entry."),
-    CommandRow("evaluate", "evaluate", "evaluate", "Evaluate a law for two of pressure, contraction and force."),
+    CommandRow("list", "library", "list_entries", "List muscles, laws, valves, plants, products and data sets."),
+    CommandRow("show", "library", "show", "Show parameters, sources and checks of a library entry."),
+    CommandRow("cite", "library", "cite", "Print the references of a library entry."),
+    CommandRow("evaluate", "library", "evaluate", "Evaluate a law for two of pressure, contraction and force."),
     CommandRow("inspect", "inspect", "inspect", "Inspect measurement files: columns, runs, sampling, outliers."),
     CommandRow("fit", "fit", "fit", "Fit a characteristic to measured points, or compare several."),
     CommandRow("approximate", "approximate", "approximate", "Approximate one characteristic by another."),

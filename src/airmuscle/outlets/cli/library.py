@@ -1,13 +1,36 @@
-"""`airmuscle evaluate` and `airmuscle show`: a library entry at an operating point, and what it contains."""
+"""Entries of the library: `airmuscle list`, `show`, `cite`, and `evaluate` at an operating point."""
 
+import dataclasses
+import itertools
+import re
+import tomllib
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from ...core import Reference, reference
 from ...files.library import UNITS, load
 from ...files.library import evaluate as evaluate_entry
+from ...files.library.files import (  # fmt: skip
+    DATA,
+    FOLDERS,
+    LAWS,
+    list_data,
+    list_laws,
+    list_plants,
+    list_products,
+    list_valves,
+)
+from ...files.library.models import model_class
+from ...physics.muscle.characteristic import ForceLaw
 from ...physics.muscle.isobar_plot import describe_point, isobar_table
 from ...report.write import rendered_figure, save_table
 from ..requests import EntryRequest, RequestError, Where, option, request
 from .delivery import print_result, write_result
 from .options import Json, Name, OptionalFolder, with_requests
-from .terminal import echo
+from .terminal import echo, print_json, print_table
 
 
 @request
@@ -78,5 +101,133 @@ def show(name: Name, variant: EntryRequest, json: Json = False) -> None:
     """
     chapter = variant.load(name, load).chapter()
     print_result([chapter], {}, json)
-    for reference in () if json else chapter.references:
-        echo(f"- {reference}")
+    for source in () if json else chapter.references:
+        echo(f"- {source}")
+
+
+@dataclasses.dataclass(frozen=True)
+class ListRow:
+    """Name, title, kind and provenance of a library file."""
+
+    name: str
+    title: str
+    kind: str
+    provenance: str
+
+
+def list_entries(json: Json = False) -> None:
+    """List muscles, laws, valves, plants, products and data sets.
+
+    A muscle can be simulated; a characteristic cannot, because it has no geometry or is not solved for the force.
+    A product states the values that the maker of a muscle permits. A valve is used in a scenario as { library = NAME },
+    and a plant as [plant] library = NAME; `airmuscle simulate NAME` runs its example. A data set is used as FILES of
+    `airmuscle fit`; that of a specimen is listed with its law. The provenance is the origin of the numbers: printed,
+    measured, data sheet, secondary source, fitted or chosen.
+
+    \b
+    Examples:
+      airmuscle list
+      airmuscle list --json
+    """
+    rows = library_rows()
+    if json:
+        print_json([dataclasses.asdict(row) for row in rows])
+        return
+    print_table({field.name: [getattr(row, field.name) for row in rows] for field in dataclasses.fields(ListRow)})
+
+
+def library_rows() -> list[ListRow]:
+    """All library entries, valves, plants and data sets, read from the files without building any model."""
+    data = {name: _data_row(DATA / f"{name}.csv") for name in list_data()}
+    laws = [_row(LAWS / f"{name}.toml", _law_kind) for name in list_laws()]
+    parts: tuple[tuple[str, Iterable[str], Callable[[Mapping[str, Any]], str]], ...] = (
+        ("valve", list_valves(), lambda tables: f"valve, {tables['valve']['model']}"),
+        ("plant", list_plants(), lambda tables: f"plant, {tables['plant']['mechanism']['model']}"),
+        ("product", list_products(), lambda _: "product, Ratings"),
+    )
+    return [
+        *(_with_data_set(row, data.pop(row.name)) if row.name in data else row for row in laws),
+        *(_row(FOLDERS[part] / f"{name}.toml", kind_of) for part, names, kind_of in parts for name in names),
+        *data.values(),
+    ]
+
+
+def _with_data_set(law: ListRow, data: ListRow) -> ListRow:
+    """One row for a law and the data set of the same name."""
+    provenance = law.provenance if data.provenance in ("", law.provenance) else f"{law.provenance}; {data.provenance}"
+    return dataclasses.replace(law, kind=f"{law.kind}; {data.kind}", provenance=provenance)
+
+
+def _row(path: Path, kind_of: Callable[[Mapping[str, Any]], str]) -> ListRow:
+    tables = tomllib.loads(path.read_text(encoding="utf-8"))
+    return ListRow(path.stem, tables["title"], kind_of(tables), tables["provenance"])
+
+
+def _law_kind(tables: Mapping[str, Any]) -> str:
+    law = tables["characteristic"]
+    muscle = issubclass(model_class(law["model"], tables["title"]), ForceLaw) and (
+        "geometry" in tables or "geometry" in law
+    )
+    return f"{'muscle' if muscle else 'characteristic'}, {law['model']}"
+
+
+def _data_row(path: Path) -> ListRow:
+    """Title and provenance from the comments at the top of a data file."""
+    with path.open(encoding="utf-8") as file:
+        comments = list(itertools.takewhile(lambda line: line.startswith("#"), file))
+    text = " ".join(line.lstrip("# ").strip() for line in comments)
+    title = comments[0].lstrip("# ").strip() if comments else ""
+    secondary = "secondary source" in text
+    provenance = "secondary source" if secondary else "measured" if "measured" in text else ""
+    return ListRow(path.stem, title, "data set", provenance)
+
+
+def cite(
+    name: Name,
+    json: Json = False,
+    bibtex: Annotated[bool, typer.Option("--bibtex", help="Print BibTeX entries.")] = False,
+) -> None:
+    """Print the references of a library entry.
+
+    The list covers the formulas and the parameter values.
+
+    \b
+    Examples:
+      airmuscle cite dmsp-20-300
+      airmuscle cite dmsp-20-300 --bibtex >> references.bib
+    """
+    if json and bibtex:
+        raise typer.BadParameter("--json and --bibtex exclude each other")
+    references = reference.cite(load(name))
+    if json:
+        print_json([dataclasses.asdict(source) for source in references])
+        return
+    for source in references:
+        echo(as_bibtex(source) if bibtex else str(source))
+    if not references:
+        echo(f"{name}: no reference is given; its parameter values are assumed.")
+
+
+def as_bibtex(source: Reference) -> str:
+    """A BibTeX entry of type @misc, which every bibliography style supports."""
+    fields = {
+        "author": _authors(source.authors),
+        "title": "{" + _escape(source.title) + "}",
+        "howpublished": _escape(source.where),
+        "year": str(source.year) if source.year else "",
+        "doi": source.doi or "",
+        "note": _escape(source.note),
+    }
+    lines = [f"  {key} = {{{value}}}," for key, value in fields.items() if value]
+    key = re.sub(r"[^\w:.-]", "-", source.key)
+    return "\n".join([f"@misc{{{key},", *lines, "}"])
+
+
+def _authors(authors: str) -> str:
+    """`Chou, C.-P., Hannaford, B. et al.` in the syntax of BibTeX: names separated by `and`."""
+    separated = re.sub(r"(?:(?<=\.),|;) ", " and ", authors)
+    return _escape(re.sub(r",? et al\.?", " and others", separated))
+
+
+def _escape(text: str) -> str:
+    return re.sub(r"([&%$#_{}])", r"\\\1", text)
