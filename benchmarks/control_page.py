@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime
 import math
 import platform
+import re
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from typing import Any
@@ -20,7 +21,7 @@ from airmuscle.design.control_benchmark.chapter import (
     search_table,
     truth_table,
 )
-from airmuscle.report import Table
+from airmuscle.report import Table, shown_columns
 
 SINES = {0.5: 0.25, 1.0: 0.45, 2.0: 0.9, 3.0: 1.3}
 """Targets of the rms error [degree] of sines of 20 degrees by frequency [Hz] (chosen)."""
@@ -74,8 +75,8 @@ def convergence(result: BenchmarkResult) -> str:
     if found is None:
         return "nothing was tuned."
     ended = [list(map(int, str(each).split(" of "))) for each in found.columns["converged"]]
-    pairs = zip(found.columns["controller"], found.columns["spread [%]"], strict=True)
-    beyond = [str(name) for name, value in pairs if float(value) > 100 * SEARCH_SPREAD]
+    pairs = zip(found.columns["controller"], found.columns["spread"], strict=True)
+    beyond = [str(name) for name, value in pairs if value is not None and value > SEARCH_SPREAD]
     text = f"{sum(n for n, _ in ended)} of {sum(m for _, m in ended)} searches converged within their sets of gains; "
     if len(result.seeds) == 1:
         return text + "one search each, so that its spread is not known."
@@ -167,7 +168,7 @@ def targets(results: Mapping[str, BenchmarkResult], curve: LearningCurve) -> lis
     late, last = float(curve.errors[10:].max()), f"trials 11 to {curve.errors.size}"
     found.append(single(f"learning, {last}", f"≤ {LEARNING_TARGET:g}°", f"{late:.3f}°", late <= LEARNING_TARGET))
     rise = max(0.0, float(np.diff(curve.errors).max()))
-    found.append(single("learning, rises", f"≤ {curve.spread:.3f}° (noise)", f"{rise:.3f}°", curve.is_monotone))
+    found.append(single("learning, rises", f"≤ {curve.spread:.3f}° (noise)", f"{rise:.3f}°", rise <= curve.spread))
     return found
 
 
@@ -201,9 +202,13 @@ def learning(curve: LearningCurve) -> list[str]:
 
 def table(made: Table, digits: int = 4) -> list[str]:
     """A table of a report in Markdown, with its title and note."""
-    columns = list(made.columns)
-    cells = [[_cell(value, digits) for value in made.columns[name]] for name in columns]
-    return [f"{sentence(made.title)}", "", *rows(columns, zip(*cells, strict=True)), "", made.note, ""]
+    shown = shown_columns(made, chosen=False)
+    heads, title = [each.heading for each in shown], made.title
+    if len(units := {re.search(r" \[.*\]$|$", head)[0] for head in heads[1:]}) == 1:  # that of all goes to the title
+        (unit,) = units
+        heads, title = [head.removesuffix(unit) for head in heads], title.replace(",", f"{unit},", 1)
+    cells = [[_cell(value, digits) for value in each.cells] for each in shown]
+    return [sentence(title), "", *rows(heads, zip(*cells, strict=True)), "", made.note, ""]
 
 
 def rows(headings: Iterable[str], cells: Iterable[Iterable[str]]) -> list[str]:
@@ -215,7 +220,7 @@ def rows(headings: Iterable[str], cells: Iterable[Iterable[str]]) -> list[str]:
 def _cell(value: Any, digits: int) -> str:
     if isinstance(value, str):
         return value
-    return "–" if math.isnan(value) else "∞" if math.isinf(value) else f"{value:.{digits}g}"
+    return "–" if value is None or math.isnan(value) else "∞" if math.isinf(value) else f"{value:.{digits}g}"
 
 
 def sentence(text: str) -> str:

@@ -6,8 +6,10 @@ No times are asserted, because they depend on the machine; benchmarks/RESULTS.md
 from __future__ import annotations
 
 import dataclasses
+import re
 
 import batch
+import control_page
 import controllers
 import environments
 import loops
@@ -23,8 +25,25 @@ import static_fit
 from filling import runs
 
 from airmuscle.core import tree
+from airmuscle.design import benchmark_controllers, find_tasks, proportional_joint, standard_contenders
 from airmuscle.engine import DormandPrince8, Rodas4, Schedule
 from airmuscle.engine.compile import compile_system
+
+
+def test_the_page_of_the_control_benchmark_has_the_tables_of_a_result_in_their_units():
+    joint = proportional_joint((1,))
+    known = [each for each in standard_contenders(joint) if each.name == "feed-forward"]
+    narrow = dataclasses.replace(joint, family={"nominal": joint.model})
+    for seeds, spread in ((1, 2), r"\|\s[^|–]+\|$"), ((1,), r"\| – \|$"):
+        found = benchmark_controllers(
+            narrow, known, find_tasks(("step",)), seeds=seeds, sets_per_gain=8, commissioning_runs=0
+        )
+        text = "\n".join(control_page.part(found))
+        error = found.metric("feed-forward", "step", "rmse").median
+        assert f"RMS error [deg], models only.\n\n| task | feed-forward |\n|---|---|\n| step | {error:.4g} |" in text
+        (searched,) = re.findall(r"\| controller \| gains .*\n.*\n(.*)", text)
+        assert re.search(spread, searched)
+        assert f"0 of {len(seeds)} searches converged" in control_page.convergence(found)
 
 
 @pytest.mark.parametrize("states", [3, 6, 8, 10])

@@ -130,7 +130,7 @@ def search_table(result: BenchmarkResult) -> Table | None:
         "sets of gains": [max(len(each.history) for each in found) for found in searches.values()],
         "converged": [f"{sum(each.converged for each in found)} of {len(found)}" for found in searches.values()],
         "objective": _column("rmse", [sorted(values)[len(values) // 2] for values in best.values()]),
-        "spread": TableColumn([max(values) / min(values) - 1.0 for values in best.values()], "1", "%"),
+        "spread": TableColumn([max(v) / min(v) - 1.0 if v[1:] else None for v in best.values()], "1", "%"),
     }
     return Table(
         "searches", "Searches", columns,

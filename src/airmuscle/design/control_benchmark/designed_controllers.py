@@ -22,6 +22,9 @@ READING = "reading"
 PERMITTED_DIFFERENCE, PRESSURE_SPREAD = 1e5, 1e3
 """Permitted deviation of the command [Pa], to which the permitted errors are relative, and deviation of the present
 pressure difference after 1 s [Pa] (chosen)."""
+RESERVE = 8e-3
+"""Dead time [s] beyond the stated one with which a design reckons (chosen): the hold of a sample, 1 m of tube and two
+samples that nobody knows. Without it the loop amplifies errors near its bandwidth."""
 HORIZON = 40
 """Samples of the horizon of the predictive controller (chosen)."""
 STEPS = (1e-3, 1e-2, 1e3)
@@ -64,7 +67,7 @@ class JointDesignModel:
 
 
 def joint_design_model(joint: BenchmarkJoint) -> JointDesignModel:
-    """The linear model of a joint, from its nominal model without friction at the mean pressure."""
+    """The linear model of a joint, from its nominal model without friction at the mean pressure, with RESERVE."""
     slopes = []
     for i, step in enumerate(STEPS):
         point = np.zeros(3)
@@ -72,7 +75,7 @@ def joint_design_model(joint: BenchmarkJoint) -> JointDesignModel:
         above, below = (angular_acceleration(joint, joint.model, *(sign * point)) for sign in (1.0, -1.0))
         slopes.append((above - below) / (2.0 * step))
     delay = next(sensor.delay for sensor in joint.sensors if sensor.column == "angle")
-    dead_time = max(delay, 1) * joint.sample_time
+    dead_time = max(delay, 1) * joint.sample_time + RESERVE
     return JointDesignModel(-slopes[0], -slopes[1], slopes[2], dead_time, joint.sample_time)
 
 
