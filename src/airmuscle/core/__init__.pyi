@@ -57,6 +57,7 @@ from .arrays import flat_view as flat_view
 from .arrays import instructions_of as instructions_of
 from .arrays import make_program as make_program
 from .arrays import one_thread as one_thread
+from .atomic_output import is_running as is_running
 from .declaration import INFINITY as INFINITY
 from .declaration import as_finite_float as as_finite_float
 from .declaration import as_float as as_float

@@ -1,7 +1,5 @@
 """Stochastic Gauss-Newton descent of the free run over windows, joint by joint, with exact gradients."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 from collections.abc import Mapping, Sequence
@@ -9,11 +7,7 @@ from typing import cast
 
 import numpy as np
 
-from ...core import tree
-from ...core.arrays import Array
-from ...core.declaration import model
-from ...core.ops import Value, Values
-from ...core.system import StateVariable, System
+from ...core import Array, StateVariable, System, Value, Values, model, tree
 from ...engine import BatchSolution, RungeKutta4, WithSensitivities, sensitivity, simulate_batch
 from ...physics import PressureDriven, SerialArm, WithStickSlip, friction_load
 from .episodes import HISTORY, Windows, WindowSignal, start_of
@@ -190,7 +184,7 @@ def _start_slope(arm: PressureDriven, path: str, known: Mapping[str, Array], win
     return {name: (moved[name] - known[name]) / step for name in known}
 
 
-def signals(system: OneJoint, windows: Windows) -> list[WindowSignal]:
+def signals(system: "OneJoint", windows: Windows) -> list[WindowSignal]:
     """The inputs of one joint in every window: pressures, and the measured motion of the other joints."""
     motion = [
         column[:, HISTORY:, i] for i in system.others for column in (windows.angle, windows.rate, windows.acceleration)

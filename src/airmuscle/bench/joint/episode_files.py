@@ -24,8 +24,6 @@ pairs = [[1, 2], [4, 3]]
 axes = ["z", "-y"]
 """
 
-from __future__ import annotations
-
 import dataclasses
 import itertools
 from collections.abc import Mapping
@@ -34,9 +32,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.arrays import Array
-from ...core.errors import ColumnError, FileError, suggestion
-from ...core.units import quantity
+from ...core import Array, ColumnError, FileError, quantity, suggestion
 from ..readers.file_kind import read_toml
 from .episode_formats import Arrays, find_episode_files, read_arrays
 from .episodes import Episode, Episodes, join, speed_of

@@ -12,8 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.arrays import Array
-from ...core.errors import ColumnError, FileError
+from ...core import Array, ColumnError, FileError
 from ..readers.raw_csv import read_csv_table
 from ..readers.raw_rosbag import read_rosbag_tables
 from ..readers.separate_process import import_lab_package, run_reader

@@ -1,15 +1,12 @@
 """Inspection of episodes: rates, ranges, which pressure acts on which angle, and what forbids an identification."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 from collections.abc import Sequence
 
 import numpy as np
 
-from ...core.arrays import Array
-from ...core.errors import IdentificationError
+from ...core import Array, IdentificationError
 from .episodes import Episode, Episodes, speed_of
 
 MAX_DELAY = 8

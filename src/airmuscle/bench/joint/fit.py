@@ -1,15 +1,11 @@
 """Identification of an arm from episodes of pressures and angles, by multiple shooting of its free run."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np
 from scipy.linalg import block_diag
 
-from ...core import tree
-from ...core.arrays import Array
-from ...core.errors import ParameterError
+from ...core import Array, ParameterError, tree
 from ...physics import (
     Braid,
     LinearInPressure,

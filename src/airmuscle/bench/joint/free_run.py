@@ -1,7 +1,5 @@
 """Free run of an arm over windows: its baselines, the residual that physics leaves in it, pressures from commands."""
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from typing import cast
@@ -9,8 +7,7 @@ from typing import cast
 import numpy as np
 from scipy.optimize import least_squares
 
-from ...core import tree
-from ...core.arrays import Array
+from ...core import Array, tree
 from ...engine import RungeKutta4, simulate_batch
 from ...physics import GaussianResidual, PressureDriven, WithStickSlip
 from .. import baselines

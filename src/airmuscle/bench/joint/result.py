@@ -1,7 +1,5 @@
 """ArmFit: an arm identified from episodes, with its free-run errors beside the baselines, and its plant."""
 
-from __future__ import annotations
-
 import dataclasses
 import re
 from collections.abc import Mapping, Sequence
@@ -9,10 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core import plotting, tree
-from ...core.arrays import Array
-from ...core.errors import ParameterError
-from ...core.short_repr import ShortRepr
+from ...core import Array, ParameterError, ShortRepr, plotting, tree
 from ...physics import Plant, PressureDriven, ProportionalRegulator, SecondOrderLag, Supply, Valve
 from ...report import Chapter, NamedValue, Plot, Table, TableColumn
 from ..identify.prediction import PlantUncertainty

@@ -42,5 +42,7 @@ from .interval import Mask as Mask
 from .interval import level_intervals as level_intervals
 from .interval import remembered as remembered
 from .interval import running_median as running_median
+from .outliers import find_bench_outliers as find_bench_outliers
+from .outliers import kept_rows as kept_rows
 from .runs import CONTRACTION_BAND as CONTRACTION_BAND
 from .runs import RELATIVE_BAND as RELATIVE_BAND

@@ -58,6 +58,7 @@ from .files import is_path as is_path
 from .files import products_of_laws as products_of_laws
 from .fitted_entry import campaign_entry as campaign_entry
 from .fitted_entry import find_initial_law as find_initial_law
+from .fitted_entry import missing_geometry as missing_geometry
 from .fitted_entry import resting_lengths as resting_lengths
 from .location import check_keys as check_keys
 from .location import read_finite_number as read_finite_number

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-from ...core.atomic_output import check_writable
+from ...core import check_writable
 from ..requests import JointFitRequest, fit_requested_arm, inspect_requested
 from .delivery import deliver
 from .options import Folder, Json, with_requests

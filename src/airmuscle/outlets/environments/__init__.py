@@ -6,8 +6,7 @@ Where Gymnasium is installed, `import airmuscle.environments` registers them, al
 
 import importlib.util
 
-from ...core.errors import InputError
-from ...core.stubs import attach_stub
+from ...core import InputError, attach_stub
 
 __getattr__, __dir__, __all__ = attach_stub(__name__, __file__)
 __all__ += ["register_environments"]

@@ -24,7 +24,7 @@ from ...bench.identify.specimen_errors import odd_specimen_notes, ranked_specime
 from ...bench.identify.static_fit_chapter import fit_chapter
 from ...bench.identify.surface.shape import fit_shape_constrained, shape_violations_of_fit
 from ...bench.identify.uncertainty_chapter import Uncertainty, length_error_chapter, shape_chapter, uncertainty_chapter
-from ...core.errors import ParameterError
+from ...core import ParameterError
 from ...engine.processes import Workers
 from ...files.library.entry import Entry
 from ...files.library.fitted_entry import (

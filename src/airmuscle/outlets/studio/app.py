@@ -3,8 +3,6 @@
 The server computes no curve and no run: it sends printed programs, which the page evaluates.
 """
 
-from __future__ import annotations
-
 import collections
 import json
 import threading
@@ -13,7 +11,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from ...core.errors import AirmuscleError
+from ...core import AirmuscleError
 from ...files.library.files import LAWS, PLANTS, list_laws, list_plants, read_toml
 from ..requests import BraidRequest, FitRequest, JointFitRequest, ReadingRequest, RequestError, form_fields
 from .fit_routes import FitService

@@ -12,8 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ...bench import propose_mapping
-from ...core.atomic_output import atomic_folder
-from ...core.errors import AirmuscleError, FileError
+from ...core import AirmuscleError, FileError, atomic_folder
 from ...report.data import as_json, as_sheet
 from ...report.write import write_into
 from ..requests import JointFitRequest, RequestError, build, fit_requested_arm, inspect_requested

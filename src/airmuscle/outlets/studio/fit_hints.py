@@ -1,12 +1,10 @@
 """Remedies of the page: the hints of messages in the words of the fields of the tab Fit."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 
 import airmuscle as am
 
-from ...core.errors import AirmuscleError, Hint, HintedText
+from ...core import AirmuscleError, Hint, HintedText
 from ..requests.declaration import RequestError
 
 

@@ -3,8 +3,6 @@
 A task has a random identifier, which only the page that started it knows, and the page may be closed meanwhile.
 """
 
-from __future__ import annotations
-
 import collections
 import dataclasses
 import secrets
@@ -14,7 +12,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from ...core.errors import AirmuscleError
+from ...core import AirmuscleError
 from ..requests.declaration import RequestError
 from .security import BadRequest
 from .worker import LimitedWorker, LimitError

@@ -1,7 +1,5 @@
 """Reading of uploaded files: recordings, and every problem with the field of the page that it concerns."""
 
-from __future__ import annotations
-
 import dataclasses
 import os
 import warnings
@@ -15,10 +13,8 @@ from ...bench.readers.constants import parse_constant_name, split_specimens
 from ...bench.readers.interpret import interpret, resolve_headings, unit_conversion
 from ...bench.readers.mapping import apply_mapping
 from ...bench.readers.reader import check_bench, read_tables
-from ...bench.segment import check_contents
-from ...bench.segment.outliers import Outlier, find_bench_outliers
-from ...core.errors import AirmuscleError, AirmuscleWarning, ColumnError
-from ...core.units import AMBIENT_PRESSURE, quantity
+from ...bench.segment import Outlier, check_contents, find_bench_outliers
+from ...core import AMBIENT_PRESSURE, AirmuscleError, AirmuscleWarning, ColumnError, quantity
 from ...recording.heading import Heading, parse_heading
 from ..requests.declaration import RequestError
 from .fit_hints import as_field_error, in_page_words

@@ -9,8 +9,6 @@ POST /api/fit/task/ID/cancel
 GET  /api/fit/task/ID/FILE            result.json, report.html, muscle.toml, report.zip
 """
 
-from __future__ import annotations
-
 import json
 from typing import Any
 

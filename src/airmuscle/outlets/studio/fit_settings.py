@@ -3,8 +3,6 @@
 An error names the field of the page that it concerns: `resting_length`, `column:p`, `file:run.csv`.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
@@ -16,8 +14,7 @@ import numpy.typing as npt
 import airmuscle as am
 
 from ...bench.segment.outliers import Outlier, kept_rows, leave_out
-from ...core.errors import AirmuscleError
-from ...core.units import quantity
+from ...core import AirmuscleError, quantity
 from ...files.library.files import list_laws
 from ..requests import SPLITS as GROUPS
 from ..requests import BraidRequest, BraidSize, ReadingRequest, RequestError, build, form_fields

@@ -1,7 +1,5 @@
 """Sheet of uploaded files: columns, recordings with runs and findings, problems, and the points of the chart."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from pathlib import Path
@@ -12,9 +10,8 @@ import numpy as np
 import airmuscle as am
 
 from ...bench.readers.constants import CONSTANT_QUANTITIES
-from ...bench.segment import Inspection, Run, inspect_all
-from ...bench.segment.outliers import Outlier, kept_rows
-from ...core.errors import AirmuscleError
+from ...bench.segment import Inspection, Outlier, Run, inspect_all, kept_rows
+from ...core import AirmuscleError
 from ...recording.columns import display_scale
 from ..requests.declaration import RequestError
 from .fit_hints import in_page_words

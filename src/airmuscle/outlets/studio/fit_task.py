@@ -4,8 +4,6 @@ The computation is that of `airmuscle fit --compare` and `airmuscle hysteresis`.
 their folder together at the end.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 import warnings
@@ -25,10 +23,8 @@ from ...bench.identify.hysteresis.hysteresis_chapter import hysteresis_chapters,
 from ...bench.identify.hysteresis.joint import select_friction
 from ...bench.identify.static_fit_chapter import equation_section
 from ...bench.segment import check_contents, motion_direction
-from ...core.atomic_output import atomic_folder
-from ...core.errors import AirmuscleError, AirmuscleWarning
-from ...files.library.fitted_entry import missing_geometry, resting_lengths
-from ...files.library.write import part_toml, save
+from ...core import AirmuscleError, AirmuscleWarning, atomic_folder
+from ...files.library import missing_geometry, part_toml, resting_lengths, save
 from ...report.chapter import Chapter
 from ...report.data import as_json, as_sheet, in_words
 from ...report.formula import to_display_mathml

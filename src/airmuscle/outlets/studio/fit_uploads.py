@@ -4,8 +4,6 @@ A set has a random identifier, which only the page that uploaded it knows; it is
 A file appears under its name when it is complete. The folder of a server that was killed is removed by the next one.
 """
 
-from __future__ import annotations
-
 import contextlib
 import os
 import re
@@ -19,7 +17,7 @@ from collections.abc import AsyncIterator, Callable
 from pathlib import Path
 
 from ...bench.readers.reader import EXTENSIONS
-from ...core.atomic_output import is_running
+from ...core import is_running
 from .security import BadRequest
 
 MAX_FILE = 32 * 10**6

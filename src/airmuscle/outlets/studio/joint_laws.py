@@ -4,15 +4,13 @@ Every law commands two pressures. Pressure regulators receive them as set points
 proportional control of the pressures, on/off valves through sigma-delta modulation. All gains are chosen.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from collections.abc import Sequence
 
 import airmuscle as am
 
-from ...core.errors import ParameterError
+from ...core import ParameterError
 
 BAR = 1e5
 SPARE = 0.02

@@ -12,8 +12,6 @@ The functions write into arrays that they are given; c is what `prepare(p, c)` m
                                         muscles must give, with that of their dampers
 """
 
-from __future__ import annotations
-
 import dataclasses
 import hashlib
 import json
@@ -24,17 +22,14 @@ import numpy as np
 
 import airmuscle as am
 
-from ...core import tree
-from ...core.errors import ParameterError
-from ...core.tree import leaves
+from ...core import ParameterError, leaves, tree
 from ...design.control_benchmark import STANDARD_TASKS, ControlTask
 from ...engine.compile.functions import Printer, TracedSystem
 from ...engine.compile.kernel_text import JavaScriptKernels
 from ...engine.compile.program import compile_system
 from ...engine.compile.text.programs import JavaScriptLanguage
 from ...engine.run.compiled_law import trace_sample
-from ...files.library.files import list_plants
-from ...files.library.plant_file import plant_tables
+from ...files.library import list_plants, plant_tables
 from ...files.scenario.scenario import TABLES, build_scenario
 from ...physics.analysis.joint_torque import load_function, torque_functions
 from .joint_laws import JointController, joint_controllers, statics_within_valves, valve_set

@@ -13,16 +13,13 @@ parameters:
 A direction that the law does not give in closed form is missing; the page searches for its root.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import airmuscle as am
 
-from ...core import autodiff
-from ...core.errors import AirmuscleError, TraceError
+from ...core import AirmuscleError, TraceError, autodiff
 from ...engine.compile.functions import Printer
 from ...engine.compile.text.programs import JavaScriptLanguage
 from ...physics.muscle.geometry.straight_fibre import FibreTube

@@ -4,8 +4,6 @@ A template is a list of texts and integers: an integer is the place of the param
 as Python writes a float, so that a page fills in numbers without a server.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import hashlib
 import json
@@ -19,12 +17,8 @@ import numpy as np
 
 import airmuscle as am
 
-from ...core import cite, leaves, tree
-from ...core.errors import ParameterError, TraceError
-from ...core.tree import Leaf
-from ...core.units import conversion
-from ...files.library.entry import Entry
-from ...files.library.write import to_toml
+from ...core import Leaf, ParameterError, TraceError, cite, conversion, leaves, tree
+from ...files.library import Entry, to_toml
 from ...physics.muscle.characteristic.validity_range import validity_range_of
 from ...physics.muscle.geometry.straight_fibre import FibreTube
 from .law_program import print_law

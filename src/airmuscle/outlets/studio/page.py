@@ -1,7 +1,5 @@
 """Page of the studio: its files, and one self-contained file of what is on the page or of given sheets."""
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import json
@@ -10,8 +8,7 @@ from importlib import metadata, resources
 from pathlib import Path
 from typing import Any
 
-from ...core.atomic_output import atomic_file
-from ...core.errors import FileError, ParameterError
+from ...core import FileError, ParameterError, atomic_file
 from .joint_sheet import joint_names, sheet_of_joint
 from .tasks import sheet_of_any
 

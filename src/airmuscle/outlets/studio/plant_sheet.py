@@ -1,7 +1,5 @@
 """Sheet of a plant: a scenario with its printed program, names, units and start, for a run in the page."""
 
-from __future__ import annotations
-
 import base64
 import hashlib
 import io
@@ -14,11 +12,8 @@ import numpy as np
 
 import airmuscle as am
 
-from ...core import cite
-from ...core.errors import AirmuscleError, ParameterError
-from ...core.tree import Leaf, leaves
-from ...files.library.location import Location
-from ...files.library.write import part_toml, tables_toml
+from ...core import AirmuscleError, Leaf, ParameterError, cite, leaves
+from ...files.library import Location, part_toml, tables_toml
 from ...files.scenario.scenario import TABLES, Scenario, build_scenario, initial_pressure
 from ...recording.columns import display_scale
 from ...report.formatting import format_number

@@ -8,8 +8,6 @@ loopback address as well. The Host of every request is compared, so that another
 no use.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import ipaddress
 import secrets
@@ -18,7 +16,7 @@ from http.cookies import CookieError, SimpleCookie
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
 
-from ...core.errors import AirmuscleError
+from ...core import AirmuscleError
 
 Scope = MutableMapping[str, Any]
 Receive = Callable[[], Awaitable[MutableMapping[str, Any]]]

@@ -4,8 +4,6 @@ A connection that sends nothing, or slowly, costs nobody else an answer: it is c
 another one needs its place.
 """
 
-from __future__ import annotations
-
 import contextlib
 import importlib.util
 import ipaddress
@@ -16,7 +14,7 @@ import threading
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from ...core.errors import InputError
+from ...core import InputError
 from .app import LONG_WORKERS, WORKERS, create_app
 from .fit_routes import FitService
 from .security import LOOPBACK, Access, is_loopback

@@ -1,7 +1,5 @@
 """Sheet of a sizing: ranked muscles for a lift or a joint with their charts and scenarios, for the tab Size."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from typing import Any
@@ -10,15 +8,13 @@ import numpy as np
 
 import airmuscle as am
 
-from ...core.arrays import Array
-from ...core.errors import AirmuscleError, ParameterError
+from ...core import AirmuscleError, Array, ParameterError
 from ...design.sizing.chapter import product_of, sizing_chapter
 from ...design.sizing.scenario import sizing_scenario
 from ...physics.muscle.characteristic.validity_range import validity_range_of
 from ...physics.muscle.isobars import compute_isobars
 from ...report.data import as_sheet, csv_text
-from ..requests.declaration import build, form_fields, options_of
-from ..requests.size import JOINT, LIFT, SizeRequest
+from ..requests import JOINT, LIFT, SizeRequest, build, form_fields, options_of
 
 OMITTED = ("count", "muscle")
 """Fields of the command that the page does not have."""

@@ -4,20 +4,15 @@ Files in the library folder may refer to other files. A text over the network mu
 the machine of the server.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from ...bench.readers.file_kind import parse_toml
-from ...core.errors import ParameterError
-from ...core.units import is_known_unit
+from ...core import ParameterError, is_known_unit
+from ...files.library import Location, is_path, list_plants, plant_tables, read_toml
 from ...files.library.entry_file import build_entry, check_describes_law, load_law
-from ...files.library.files import is_path, list_plants, read_toml
-from ...files.library.location import Location
-from ...files.library.plant_file import plant_tables
 from .law_sheet import law_sheet
 from .plant_sheet import sheet_of_plant, sheet_of_tables
 

@@ -4,8 +4,6 @@ A task that exceeds its limit of time is ended with its process; the next task s
 never read in the process of the server.
 """
 
-from __future__ import annotations
-
 import contextlib
 import queue
 import sys
@@ -15,7 +13,7 @@ import warnings
 from collections.abc import Callable, Iterator
 from typing import Any
 
-from ...core.errors import AirmuscleError, InputError, printable
+from ...core import AirmuscleError, InputError, printable
 from ...engine.processes import START_LIMIT, Report, Worker, WorkerError
 
 MEMORY = 4 * 2**30
