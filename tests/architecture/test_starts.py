@@ -61,3 +61,5 @@ def test_names_that_are_imported_on_use_are_available():
     assert {"fit", "Fit"} <= set(dir(am))
     with pytest.raises(AttributeError, match="module 'airmuscle' has no attribute 'fitt'"):
         am.fitt  # noqa: B018
+    with pytest.raises(AttributeError, match=r"no attribute 'load_scenario'; it is in airmuscle\.files$"):
+        am.load_scenario  # noqa: B018

@@ -2,6 +2,7 @@
 
 import functools
 import importlib
+import os
 import sys
 import types
 
@@ -13,15 +14,18 @@ def attach_stub(package, file):  # type: ignore[no-untyped-def]
     `core`, name the argument that is wrong where a call ends in an exception of Python. Nothing else is imported: until
     `__main__.main` runs, an interruption cannot be handled.
     """
-    with open(f"{file}i", encoding="ascii") as stub:
-        parts = stub.read().split("# isort: split")
+    parts = _text(f"{file}i").split("# isort: split")
     found = [[words for words in map(str.split, part.splitlines()) if words[:1] == ["from"]] for part in parts]
     modules = {words[3]: words[1] for part in found for words in part}
     public = sorted(words[3] for words in found[0])
 
     def get(name):  # type: ignore[no-untyped-def]
         if name not in modules:
-            raise AttributeError(f"module {package!r} has no attribute {name!r}")
+            folders = [] if name.startswith("_") else sorted(os.listdir(os.path.dirname(file)))
+            stubs = {folder: os.path.join(os.path.dirname(file), folder, "__init__.pyi") for folder in folders}
+            rooms = [room for room, stub in stubs.items() if os.path.isfile(stub) and f" as {name}\n" in _text(stub)]
+            place = f"; it is in {package}.{rooms[0]}" if rooms else ""
+            raise AttributeError(f"module {package!r} has no attribute {name!r}{place}")
         if modules[name] == ".":
             return importlib.import_module(f".{name}", package)
         value = getattr(importlib.import_module(modules[name], package), name)
@@ -31,6 +35,11 @@ def attach_stub(package, file):  # type: ignore[no-untyped-def]
         return value
 
     return get, lambda: public, public
+
+
+def _text(path: str) -> str:
+    with open(path, encoding="ascii") as file:
+        return file.read()
 
 
 def _naming_arguments(function, room):  # type: ignore[no-untyped-def]

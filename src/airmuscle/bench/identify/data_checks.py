@@ -111,18 +111,13 @@ def outlier_notes(recordings: Sequence[Recording]) -> list[str]:
             f"Suspected outliers of the force pull the law: {len(found)} of {rows} rows, in {files} of "
             f"{len({run.origin for run in timed})} files, which alone give an rms error of {rms:.2g} N ({examples}).",
             Hint("To leave them out", "drop_outliers", True, "ColumnMapping"),
-            Hint("To reduce their weight", "loss", Huber(_rounded(HUBER * sensors["force"].std))),
+            Hint("To reduce their weight", "loss", Huber(float(f"{HUBER * sensors['force'].std:.2g}"))),
         )
     ]
 
 
 def _describe_outlier(run: Recording, outlier: Outlier) -> str:
     return f"{run.origin}, row {outlier.row + 1} ({outlier.value:.4g} N, neighbours {outlier.expected:.4g} N)"
-
-
-def _rounded(scale: float) -> float:
-    """A scale with two significant digits."""
-    return float(f"{scale:.2g}")
 
 
 @dataclasses.dataclass(frozen=True)

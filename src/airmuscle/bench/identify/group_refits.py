@@ -150,7 +150,9 @@ class GroupRefits:
         if basis is not None:
             self._rows = weighted @ basis.directions
             self._sums = self._sum_groups(residuals, count)
-            self._smallest = 1.0 / float(np.linalg.norm(basis.directions * _norms(weighted[self._active])[:, None], 2))
+            self._smallest = 1.0 / float(
+                np.linalg.norm(basis.directions * np.linalg.norm(weighted[self._active], axis=0)[:, None], 2)
+            )
 
     def refit(self, counts: Array, start: Array | None = None) -> Array | None:
         """The parameters (P,) for these multiplicities of the groups (G,); None where the refit is not certain.
@@ -220,7 +222,3 @@ class GroupRefits:
         first = FirstStep(self._basis, step, float(counts @ self._sums.squares)) if start is None else None
         solution = gauss_newton(problem, self._solution.values if start is None else start, first, RELATIVE_STEP)
         return None if solution is None else solution[0]
-
-
-def _norms(matrix: Array) -> Array:
-    return np.asarray(np.linalg.norm(matrix, axis=0))

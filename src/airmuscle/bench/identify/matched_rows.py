@@ -148,7 +148,10 @@ def _with_residuals(blocks: list[Block]) -> list[Block]:
     """The blocks with residuals and slopes of the polynomial of all their rows."""
     if not blocks:
         return []
-    p, c, force = (_joined(blocks, name) for name in ("pressure", "contraction", "force"))
+    p, c, force = (
+        np.concatenate([block.recording[name][block.rows] for block in blocks])
+        for name in ("pressure", "contraction", "force")
+    )
     scale = max(float(np.max(np.abs(p))), 1.0)
     (low, high) = float(np.min(c)), float(np.max(c))
     x, y = p / scale, (c - low) / max(high - low, 1e-6)
@@ -159,10 +162,6 @@ def _with_residuals(blocks: list[Block]) -> list[Block]:
     ends = np.cumsum([len(block.rows) for block in blocks])[:-1]
     parts = zip(blocks, np.split(residuals, ends), np.split(slopes, ends), strict=True)
     return [dataclasses.replace(block, residuals=r, slopes=s) for block, r, s in parts]
-
-
-def _joined(blocks: Sequence[Block], name: str) -> Array:
-    return np.concatenate([block.recording[name][block.rows] for block in blocks])
 
 
 def _matched_runs(blocks: Sequence[Block], recordings: Sequence[Recording]) -> list[MatchedRuns]:

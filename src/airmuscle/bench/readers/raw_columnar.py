@@ -139,7 +139,10 @@ def _groups(
             (vectors if item.ndim == 1 and item.dtype.names is None else tables).append(item)
     constants, numeric = {**outer, **_constants(group.attrs)}, [d for d in vectors if d.dtype.kind in "biuf"]
     reduction = Reduction.of((d.size for d in numeric), downsampling)
-    channels = [Channel(_name(d), _values(d, reduction.step, downsampling), unit=_unit(d.attrs)) for d in numeric]
+    channels = [
+        Channel(str(d.name).rpartition("/")[2], _values(d, reduction.step, downsampling), unit=_unit(d.attrs))
+        for d in numeric
+    ]
     place = f"{origin}, group '{group.name}'"
     check_reduced_lengths(place, (d.size for d in numeric), (len(c.values) for c in channels))
     yield StoredTable(group.name, channels, constants, reduction)
@@ -173,10 +176,6 @@ def _columns(dataset: Any, step: int, downsampling: Downsampling) -> list[Channe
         values = list(np.asarray(_values(dataset, step, downsampling)).T)
     units = units if len(units) == len(names) else [""] * len(names)
     return [Channel(name, value, unit=unit) for name, value, unit in zip(names, values, units, strict=True)]
-
-
-def _name(dataset: Any) -> str:
-    return str(dataset.name).rpartition("/")[2]
 
 
 def _unit(attributes: Mapping[str, Any]) -> str:

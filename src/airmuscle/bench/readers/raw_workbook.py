@@ -121,13 +121,11 @@ def _find_heading_row(rows: Rows) -> int:
 def _is_numeric(row: list[Any]) -> bool:
     """Whether more than half of the cells of a row are numbers or times, also as texts; the others may be names."""
     cells = [c for c in row if c not in (None, "")]
-    numbers = sum(_is_numeric_text(c) if isinstance(c, str) else isinstance(c, _NUMBERS) for c in cells)
+    numbers = sum(
+        is_number(c) or seconds_from_clock((c,)) is not None if isinstance(c, str) else isinstance(c, _NUMBERS)
+        for c in cells
+    )
     return 2 * numbers > len(cells)
-
-
-def _is_numeric_text(cell: str) -> bool:
-    """Whether a text is a number, a clock time or a date."""
-    return is_number(cell) or seconds_from_clock((cell,)) is not None
 
 
 def _check_headings_cover(origin: str, headings: list[str], used: list[int], body: Rows) -> None:

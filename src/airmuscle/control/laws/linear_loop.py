@@ -122,6 +122,8 @@ def _peak(grid: Array, distances: Array, function: Callable[[float], float]) -> 
 
 SHOWN = 500
 """Frequencies of a Bode plot."""
+NO_GAIN = 1e-9
+"""Greatest gain of an open loop that counts as none (chosen); a closed valve leaves rounding, 1e-13."""
 STABLE = 1e-9
 """By how much the magnitude of a pole of a stable loop may exceed 1: enclosed air that is not controlled, rounding."""
 
@@ -181,19 +183,30 @@ class LinearLoop:
                 f"margins: the closed loop is not stable, its pole of the greatest magnitude is {self.poles[0]:.4g}. "
                 "Lower the gains, or shorten the sample time."
             )
-        return loop_margins(self.open_loop(column))
+        return loop_margins(self._acting(column))
 
     def bode(self, column: str | None = None, frequencies: npt.ArrayLike | None = None) -> Any:
         """A Matplotlib figure of gain and phase of the open loop, up to the Nyquist frequency unless given [Hz]."""
-        opened = self.open_loop(column)
+        opened = self._acting(column)
         if frequencies is None:
             frequencies = np.geomspace(1e-4, 1.0, SHOWN) * opened.nyquist_frequency
         return bode_figure(opened, checked_frequencies(frequencies))
 
     def nyquist(self, column: str | None = None) -> Any:
         """A Matplotlib figure of the open loop in the complex plane, with the circle of its sensitivity peak."""
-        opened = self.open_loop(column)
+        opened = self._acting(column)
         return nyquist_figure(opened.frequency_response(frequency_grid(opened))[:, 0, 0], loop_margins(opened).peak)
+
+    def _acting(self, column: str | None) -> SampledModel:
+        """The loop that is opened at a column; ParameterError where its gain is zero, as behind a closed valve."""
+        opened = self.open_loop(column)
+        if np.abs(opened.frequency_response(frequency_grid(opened))).max(initial=0.0) < NO_GAIN:
+            raise ParameterError(
+                f"the loop that is opened at '{column or self.law.measured[0]}' has no gain at this working point: a "
+                "valve that is closed, also one whose spool is within its overlap, lets no change through. Linearise "
+                "at a state or inputs in which it is open by a little."
+            )
+        return opened
 
     def step_response(self, setpoint: str, duration: float, size: float = 1.0) -> dict[str, Array]:
         """`time` [s] and the deviations (K,) of all measured columns at the samples after a step of a set point."""

@@ -70,7 +70,7 @@ def calibrate(fit: Fit, points: Sequence[Recording], records: Sequence[CampaignR
     """The band for further runs of the measured muscles, and that for other lengths if there are three or more."""
     max_force = FORCE_MARGIN * max(float(np.nanmax(run["force"])) for run in points)
     lengths = [_length(run) for run in points]
-    levels = [_level_name(record) for record in records]
+    levels = [record.level for record in records]
     bands: list[ErrorBand] = []
     for purpose, labels in (
         ("further pressures and speeds of the measured muscles", _inner(levels)),
@@ -117,10 +117,6 @@ def _band(purpose: str, residuals: Array, groups: int) -> ErrorBand:
 def _length(run: Recording) -> tuple[str, float] | None:
     length = run.constants.get("resting_length")
     return None if length is None else ("resting length", float(length))
-
-
-def _level_name(record: CampaignRecord) -> tuple[str, float] | None:
-    return record.level
 
 
 def _inner(values: Sequence[tuple[str, float] | None]) -> list[tuple[str, int] | None]:
