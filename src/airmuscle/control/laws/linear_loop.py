@@ -102,11 +102,15 @@ def _scanned(opened: SampledModel, frequencies: Array) -> npt.NDArray[np.complex
 
 
 def _zeros(grid: Array, values: Array, function: Callable[[float], float]) -> list[float]:
-    """The zeros of a function between the points of a grid where it changes its sign, to rounding."""
+    """The zeros of a function between the points of a grid where it changes its sign, to rounding.
+
+    A sign of its `values`, which are computed together, may be rounding; then the function itself has none there.
+    """
     from scipy.optimize import brentq
 
-    changes = np.flatnonzero(values[:-1] * values[1:] < 0)
-    return [float(brentq(function, grid[i], grid[i + 1], xtol=1e-300, rtol=1e-14)) for i in changes]
+    pairs = [(grid[i], grid[i + 1]) for i in np.flatnonzero(values[:-1] * values[1:] < 0)]
+    changes = [(low, high) for low, high in pairs if function(low) * function(high) < 0]
+    return [float(brentq(function, low, high, xtol=1e-300, rtol=1e-14)) for low, high in changes]
 
 
 def _peak(grid: Array, distances: Array, function: Callable[[float], float]) -> tuple[float, float]:
