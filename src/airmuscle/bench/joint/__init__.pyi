@@ -1,3 +1,5 @@
+from .angle_estimate import AngleEstimate as AngleEstimate
+from .angle_estimate import estimate_angles as estimate_angles
 from .episode_files import Channels as Channels
 from .episode_files import EpisodeMapping as EpisodeMapping
 from .episode_files import read_episode_mapping as read_episode_mapping
@@ -13,7 +15,5 @@ from .free_run import RegulatorLag as RegulatorLag
 from .free_run import ResidualGain as ResidualGain
 from .free_run import fit_regulator_lags as fit_regulator_lags
 from .free_run import fit_residual as fit_residual
-from .result import AngleEstimate as AngleEstimate
 from .result import ArmFit as ArmFit
 from .result import ArmParameter as ArmParameter
-from .result import estimate_angles as estimate_angles

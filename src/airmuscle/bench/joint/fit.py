@@ -222,9 +222,10 @@ def _name(path: str) -> str:
 
 # Reduced arm of unknown size from which a fit starts: muscles linear in pressure on links with stick-slip
 
-RADIUS, LENGTH, INERTIA, AREA = 0.03, 0.3, 0.1, 6.7e-4
+RADIUS, LENGTH, INERTIA, AREA, FIBRE_ANGLE = 0.03, 0.3, 0.1, 6.7e-4, 0.65
 """Moment arm [m], resting length and distance of joints [m], inertia [kg m^2] and area [m2] of every joint, chosen: a
-record of pressures and angles contains none of the first three, and each multiplies coefficients that are fitted."""
+record of pressures and angles contains none of the first three, and each multiplies coefficients that are fitted. The
+fibre angle [rad] of the volume permits 2.5 rad to both sides."""
 
 
 def reduced_arm(middle: Array, axes: Sequence[tuple[int, int, int]] = ()) -> PressureDriven:
@@ -250,7 +251,7 @@ def reduced_arm(middle: Array, axes: Sequence[tuple[int, int, int]] = ()) -> Pre
 def _muscle(name: str, reference: float) -> Muscle:
     full = 3e5 * AREA
     law = LinearInPressure((AREA, 0.0, 0.0), (-0.05 * full, 0.0, 0.0), 0.3 * full, reference)
-    return Muscle(law, Braid(0.01, 0.43, LENGTH), name=name)
+    return Muscle(law, Braid(0.01, FIBRE_ANGLE, LENGTH), name=name)
 
 
 def _link(number: int, axis: tuple[int, int, int], distance: float) -> SpatialLink:

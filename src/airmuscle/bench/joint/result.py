@@ -2,19 +2,19 @@
 
 import dataclasses
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from ...core import Array, ParameterError, ShortRepr, plotting, tree
+from ...core import Array, plotting, tree
 from ...physics import Plant, PressureDriven, ProportionalRegulator, SecondOrderLag, Supply, Valve
 from ...report import Chapter, NamedValue, Plot, Table, TableColumn
 from ..identify.prediction import PlantUncertainty
 from ..reported import Reported
 from .episode_inspection import EpisodeInspection
-from .episodes import COVERAGE, Episode, Episodes, coverage, in_pairs, rms
-from .free_run import RegulatorLag, ResidualGain, angles
+from .episodes import coverage, rms
+from .free_run import RegulatorLag, ResidualGain
 
 SUPPLY = 6e5
 """Gauge pressure [Pa] of the supply of the plant (chosen)."""
@@ -187,108 +187,3 @@ class ArmFit(Reported):
         lines, names = panels[0][0].get_legend_handles_labels()
         figure.legend(lines, names, loc="outside upper center", ncols=len(names))
         return figure
-
-
-# Angles from the pressures alone: free runs from the poses in which episodes begin
-
-MEMBERS, CALIBRATED = 12, 200
-"""Poses from which every episode is run, and episodes of the fit whose errors make the band (chosen)."""
-UNSEEN = 0.5
-"""Spread of the runs, relative to that of their poses, above which the pressures do not determine an angle (chosen)."""
-
-
-@dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class AngleEstimate(ShortRepr):
-    """Angles of episodes from their pressures; N episodes of at most R rows, NaN after their ends; `print` it.
-
-    angle     (N, R, J) [rad] mean of the runs from all poses
-    spread    (N, R, J) [rad] standard deviation of these runs: large where the joint has not moved since the start
-    band      (R, J) [rad] half-width that holds 95 % of the errors of the fitted episodes at this row
-    measured  (N, R, J) [rad]; `range` (J,) [rad] of the fitted angles between their 1 and 99 % quantiles
-    unseen    (J,) share of the rows where pressures alone do not determine the angle: motion is needed to see it
-    """
-
-    angle: Array
-    spread: Array
-    band: Array
-    measured: Array
-    range: Array
-    unseen: Array
-
-    @property
-    def rms(self) -> Array:
-        """Root mean square error (J,) [rad]."""
-        return np.asarray(np.sqrt(np.nanmean((self.angle - self.measured) ** 2, axis=(0, 1))))
-
-    @property
-    def coverage(self) -> Array:
-        """Share (J,) of the rows inside the band."""
-        inside = np.abs(self.angle - self.measured) <= self.band  # false after the end of an episode
-        return np.asarray(inside.sum(axis=(0, 1)) / np.isfinite(self.measured).sum(axis=(0, 1)))
-
-    def __str__(self) -> str:
-        return "\n".join(
-            f"joint {j}: {np.degrees(error):.3g} deg rms from pressures alone, {100 * error / span:.3g} % of its "
-            f"range, {100 * inside:.3g} % inside the 95 % band; in {100 * unseen:.3g} % of the rows the angle is not "
-            "seen until the joint moves"
-            for j, (error, span, inside, unseen) in enumerate(
-                zip(self.rms, self.range, self.coverage, self.unseen, strict=True), start=1
-            )
-        )
-
-
-def estimate_angles(fit: ArmFit, episodes: Episodes, *, any_pose: bool = False, seed: int = 0) -> AngleEstimate:
-    """Angles and bands of episodes that are known by their pressures only.
-
-    The identified arm runs freely from each of 12 poses. These are first rows of the fitted episodes, because an arm
-    begins in a place that is known from them; with `any_pose` they are rows anywhere in these episodes. What differs
-    between the runs is what the pressures do not tell: an angle that stiction holds is not seen until it moves. Speeds
-    at the start are 0; readings count until the delay of their sensors after each row. The measured angles serve only
-    for `rms` and `coverage`. Raises ParameterError for other numbers of joints and muscles than those of the fit.
-    """
-    if episodes.muscles != len(fit.arm.muscle) or episodes.joints != len(fit.pairs):
-        raise ParameterError(
-            f"estimate_angles: the episodes have {episodes.joints} joints and {episodes.muscles} pressures, the fit "
-            f"{len(fit.pairs)} and {len(fit.arm.muscle)}; give episodes of the same arm."
-        )
-    fitted = in_pairs(fit.inspection.episodes[: fit.fitted], fit.pairs)
-    rng = np.random.default_rng(seed)
-    rows = fitted.rows("angle") if any_pose else np.array([run.angle[0] for run in fitted.runs])
-    poses = rows[rng.choice(len(rows), min(MEMBERS, len(rows)), replace=False)]
-    known = fitted[-CALIBRATED:]
-    angle, _ = _runs(fit.arm, known.runs, known.sample_time, fit.inspection.delay, poses)
-    level = min(1.0, COVERAGE * (1 + 1 / len(known)))  # so that it holds for one further episode, too
-    limits = np.nanquantile(np.abs(angle - _padded(known.runs, "angle")), level, axis=0, method="higher")
-    own = in_pairs(episodes, fit.pairs)
-    angle, spread = _runs(fit.arm, own.runs, own.sample_time, fit.inspection.delay, poses)
-    measured = _padded(own.runs, "angle")
-    limits = limits[np.minimum(np.arange(angle.shape[1]), len(limits) - 1)]
-    unseen = np.where(np.isfinite(measured), spread > UNSEEN * poses.std(axis=0), np.nan)
-    span = np.ptp(np.quantile(fitted.rows("angle"), (0.01, 0.99), axis=0), axis=0)
-    return AngleEstimate(angle, spread, limits, measured, span, np.nanmean(unseen, axis=(0, 1)))
-
-
-def _runs(
-    arm: PressureDriven, runs: Sequence[Episode], sample_time: float, delay: int, poses: Array
-) -> tuple[Array, Array]:
-    """Mean and standard deviation (N, R, J) of the free runs from all poses; NaN after the end of an episode."""
-    pressure = _padded(runs, "pressure", held=True)
-    rows, names = pressure.shape[1], [c.name for c in arm.mechanism.coordinates]
-    later = np.minimum(np.arange(rows) + delay, rows - 1)
-    state = {s.name: np.zeros(len(runs) * len(poses)) for s in arm.states}
-    state |= {name: np.tile(poses[:, j], len(runs)) for j, name in enumerate(names)}
-    state |= {f"{p}pressure": np.repeat(pressure[:, later[0], i], len(poses)) for i, p in enumerate(arm.prefixes)}
-    found = angles(arm, np.repeat(pressure[:, later], len(poses), axis=0), state, sample_time)
-    stacked = found.reshape(len(runs), len(poses), rows, len(names))
-    ended = np.isnan(_padded(runs, "angle"))
-    return np.where(ended, np.nan, stacked.mean(axis=1)), np.where(ended, np.nan, stacked.std(axis=1))
-
-
-def _padded(runs: Sequence[Episode], name: str, held: bool = False) -> Array:
-    """One quantity of all episodes (N, R, columns), its last row held or NaN after the end of an episode."""
-    columns = [getattr(run, name) for run in runs]
-    longest = max(len(c) for c in columns)
-    ends = [c[-1:] if held else np.full_like(c[-1:], np.nan) for c in columns]
-    return np.stack(
-        [np.concatenate([c, np.repeat(e, longest - len(c), axis=0)]) for c, e in zip(columns, ends, strict=True)]
-    )
