@@ -74,6 +74,17 @@ def test_angles_from_pressures_alone_hold_their_band_and_need_motion(fitted):
     assert "the angle is not seen until the joint moves" in str(found)
 
 
+def test_what_the_free_runs_lack_is_corrected_from_fitted_episodes(fitted):
+    """An arm with one muscle too strong; with nine fitted episodes nothing is corrected, because ten are needed."""
+    fit, _ = fitted
+    law = fit.arm.muscle[0].contractile
+    strong = replace(fit.arm.muscle[0], contractile=replace(law, area=tuple(1.4 * a for a in law.area)))
+    wrong = replace(fit, arm=replace(fit.arm, muscle=(strong, fit.arm.muscle[1])))
+    further = made_episodes(30, seed=2)
+    plain, corrected = (estimate_angles(replace(wrong, fitted=n), further).rms[0] for n in (9, fit.fitted))
+    assert corrected < 0.7 * plain
+
+
 def test_a_joint_that_does_not_move_is_not_seen(fitted):
     fit, _ = fitted
     at_rest = changed(EPISODES[24:26], pressure=lambda p: np.full_like(p, 1.5e5))

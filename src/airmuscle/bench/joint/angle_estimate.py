@@ -12,12 +12,13 @@ from .free_run import angles
 from .result import ArmFit
 
 MEMBERS, CALIBRATED, EARLIER = 12, 400, 10
-"""Poses from which every episode is run, episodes of the fit whose errors make correction and band, and rows before a row
-whose pressures the correction sees, too (chosen)."""
+"""Poses from which every episode is run, episodes of the fit whose errors make correction and band, and rows before a
+row whose pressures the correction sees, too (chosen)."""
 UNSEEN = 0.5
 """Spread of the runs, relative to that of their poses, above which the pressures do not determine an angle (chosen)."""
-RIDGE, FEWEST = 0.3, 10
-"""Weight of the ridge relative to the number of episodes, and least number of episodes in a row (chosen)."""
+RIDGE, FEWEST, BLOCKS = 0.3, 10, 4
+"""Weight of the ridge relative to the number of episodes, least number of episodes in a row, and number of blocks of
+episodes that are left out in turn for the band (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -66,9 +67,11 @@ def estimate_angles(fit: ArmFit, episodes: Episodes, *, any_pose: bool = False, 
     The identified arm runs freely from each of 12 poses. These are first rows of the fitted episodes, because an arm
     begins in a place that is known from them; with `any_pose` they are rows anywhere in these episodes. What differs
     between the runs is what the pressures do not tell: an angle that stiction holds is not seen until it moves. Speeds
-    at the start are 0; readings count until the delay of their sensors after each row. The mean of the runs is corrected by
-    what it lacked in fitted episodes: a ridge regression in every row on the angles so found and on the pressures. The
-    measured angles serve only for `rms` and `coverage`. Raises ParameterError for other numbers of joints and muscles than those of the fit.
+    at the start are 0; readings count until the delay of their sensors after each row. The mean of the runs is
+    corrected by what it lacked in fitted episodes: ridge regressions of every row on the angles so found and on the
+    pressures; the band holds the errors of a quarter of these episodes with the regressions of the others. The measured
+    angles serve only for `rms` and `coverage`. Raises ParameterError for other numbers of joints and muscles than those
+    of the fit.
     """
     if episodes.muscles != len(fit.arm.muscle) or episodes.joints != len(fit.pairs):
         raise ParameterError(
@@ -82,8 +85,11 @@ def estimate_angles(fit: ArmFit, episodes: Episodes, *, any_pose: bool = False, 
     known, own = fitted[-CALIBRATED:], in_pairs(episodes, fit.pairs)
     before, _ = _runs(fit.arm, known.runs, known.sample_time, fit.inspection.delay, poses)
     seen, errors = _seen(before, known.runs), before - _padded(known.runs, "angle")
-    odd = np.arange(len(known)) % 2 == 1
-    left = [errors[part] - _predicted_errors(seen[~part], errors[~part], seen[part]) for part in (odd, ~odd)]
+    block = np.arange(len(known)) * BLOCKS // len(known)  # in time, so that a drift of the arm widens the band
+    left = [
+        errors[block == b] - _predicted_errors(seen[block != b], errors[block != b], seen[block == b])
+        for b in range(BLOCKS)
+    ]
     level = min(1.0, COVERAGE * (1 + 1 / len(known)))  # so that it holds for one further episode, too
     limits = np.nanquantile(np.abs(np.concatenate(left)), level, axis=0, method="higher")
     angle, spread = _runs(fit.arm, own.runs, own.sample_time, fit.inspection.delay, poses)
