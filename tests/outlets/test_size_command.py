@@ -48,6 +48,9 @@ def test_the_lift_of_the_scenario_reaches_both_ends_of_the_stroke(requirement, c
     assert np.interp(RESTING * cycle, run["time"], position) == pytest.approx(0.0, abs=1e-6 * requirement.stroke)
     assert position[-1] == pytest.approx(0.0, abs=0.02 * requirement.stroke)
     assert position.max() < 1.02 * requirement.stroke
+    warm = simulate(scenario_text(choice).replace("Isothermal", "WallHeatTransfer"), tmp_path)["position"]
+    further = (warm.max() - choice.design.extended.contraction * choice.length) / requirement.stroke
+    assert 1.03 < further < 1.06, "as the scenario states of the default gas"
 
 
 def test_a_fill_through_the_sized_valve_takes_its_part_of_the_cycle(tmp_path):

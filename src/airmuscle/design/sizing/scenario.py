@@ -269,6 +269,11 @@ def _note(choice: MuscleChoice, chosen_inertia: bool) -> str:
         + (", the moving mass or inertia" if chosen_inertia else "")
         + ".",
     ]
+    if isinstance(choice.requirement, LiftRequirement):
+        lines.append(
+            "The times of the valves are for isothermal air: with the default gas, which warms while it fills, they "
+            "lift 3 to 6 % of the stroke too far. Delete the gas to see it, and close a loop where that matters."
+        )
     if isinstance(choice.requirement, JointRequirement):
         lines.append("Chosen: the regulators, and a pendulum that gives the torque at both ends of the range.")
     return "\n".join(lines)
