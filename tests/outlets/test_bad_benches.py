@@ -218,3 +218,18 @@ def test_a_mapping_that_names_a_missing_column(tmp_path, command):
     line = refused(tmp_path, *command, file, "--mapping", tmp_path / "rig.toml")
     assert "run.csv: the mapping names column 'presure', but the columns are time [s], pressure [Pa]" in line
     assert "Did you mean 'pressure [Pa]'?" in line
+
+
+# Warnings and notes
+
+
+@pytest.mark.parametrize(("one_screen", "notes"), [(True, 0), (False, 1)])
+def test_a_warning_is_not_repeated_by_a_note_on_the_same_screen(tmp_path, monkeypatch, one_screen, notes):
+    monkeypatch.setattr("airmuscle.outlets.cli.delivery.on_one_screen", lambda: one_screen)
+    files = [ramp(tmp_path / f"{p}.csv", 1e3 * p, seed=p) for p in (200, 300, 400, 500)]
+    (run,) = read(files[0])
+    write(run.with_columns(force=np.where(np.arange(len(run)) == 50, -999.0, run["force"])), files[0])
+    result = airmuscle("fit", *files, *SURFACE, "--out", tmp_path / "out", width=300)
+    text = "the force is -999 in 1 row, far from all other readings"
+    assert (result.stderr.count(text), result.stdout.count(text)) == (1, notes)
+    assert text in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")

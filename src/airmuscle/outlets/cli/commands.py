@@ -17,7 +17,7 @@ from ...core import AirmuscleError, AirmuscleWarning, exclusive_folders, quotabl
 from .entry_point import INTERRUPTED, check_interrupted, deferred_sigint
 from .option_hints import in_options
 from .options import install_completion_classes, print_completion_script
-from .terminal import echo
+from .terminal import echo, show_warning
 
 SETTINGS: dict[str, Any] = {
     "add_completion": False,
@@ -179,7 +179,7 @@ def _show_warning(
     """Print one line for a warning of airmuscle; other warnings are shown with their location in the code."""
     if issubclass(category, AirmuscleWarning):
         text = message.args[0] if isinstance(message, Warning) else message
-        echo(f"warning: {in_options(text, ctx.invoked_subcommand)}", err=True)
+        show_warning(in_options(text, ctx.invoked_subcommand))
     else:
         show_other(message, category, *location, **options)
 

@@ -1,6 +1,7 @@
 """Delivery of a result: its files, all or none, and its brief view in the terminal, or JSON."""
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from ...core import atomic_folder
@@ -9,7 +10,7 @@ from ...report.data import as_data, in_words
 from ...report.text import as_text
 from ...report.write import REPORT_FILE, write_into
 from .option_hints import in_options
-from .terminal import echo, print_json, terminal_width
+from .terminal import echo, on_one_screen, print_json, terminal_width, warned
 
 Files = Mapping[str, "str | Callable[[Path], object]"]
 """Files of a result by name: a text, or a function that writes the file at a path."""
@@ -38,6 +39,8 @@ def print_result(chapters: Sequence[Chapter], paths: Mapping[str, Path], json: b
     if json:
         print_json({**as_data(chapters), "files": {name: str(path) for name, path in paths.items()}})
         return
+    if on_one_screen():
+        chapters = [replace(each, notes=tuple(text for text in each.notes if text not in warned)) for each in chapters]
     echo(as_text(chapters, terminal_width(), "the report" if "report" in paths else WITHOUT_REPORT))
     for name, path in paths.items():
         echo(f"{name}: {path}")

@@ -25,6 +25,21 @@ def echo(text: str = "", *, err: bool = False) -> None:
     typer.echo("\n".join(map(printable, text.split("\n"))), err=err)
 
 
+warned: set[str] = set()
+"""Texts of the warnings that this process has printed."""
+
+
+def show_warning(text: str) -> None:
+    """Print a warning, which the notes of a result on the same screen do not repeat."""
+    warned.add(text)
+    echo(f"warning: {text}", err=True)
+
+
+def on_one_screen() -> bool:
+    """Whether warnings and results appear on one terminal."""
+    return sys.stdout.isatty() and sys.stderr.isatty()
+
+
 def print_json(content: Any) -> None:
     """Print standard JSON; numbers that are not finite are null."""
     lines = as_json(content).splitlines()
