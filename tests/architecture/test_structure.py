@@ -273,6 +273,10 @@ def face_of(module: str) -> frozenset[str] | None:
     return frozenset(names) | {path.parent.name for path in folder.glob("*/__init__.py")}
 
 
+def is_module(name: str) -> bool:
+    return SOURCE.parent.joinpath(*name.split(".")).with_suffix(".py").is_file()
+
+
 def names_outside_faces(code: str) -> Iterator[str]:
     """Imported modules that are no rooms, and imported names that are not in `__all__` of their room."""
     for node in ast.walk(ast.parse(code)):
@@ -311,12 +315,16 @@ def test_all_exceptions_are_in_airmuscle_errors():
 
 
 def test_tests_import_inner_modules_120_times_at_most():
-    """They import from the faces, so that a file can be moved; what they test within a room they import from its file."""
+    """They import from the faces, so that a file can be moved; what they test within a room they import from its file.
+
+    Names that a stub has for the other rooms alone count as well; the import of a module by its package does not.
+    """
     inner = [
         (path, node.module)
         for path in (ROOT / "tests").rglob("*.py")
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
         if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("airmuscle.")
-        if face_of(node.module) is None
+        if (face := face_of(node.module)) is None
+        or any(not (alias.name in face or is_module(f"{node.module}.{alias.name}")) for alias in node.names)
     ]
     assert len(inner) <= 120
