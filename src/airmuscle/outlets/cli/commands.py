@@ -42,10 +42,10 @@ COMMANDS = (
     CommandRow("show", "library", "show", "Show parameters, sources and checks of a library entry."),
     CommandRow("cite", "library", "cite", "Print the references of a library entry."),
     CommandRow("evaluate", "library", "evaluate", "Evaluate a law for two of pressure, contraction and force."),
-    CommandRow("inspect", "inspect", "inspect", "Inspect measurement files: columns, runs, sampling, outliers."),
+    CommandRow("inspect", "measurements", "inspect", "Inspect measurement files: columns, runs, sampling, outliers."),
     CommandRow("fit", "fit", "fit", "Fit a characteristic to measured points, or compare several."),
     CommandRow("approximate", "approximate", "approximate", "Approximate one characteristic by another."),
-    CommandRow("convert", "convert", "convert", "Write measurement files as CSV, Parquet or HDF5."),
+    CommandRow("convert", "measurements", "convert", "Write measurement files as CSV, Parquet or HDF5."),
     CommandRow("hysteresis", "hysteresis", "hysteresis", "Fit friction models to hysteresis loops."),
     CommandRow("fit-dynamic", "fit_dynamic", "fit_dynamic", "Identify plant parameters from transient records."),
     CommandRow(
@@ -64,7 +64,7 @@ COMMANDS = (
     CommandRow("benchmark", "benchmark", "benchmark", "Benchmark controllers of a joint on common tasks."),
     CommandRow("export", "export", "export", "Export to C, MATLAB, FMU, MuJoCo, PyTorch and other targets."),
     CommandRow("studio", "studio", "studio", "Show muscles and plants in the browser."),
-    CommandRow("schema", "schema", "schema", "Print the JSON schema of scenario or muscle files."),
+    CommandRow("schema", "library", "schema", "Print the JSON schema of scenario or muscle files."),
 )
 """All commands, in the order of use."""
 RUN_CODE = ("simulate", "study", "tune", "benchmark", "export", "schema")

@@ -1,4 +1,4 @@
-"""`airmuscle convert`: measurement files or recordings in another file format."""
+"""`airmuscle inspect` and `airmuscle convert`: measurement files before a fit, and in another file format."""
 
 import math
 from pathlib import Path
@@ -6,14 +6,50 @@ from typing import Annotated
 
 import typer
 
-from ...bench.readers import Decimation, read, write
+from ...bench.readers import ColumnMapping, Decimation, RecordedTime, read, write
 from ...bench.readers.reader import find_files
 from ...bench.readers.writer import EXTENSIONS
+from ...bench.segment import inspect_all, inspection_chapters
 from ...core import FileError
 from ..requests import ReadingRequest, option, request
 from .bench_files import print_row_notes
-from .options import Json, with_requests
-from .terminal import echo, print_json
+from .delivery import deliver
+from .options import Json, OptionalFolder, with_requests
+from .terminal import echo, print_json, reading_progress
+
+UNORDERED = ColumnMapping(time=RecordedTime(ordered=False))
+"""Stamps that repeat or decrease are shown, not refused."""
+Files = Annotated[
+    list[str],
+    typer.Argument(
+        metavar="FILES",
+        help="Files, folders or glob patterns: CSV, Excel, MAT, TDMS, MDF; '-' is text on standard input.",
+    ),
+]
+
+
+@with_requests
+def inspect(files: Files, reading: ReadingRequest, json: Json = False, out: OptionalFolder = None) -> None:
+    """Inspect measurement files: columns, runs, sampling, outliers.
+
+    \b
+    Shows how the files are interpreted: columns and units, sampling, runs, branches, plateaus and suspected outliers.
+    The data are not changed. With --out, DIR/report.html shows all of each recording, with a figure.
+    Sensor properties are estimated from all files together, as from one test rig.
+
+    \b
+    Examples:
+      airmuscle inspect bench.csv
+      ssh rig cat log.csv | airmuscle inspect -
+      airmuscle inspect runs/ --resting-length "300 mm" --out inspection
+      airmuscle inspect log.mat --column "data(:,1)=time [s]" --column "data(:,2)=pressure [bara]"
+      airmuscle inspect runs/*.tdms --mapping rig.toml --json
+    """
+    with reading_progress() as progress:
+        recordings = read(files, reading.column_mapping(UNORDERED), progress=progress)
+    chapters = inspection_chapters(inspect_all(recordings))
+    deliver("inspect", chapters, json=json, out=out, title="Inspection")
+
 
 EVERY_ROW = 2**62
 """A number of rows that no file has."""
