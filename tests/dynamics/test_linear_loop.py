@@ -199,7 +199,7 @@ def test_a_working_point_at_a_kink_is_refused():
         (lambda s, u: our_loop().step_response("angle", 1.0), "no set point 'angle'; there are position"),
         (lambda s, u: our_loop(gain=1e5).margins(), "the closed loop is not stable"),
         (lambda s, u: our_loop(gain=1e-15).margins(), "opened at 'position' has no gain at this working point"),
-        (lambda s, u: our_loop(gain=1e-15).bode(), "a valve that is closed"),
+        (lambda s, u: our_loop(gain=1e-15).bode(), "is a valve that is closed"),
         (lambda s, u: linearise(PLANT, s, u).with_delay(-1.0), "must be finite and not negative"),
         (lambda s, u: linearise(PLANT, s, u).with_delay({"x": 1.0}), "no input 'x'"),
         (lambda s, u: linearise(PLANT, s, u).pade(11), "allowed range: 1 to 10"),

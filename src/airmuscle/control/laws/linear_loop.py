@@ -126,10 +126,9 @@ def _peak(grid: Array, distances: Array, function: Callable[[float], float]) -> 
 
 SHOWN = 500
 """Frequencies of a Bode plot."""
-NO_GAIN = 1e-9
-"""Greatest gain of an open loop that counts as none (chosen); a closed valve leaves rounding, 1e-13."""
-STABLE = 1e-9
-"""By how much the magnitude of a pole of a stable loop may exceed 1: enclosed air that is not controlled, rounding."""
+NO_GAIN = STABLE = 1e-9
+"""Greatest gain of an open loop that counts as none (a closed valve), and by how much the magnitude of a pole of
+a stable loop may exceed 1: enclosed air that is not controlled, rounding (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -192,9 +191,8 @@ class LinearLoop:
     def bode(self, column: str | None = None, frequencies: npt.ArrayLike | None = None) -> Any:
         """A Matplotlib figure of gain and phase of the open loop, up to the Nyquist frequency unless given [Hz]."""
         opened = self._acting(column)
-        if frequencies is None:
-            frequencies = np.geomspace(1e-4, 1.0, SHOWN) * opened.nyquist_frequency
-        return bode_figure(opened, checked_frequencies(frequencies))
+        own = np.geomspace(1e-4, 1.0, SHOWN) * opened.nyquist_frequency
+        return bode_figure(opened, own if frequencies is None else checked_frequencies(frequencies))
 
     def nyquist(self, column: str | None = None) -> Any:
         """A Matplotlib figure of the open loop in the complex plane, with the circle of its sensitivity peak."""
@@ -206,9 +204,8 @@ class LinearLoop:
         opened = self.open_loop(column)
         if np.abs(opened.frequency_response(frequency_grid(opened))).max(initial=0.0) < NO_GAIN:
             raise ParameterError(
-                f"the loop that is opened at '{column or self.law.measured[0]}' has no gain at this working point: a "
-                "valve that is closed, also one whose spool is within its overlap, lets no change through. Linearise "
-                "at a state or inputs in which it is open by a little."
+                f"the loop that is opened at '{column or self.law.measured[0]}' has no gain at this working point. "
+                "Linearise where the valves are open by a little; a spool within its overlap is a valve that is closed."
             )
         return opened
 
