@@ -102,15 +102,12 @@ def _scanned(opened: SampledModel, frequencies: Array) -> npt.NDArray[np.complex
 
 
 def _zeros(grid: Array, values: Array, function: Callable[[float], float]) -> list[float]:
-    """The zeros of a function between the points of a grid where it changes its sign, to rounding.
-
-    A sign of its `values`, which are computed together, may be rounding; then the function itself has none there.
-    """
+    """The zeros of a function between points where `values`, whose sign may be rounding, and it change their sign."""
     from scipy.optimize import brentq
 
-    pairs = [(grid[i], grid[i + 1]) for i in np.flatnonzero(values[:-1] * values[1:] < 0)]
-    changes = [(low, high) for low, high in pairs if function(low) * function(high) < 0]
-    return [float(brentq(function, low, high, xtol=1e-300, rtol=1e-14)) for low, high in changes]
+    pairs = [grid[i : i + 2] for i in np.flatnonzero(values[:-1] * values[1:] < 0)]
+    changes = [ends for ends in pairs if function(ends[0]) * function(ends[1]) < 0]
+    return [float(brentq(function, *ends, xtol=1e-300, rtol=1e-14)) for ends in changes]
 
 
 def _peak(grid: Array, distances: Array, function: Callable[[float], float]) -> tuple[float, float]:

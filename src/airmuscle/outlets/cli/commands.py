@@ -64,7 +64,7 @@ COMMANDS = (
     CommandRow("benchmark", "benchmark", "benchmark", "Benchmark controllers of a joint on common tasks."),
     CommandRow("export", "export", "export", "Export to C, MATLAB, FMU, MuJoCo, PyTorch and other targets."),
     CommandRow("studio", "studio", "studio", "Show muscles and plants in the browser."),
-    CommandRow("schema", "library", "schema", "Print the JSON schema of scenario or muscle files."),
+    CommandRow("schema", "schema", "schema", "Print the JSON schema of scenario or muscle files."),
 )
 """All commands, in the order of use."""
 RUN_CODE = ("simulate", "study", "tune", "benchmark", "export", "schema")

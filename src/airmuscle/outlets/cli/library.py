@@ -1,4 +1,4 @@
-"""Entries of the library: `airmuscle list`, `show`, `cite`, and `evaluate` at a point; `schema` of the files."""
+"""Entries of the library: `airmuscle list`, `show`, `cite`, and `evaluate` at an operating point."""
 
 import dataclasses
 import itertools
@@ -10,8 +10,8 @@ from typing import Annotated, Any
 
 import typer
 
-from ...core import Reference, atomic_folder, reference
-from ...files.library import UNITS, load, model_class
+from ...core import Reference, reference
+from ...files.library import UNITS, load
 from ...files.library import evaluate as evaluate_entry
 from ...files.library.files import (  # fmt: skip
     DATA,
@@ -23,10 +23,9 @@ from ...files.library.files import (  # fmt: skip
     list_products,
     list_valves,
 )
-from ...files.scenario.schema import muscle_schema, scenario_schema
+from ...files.library.models import model_class
 from ...physics.muscle.characteristic import ForceLaw
 from ...physics.muscle.isobar_plot import describe_point, isobar_table
-from ...report.data import as_json
 from ...report.write import rendered_figure, save_table
 from ..requests import EntryRequest, RequestError, Where, option, request
 from .delivery import print_result, write_result
@@ -232,34 +231,3 @@ def _authors(authors: str) -> str:
 
 def _escape(text: str) -> str:
     return re.sub(r"([&%$#_{}])", r"\\\1", text)
-
-
-def schema(
-    muscle: Annotated[
-        bool, typer.Option("--muscle", help="The schema of muscle files; default: of scenario files.")
-    ] = False,
-    out: Annotated[
-        Path | None, typer.Option("--out", metavar="FILE", help="Output file; default: print to stdout.")
-    ] = None,
-) -> None:
-    """Print the JSON schema of scenario or muscle files.
-
-    \b
-    Editors use the schema to check and complete TOML files. It is generated from the models of this version, so it
-    allows exactly what this version reads.
-    The first line of a TOML file names its schema: #:schema scenario.schema.json
-
-    \b
-    Examples:
-      airmuscle schema --out scenario.schema.json
-      airmuscle schema --muscle --out muscle.schema.json
-    """
-    content = muscle_schema() if muscle else scenario_schema()
-    if out is None:
-        print_json(content)
-        return
-    if not out.name:
-        raise typer.BadParameter("--out must be a file name, such as scenario.schema.json")
-    with atomic_folder(out.parent) as folder:
-        (folder / out.name).write_text(as_json(content), encoding="utf-8")
-    echo(f"schema: {out}")
