@@ -112,6 +112,7 @@ from .joint import RegulatorLag as RegulatorLag
 from .joint import ResidualGain as ResidualGain
 from .joint import estimate_angles as estimate_angles
 from .joint import fit_joint as fit_joint
+from .joint import fit_known_joint as fit_known_joint
 from .joint import fit_regulator_lags as fit_regulator_lags
 from .joint import fit_residual as fit_residual
 from .joint import inspect_episodes as inspect_episodes

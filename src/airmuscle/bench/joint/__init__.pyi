@@ -15,5 +15,6 @@ from .free_run import RegulatorLag as RegulatorLag
 from .free_run import ResidualGain as ResidualGain
 from .free_run import fit_regulator_lags as fit_regulator_lags
 from .free_run import fit_residual as fit_residual
+from .known_joint import fit_known_joint as fit_known_joint
 from .result import ArmFit as ArmFit
 from .result import ArmParameter as ArmParameter

@@ -3,7 +3,7 @@
 import dataclasses
 import functools
 from collections.abc import Mapping, Sequence
-from typing import cast
+from typing import TypeVar, cast
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from ...engine import BatchSolution, RungeKutta4, WithSensitivities, sensitivity
 from ...physics import PressureDriven, SerialArm, WithStickSlip, friction_load
 from .episodes import HISTORY, Windows, WindowSignal, start_of
 
+Arm = TypeVar("Arm", bound=System)
 SUBSTEPS = 3
 """Steps of the integrator in a row."""
 CLIP, OUTLIER = 0.3, 3.0
@@ -193,12 +194,12 @@ def signals(system: "OneJoint", windows: Windows) -> list[WindowSignal]:
     return [WindowSignal(np.ascontiguousarray(each), windows.sample_time) for each in stacked]
 
 
-def with_values(arm: PressureDriven, paths: Sequence[str], values: Sequence[float] | Array) -> PressureDriven:
+def with_values(arm: Arm, paths: Sequence[str], values: Sequence[float] | Array) -> Arm:
     """The arm with other values of these parameters."""
     place = {leaf.path: i for i, leaf in enumerate(tree.leaves(arm))}
     flat = np.array(tree.flatten(arm))
     flat[[place[path] for path in paths]] = values
-    changed: PressureDriven = tree.unflatten(arm, flat.tolist())
+    changed: Arm = tree.unflatten(arm, flat.tolist())
     return changed
 
 

@@ -217,7 +217,7 @@ def start_of(arm: PressureDriven, windows: Windows) -> Mapping[str, Array]:
         state[mechanism.inner_states[j].name] = _bristle(before[:, :, j], element.presliding_angle)
     for i, (prefix, lag) in enumerate(zip(arm.prefixes, arm.lags, strict=True)):
         readings = windows.pressure[:, : HISTORY + 1, i]
-        state[f"{prefix}pressure"] = _lagged(readings, lag, windows.sample_time)
+        state[f"{prefix}pressure"] = lagged(readings, lag, windows.sample_time)
     return state
 
 
@@ -230,7 +230,7 @@ def _bristle(angle: Array, presliding: float) -> Array:
     return z
 
 
-def _lagged(reading: Array, lag: float, sample_time: float) -> Array:
+def lagged(reading: Array, lag: float, sample_time: float) -> Array:
     """Pressure behind readings (N, R) that are linear between the rows: the exact response of a first-order lag."""
     p, share = reading[:, 0].copy(), np.exp(-sample_time / lag)
     for before, after in zip(reading[:, :-1].T, reading[:, 1:].T, strict=True):

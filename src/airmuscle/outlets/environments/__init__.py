@@ -10,9 +10,8 @@ from ...core import InputError, attach_stub
 
 __getattr__, __dir__, __all__ = attach_stub(__name__, __file__)
 __all__ += ["register_environments"]
-ENVIRONMENTS = {"Joint": "joint", "JointOnOff": "on_off", "Lift": "lift", "Arm": "arm"}
-"""Names of the registered environments and of the functions that make them; the identifiers are airmuscle/Joint-v0 and
-so on."""
+ENVIRONMENTS = ("Joint", "JointOnOff", "Lift", "Arm")
+"""Registered environments; their identifiers are airmuscle/Joint-v0 and so on."""
 EPISODE_PERIODS = 500
 """Periods after which an episode of a registered environment is truncated."""
 
@@ -27,14 +26,15 @@ def register_environments() -> None:
         raise InputError("learning environments need the package gymnasium. Install it: pip install airmuscle[sim]")
     from gymnasium.envs import registration
 
-    for name, make in ENVIRONMENTS.items():
+    for name in ENVIRONMENTS:
         identifier = f"airmuscle/{name}-v0"
         if identifier not in registration.registry:
             registration.register(
                 identifier,
-                entry_point=f"airmuscle.outlets.environments.plant_env:make_{make}",
-                vector_entry_point=f"airmuscle.outlets.environments.plant_vector_env:make_{make}_vector",
+                entry_point="airmuscle.outlets.environments.plant_env:make_environment",
+                vector_entry_point="airmuscle.outlets.environments.plant_vector_env:make_vector",
                 max_episode_steps=EPISODE_PERIODS,
+                kwargs={"kind": name},
             )
 
 

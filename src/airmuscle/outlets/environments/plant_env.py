@@ -13,7 +13,7 @@ from ...engine.run import RungeKutta4, Stepper
 from ...physics.equilibrium import complete_inputs
 from ...recording import Recording
 from .randomisation import EpisodeDraw, Randomisation, whole_steps
-from .standard import arm_task, joint_task, lift_task
+from .standard import ON_OFF, task_and_options
 from .task import EnvironmentTask
 
 STEP = RungeKutta4(1e-3)
@@ -200,27 +200,9 @@ class MeasuredObservations(gymnasium.ObservationWrapper):  # type: ignore[misc, 
         return np.array(self._late[0])
 
 
-def make_joint(task: EnvironmentTask | None = None, **options: Any) -> PlantEnv:
-    """airmuscle/Joint-v0, or the same with another task, which is not randomised unless `randomisation` is given."""
-    return _make(joint_task(), task, options)
-
-
-def make_on_off(task: EnvironmentTask | None = None, **options: Any) -> Any:
-    """airmuscle/JointOnOff-v0: that of the joint, whose valves are open or closed for a whole period."""
-    return with_on_off_valves(make_joint(task, **options))
-
-
-def make_lift(task: EnvironmentTask | None = None, **options: Any) -> PlantEnv:
-    """airmuscle/Lift-v0, or the same with another task."""
-    return _make(lift_task(), task, options)
-
-
-def make_arm(task: EnvironmentTask | None = None, **options: Any) -> PlantEnv:
-    """airmuscle/Arm-v0, or the same with another task."""
-    return _make(arm_task(), task, options)
-
-
-def _make(default: tuple[EnvironmentTask, tuple[Randomisation, ...]], task: Any, options: dict[str, Any]) -> PlantEnv:
-    if task is None:
-        return PlantEnv(default[0], **{"randomisation": default[1], **options})
-    return PlantEnv(task, **options)
+def make_environment(kind: str, task: EnvironmentTask | None = None, **options: Any) -> Any:
+    """The registered environment airmuscle/KIND-v0, or the same with another task, which is not randomised unless
+    `randomisation` is given."""
+    task, options = task_and_options(kind, task, options)
+    env = PlantEnv(task, **options)
+    return with_on_off_valves(env) if kind == ON_OFF else env

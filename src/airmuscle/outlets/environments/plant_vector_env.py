@@ -15,7 +15,7 @@ from ...engine.run.batch.stepper import BatchStepper
 from . import EPISODE_PERIODS
 from .plant_env import STEP, action_space, observation_space, with_on_off_valves
 from .randomisation import EpisodeDraw, Randomisation, whole_steps
-from .standard import arm_task, joint_task, lift_task
+from .standard import ON_OFF, task_and_options
 from .task import EnvironmentTask
 
 Booleans = npt.NDArray[np.bool_]
@@ -232,29 +232,8 @@ def _final(observations: npt.NDArray[np.float32], over: Booleans) -> dict[str, A
     return {"final_obs": last, "_final_obs": over.copy()}
 
 
-def make_joint_vector(num_envs: int = 1, task: EnvironmentTask | None = None, **options: Any) -> PlantVectorEnv:
-    """A vector of airmuscle/Joint-v0, or the same with another task."""
-    return _make(joint_task(), num_envs, task, options)
-
-
-def make_on_off_vector(num_envs: int = 1, task: EnvironmentTask | None = None, **options: Any) -> Any:
-    """A vector of airmuscle/JointOnOff-v0, or the same with another task."""
-    return with_on_off_valves(make_joint_vector(num_envs, task, **options))
-
-
-def make_lift_vector(num_envs: int = 1, task: EnvironmentTask | None = None, **options: Any) -> PlantVectorEnv:
-    """A vector of airmuscle/Lift-v0, or the same with another task."""
-    return _make(lift_task(), num_envs, task, options)
-
-
-def make_arm_vector(num_envs: int = 1, task: EnvironmentTask | None = None, **options: Any) -> PlantVectorEnv:
-    """A vector of airmuscle/Arm-v0, or the same with another task."""
-    return _make(arm_task(), num_envs, task, options)
-
-
-def _make(
-    default: tuple[EnvironmentTask, tuple[Randomisation, ...]], count: int, task: Any, options: dict[str, Any]
-) -> PlantVectorEnv:
-    if task is None:
-        return PlantVectorEnv(count, default[0], **{"randomisation": default[1], **options})
-    return PlantVectorEnv(count, task, **options)
+def make_vector(kind: str, num_envs: int = 1, task: EnvironmentTask | None = None, **options: Any) -> Any:
+    """A vector of the registered environment airmuscle/KIND-v0, or the same with another task."""
+    task, options = task_and_options(kind, task, options)
+    env = PlantVectorEnv(num_envs, task, **options)
+    return with_on_off_valves(env) if kind == ON_OFF else env

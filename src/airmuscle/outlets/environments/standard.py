@@ -5,6 +5,7 @@ import functools
 import math
 import warnings
 from collections.abc import Mapping
+from typing import Any
 
 from ...core import AirmuscleWarning, ParameterError, Value, bar, model, ops, parameter
 from ...files.library import Entry, PlantEntry, ValveEntry, load
@@ -212,6 +213,21 @@ def arm_task() -> TaskWithRandomisation:
         ValueRange(("targets[1]",), -0.1, 0.1),
         FactorRange(masses, 0.8, 1.2),
     )
+
+
+ON_OFF = "JointOnOff"
+TASKS = {"Joint": joint_task, ON_OFF: joint_task, "Lift": lift_task, "Arm": arm_task}
+"""Functions that return the tasks of the registered environments, airmuscle/Joint-v0 and so on."""
+
+
+def task_and_options(
+    kind: str, task: EnvironmentTask | None, options: dict[str, Any]
+) -> tuple[EnvironmentTask, dict[str, Any]]:
+    """The given task, or that of a registered environment with its randomisation."""
+    if task is not None:
+        return task, options
+    default, randomisation = TASKS[kind]()
+    return default, {"randomisation": randomisation, **options}
 
 
 def _library_plant(name: str) -> Plant:

@@ -11,6 +11,7 @@ from ...bench.joint import (
     EpisodeInspection,
     EpisodeMapping,
     fit_joint,
+    fit_known_joint,
     inspect_episodes,
     read_episode_mapping,
     read_episodes,
@@ -18,10 +19,14 @@ from ...bench.joint import (
 from ...bench.joint.episode_formats import propose_mapping
 from ...control.laws import PID, Cascade, CoContraction, Decentralised
 from ...files.library.write import model_table, scenario_toml
+from ...files.scenario import load_scenario
 from ...files.scenario.plant_uncertainty import uncertainty_table
+from ...physics import PressureDriven
 from ...report.chapter import Chapter
-from .declaration import RequestError, option, request
+from .declaration import RequestError, Where, option, request
 
+FIRST_LAG = 0.02
+"""Lag [s] of the pressures from which the search of a known joint starts (chosen)."""
 DURATION, STEP = 2.0, 0.15
 """Duration [s] of the scenarios, and step of the controlled one relative to the range of the angle (chosen)."""
 
@@ -46,6 +51,21 @@ class JointFitRequest:
         "Fit a hybrid law to what physics leaves, used for joints that gain by it on episodes held back.", default=False
     )
     seed: int = option("Seed of the order of the windows.", default=0)
+    known: Path | None = option(
+        "Scenario of a joint of known muscles and geometry, such as those of the library: the numbers of --free are "
+        "estimated.", default=None,
+    )  # fmt: skip
+    free: tuple[str, ...] = option(
+        "With --known: path of a parameter that is estimated, zeros, gains or lags. Repeatable; by default inertia, "
+        "damping, offset, weight and friction of the mechanism, lags and zeros.", default=(), metavar="PATH",
+    )  # fmt: skip
+
+    def check(self, where: Where) -> None:
+        """Raise RequestError for paths without a known joint, and for a residual of one."""
+        if self.known is None and self.free:
+            raise RequestError(f"{where('free')} requires {where('known')}, the scenario of the joint.", "free")
+        if self.known is not None and self.residual:
+            raise RequestError(f"{where('residual')} and {where('known')} exclude each other.", "residual")
 
 
 def inspect_requested(source: Path, request: JointFitRequest) -> EpisodeInspection:
@@ -71,12 +91,20 @@ def fit_requested_arm(
 
     Raises RequestError without a mapping file, IdentificationError, ParameterError and others of the fit.
     """
-    rules = _mapping(source, request)
+    rules, title = _mapping(source, request), f"Arm identified from {source.name}"
+    if request.known is not None:
+        plant = load_scenario(request.known).plant
+        arm = PressureDriven(plant.muscles, plant.mechanism, (FIRST_LAG,) * len(plant.muscles))
+        known = fit_known_joint(
+            read_episodes(source, rules), arm, request.free, left_out=request.left_out, rows=request.horizon,
+            progress=progress,
+        )  # fmt: skip
+        written = {"scenario.toml": _scenarios(known, title)["scenario.toml"]}
+        return dataclasses.replace(known.chapter(), title=title), written
     fit = fit_joint(
         read_episodes(source, rules), pairs=rules.pairs, axes=rules.axes, left_out=request.left_out,
         rows=request.horizon, residual=request.residual, seed=request.seed, progress=progress,
     )  # fmt: skip
-    title = f"Arm identified from {source.name}"
     return dataclasses.replace(fit.chapter(), title=title), _scenarios(fit, title)
 
 

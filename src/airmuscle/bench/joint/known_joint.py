@@ -1,0 +1,208 @@
+"""Identification of the few unknown numbers of an arm of library muscles and mechanisms, from episodes."""
+
+from collections.abc import Callable, Sequence
+from typing import ClassVar
+
+import numpy as np
+
+from ...core import ParameterError, StateVariable, System, Value, Values, suggestion, tree
+from ...core.arrays import Array
+from ...core.declaration import model, parameter
+from ...engine import WithSensitivities, sensitivity
+from ...physics import PressureDriven
+from .descent import CLIP, OUTLIER, over, with_values
+from .episode_inspection import check_episodes, inspect_episodes
+from .episodes import HISTORY, ROWS, Episodes, Windows, WindowSignal, band, cut, lagged
+from .fit import NAMED, SHARE, UNSEPARATED
+from .free_run import baseline_errors
+from .result import ArmFit, ArmParameter
+
+FIELDS = ("inertia", "damping", "offset", "weight_torque", "coulomb_torque")
+"""Fields of a mechanism that are estimated unless others are named."""
+READINGS = ("zeros", "gains")
+"""Names that stand for the zeros and the gains of all pressures."""
+SAMPLE, EVALUATIONS = 300, 40
+"""Windows and evaluations of the search (chosen)."""
+SIZES = {"zeros": 1e4, "gains": 1.0, "offset": 0.05}
+"""Typical sizes [SI] of parameters that may start at 0 (chosen)."""
+
+
+@model
+class ReadPressures(System):
+    """An arm whose pressures are read with a gain and a zero, p = g (r - z); states and inputs are the readings r."""
+
+    from_file: ClassVar[bool] = False
+
+    arm: PressureDriven
+    gains: tuple[float, ...] = parameter("1", "g", "pressure over reading", bounds=(0.1, 10.0))
+    zeros: tuple[float, ...] = parameter("Pa", "z", "reading at ambient pressure", bounds=(-5e5, 5e5))
+
+    @property
+    def states(self) -> tuple[StateVariable, ...]:
+        return self.arm.states
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        return self.arm.inputs
+
+    def rates(self, state: Values, inputs: Values) -> dict[str, Value]:
+        acting, given = dict(state), dict(inputs)
+        for prefix, gain, zero in zip(self.arm.prefixes, self.gains, self.zeros, strict=True):
+            acting[f"{prefix}pressure"] = gain * (state[f"{prefix}pressure"] - zero)
+            given[f"{prefix}measured_pressure"] = gain * (inputs[f"{prefix}measured_pressure"] - zero)
+        found = self.arm.rates(acting, given)
+        for prefix, gain in zip(self.arm.prefixes, self.gains, strict=True):
+            found[f"{prefix}pressure"] = found[f"{prefix}pressure"] / gain
+        return found
+
+    def outputs(self, state: Values, inputs: Values) -> dict[str, Value]:
+        return {}
+
+
+def fit_known_joint(
+    episodes: Episodes, arm: PressureDriven, free: Sequence[str] = (), *, left_out: float = 0.1, rows: int = ROWS,
+    progress: Callable[[str], None] = lambda text: None,
+) -> ArmFit:  # fmt: skip
+    """Estimate the unknown numbers of an arm of known muscles and geometry, such as those of the library.
+
+    arm   muscle i has the pressure i of the episodes, coordinate j their angle j; the search starts from its values
+    free  paths of its parameters, `zeros`, `gains` and `lags` for those of all pressure readings; by default inertia,
+          damping, offset, weight and dry friction of the mechanism, the lags and the zeros
+
+    The objective is the robust error of the free run over windows, with exact gradients. Gains and inertia together are
+    separated by forces alone that do not grow with the pressure, such as that of the rubber. Other arguments and the result are those of `fit_joint`. Raises
+    IdentificationError for episodes that `inspect_episodes` refuses, ParameterError for another number of pressures or
+    angles, and for a path that the arm does not have.
+    """
+    count, joints = len(arm.muscle), len(arm.mechanism.coordinates)
+    if (episodes.muscles, episodes.joints) != (count, joints) or not 0.0 < left_out < 1.0 or len(episodes) < 4:
+        raise ParameterError(
+            f"fit_known_joint: {len(episodes)} episodes have {episodes.muscles} pressures, {episodes.joints} angles, the "
+            f"arm {count} muscles and {joints} coordinates, and left_out is {left_out:g}; give as many columns in "
+            "the order of the muscles, 4 episodes or more, and a share between 0 and 1."
+        )
+    inspection = inspect_episodes(episodes)
+    check_episodes(inspection)
+    system = ReadPressures(arm, (1.0,) * count, (0.0,) * count)
+    paths = _paths(system, free)
+    progress(f"{len(paths)} parameters; delay of the pressures: {inspection.delay} rows")
+    split = max(1, round((1.0 - left_out) * len(episodes)))
+    train, judge = cut(episodes[:split], inspection.delay, rows), cut(episodes[split:], inspection.delay, rows)
+    search = KnownSearch(system, paths, train.part(_some(train)))
+    system = search.run()
+    errors = np.nan_to_num(_run(system, (), judge)[0], nan=OUTLIER)
+    progress(f"{np.degrees(np.sqrt(np.mean(errors**2))):.3g} deg rms over {rows} rows on episodes left out")
+    estimates, covariance, remarks = search.separate(system)
+    own = [i for i, path in enumerate(paths) if path.startswith("arm.")]
+    pairs = tuple((2 * j + 1, 2 * j + 2) for j in range(joints))
+    return ArmFit(
+        system.arm, inspection, pairs, errors, judge.episode, baseline_errors(episodes[:split], episodes[split:], rows),
+        band(errors), tuple(estimates[i] for i in own), (*inspection.remarks, *remarks), split,
+        covariance=covariance[np.ix_(own, own)],
+    )  # fmt: skip
+
+
+def _paths(system: ReadPressures, free: Sequence[str]) -> list[str]:
+    """The paths in the system of what is estimated."""
+    leaves = [leaf.path for leaf in tree.leaves(system)]
+    if not free:
+        fields = [path for path in leaves if path.startswith("arm.mechanism.") and path.rsplit(".")[-1] in FIELDS]
+        free = [*(path.removeprefix("arm.") for path in fields), "lags", READINGS[0]]
+    found = []
+    for name in free:
+        whole = name if name.split("[")[0] in READINGS else f"arm.{name}"
+        own = [path for path in leaves if path == whole or path.startswith(f"{whole}[")]
+        if not own:
+            raise ParameterError(
+                f"fit_known_joint: the arm has no parameter '{name}'; allowed are zeros, gains and the paths of its "
+                f"parameters, such as {leaves[-1].removeprefix('arm.')}.{suggestion(whole, leaves)}"
+            )
+        found += own
+    return list(dict.fromkeys(found))
+
+
+def _some(windows: Windows) -> Array:
+    return np.linspace(0, len(windows) - 1, min(SAMPLE, len(windows))).astype(int)
+
+
+def _run(system: ReadPressures, paths: Sequence[str], windows: Windows) -> tuple[Array, Array]:
+    """Errors (N, rows, J) [rad] of the free run, and their derivatives (N, rows, J, P) by the parameters."""
+    arm, count = system.arm, len(windows)
+    state = {s.name: np.zeros(count) for s in arm.states}
+    for j, c in enumerate(arm.mechanism.coordinates):
+        state |= {c.name: windows.angle[:, HISTORY, j], c.speed: windows.speed[:, HISTORY, j]}
+    for i, (prefix, lag) in enumerate(zip(arm.prefixes, arm.lags, strict=True)):
+        state[f"{prefix}pressure"] = lagged(windows.pressure[:, : HISTORY + 1, i], lag, windows.sample_time)
+    names = [c.name for c in arm.mechanism.coordinates]
+    signals = [WindowSignal(np.ascontiguousarray(p[HISTORY:]), windows.sample_time) for p in windows.pressure]
+    if not paths:
+        run, moved = over(windows, system, signals, state, names), np.zeros((count, windows.rows, len(names), 0))
+    else:
+        observed = WithSensitivities(system, tuple((p,) for p in paths), (1.0,) * len(paths), observed=tuple(names))
+        columns = [[sensitivity(name, k) for k in range(len(paths))] for name in names]
+        state |= {sensitivity(s, k): np.zeros(count) for s in list(state) for k in range(len(paths))}
+        run = over(windows, observed, signals, state, [*names, *(each for row in columns for each in row)])
+        moved = np.stack([np.stack([run[n][:, 1:] for n in row], axis=-1) for row in columns], axis=2)
+    return np.stack([run[name][:, 1:] for name in names], axis=-1) - windows.angle[:, HISTORY + 1 :], moved
+
+
+class KnownSearch:
+    """Robust least squares of the free run over windows, in parameters that are scaled by their sizes."""
+
+    def __init__(self, system: ReadPressures, paths: Sequence[str], windows: Windows) -> None:
+        leaves = {leaf.path: leaf for leaf in tree.leaves(system)}
+        self.system, self.paths, self.windows = system, list(paths), windows
+        self.start = np.array([float(leaves[path].value) for path in paths])
+        fields = [path.rsplit(".", 1)[-1].split("[")[0] for path in paths]
+        typical = [SIZES.get(field, abs(value) or 1.0) for field, value in zip(fields, self.start, strict=True)]
+        self.sizes = np.maximum(np.abs(self.start), typical)
+        self.low, self.high = (np.array([leaves[path].declared.bounds[i] for path in paths]) for i in (0, 1))
+        self.low = np.where(np.array(fields) == "lags", np.maximum(self.low, 2e-3), self.low)
+        self._last: tuple[bytes, Array, Array] = (b"", np.zeros(0), np.zeros(0))
+
+    def _evaluate(self, scaled: Array) -> tuple[Array, Array]:
+        if self._last[0] != scaled.tobytes():
+            error, slope = _run(with_values(self.system, self.paths, scaled * self.sizes), self.paths, self.windows)
+            lost = ~np.isfinite(error) | (np.abs(error) > OUTLIER) | ~np.isfinite(slope).all(axis=-1)
+            error, slope = np.where(lost, OUTLIER, error), np.where(lost[..., None], 0.0, slope)
+            self._last = scaled.tobytes(), error, slope * self.sizes
+        return self._last[1:]
+
+    def run(self) -> ReadPressures:
+        """The system with the estimates."""
+        from scipy.optimize import least_squares
+
+        found = least_squares(
+            lambda x: self._evaluate(x)[0].ravel(), np.clip(self.start, self.low, self.high) / self.sizes,
+            jac=lambda x: self._evaluate(x)[1].reshape(-1, len(self.paths)), loss="soft_l1", f_scale=CLIP,
+            bounds=(self.low / self.sizes, self.high / self.sizes), max_nfev=EVALUATIONS,
+        )  # fmt: skip
+        return with_values(self.system, self.paths, found.x * self.sizes)
+
+    def separate(self, system: ReadPressures) -> tuple[list[ArmParameter], Array, list[str]]:
+        """Estimates, their covariance along what the record separates, and remarks; a window is one observation."""
+        leaves = {leaf.path: float(leaf.value) for leaf in tree.leaves(system)}
+        values = np.array([leaves[path] for path in self.paths])
+        error, slope = self._evaluate(values / self.sizes)
+        flat = slope.reshape(-1, len(self.paths))
+        levels, directions = np.linalg.eigh(flat.T @ flat / (np.mean(error**2) * self.windows.rows))
+        weak = levels < 1.0 / UNSEPARATED**2
+        inverse = self.sizes[:, None] * directions / np.sqrt(np.maximum(levels, 1e-12 * levels[-1]))
+        deviations = np.sqrt(np.sum(inverse**2, axis=1))
+        estimates = [
+            ArmParameter(path.removeprefix("arm."), float(value), float(deviation))
+            for path, value, deviation in zip(self.paths, values, deviations, strict=True)
+        ]
+        remarks = [
+            f"{each.path.replace('[', ' of the reading of pressure ').rstrip(']')} (from 0): {each.value:.4g} ± "
+            f"{each.standard_error:.2g} (SI)" for each in estimates if each.path.split("[")[0] in READINGS
+        ]  # fmt: skip
+        shares = np.sum(directions[:, weak] ** 2, axis=1)
+        names = [estimates[i].path for i in np.argsort(-shares) if shares[i] > SHARE]
+        if names:
+            remarks.append(
+                f"the record does not separate {', '.join(names[:NAMED])}: combinations of them may have any value; "
+                "fix or measure one of them"
+            )
+        known = inverse[:, ~weak]
+        return estimates, known @ known.T, remarks
