@@ -39,7 +39,7 @@ from airmuscle.outlets.studio import (
     arm_task,
     check_file_name,
     create_app,
-    fit_queue,
+    fit_routes,
     fit_uploads,
     run_fit,
     self_contained_page,
@@ -529,7 +529,7 @@ def test_ten_users_are_served_in_turn_and_further_ones_are_refused(tmp_path):
 
 
 def test_results_that_are_forgotten_leave_no_files(tmp_path, monkeypatch):
-    monkeypatch.setattr(fit_queue, "MAX_TASKS", 2)
+    monkeypatch.setattr(fit_routes, "MAX_TASKS", 2)
     queue = FitQueue(write_slowly, count=1, make_worker=WorkerHere)
     for count in range(5):
         task = queue.submit("set", tmp_path, 0.0)
@@ -580,7 +580,7 @@ def test_an_error_of_a_task_keeps_its_field(tmp_path):
 def test_a_worker_ends_with_its_server(tmp_path):
     """Also during a task, so that a killed server leaves no process and no result."""
     script = (
-        "import sys, pathlib; from airmuscle.outlets.studio.fit_queue import FitQueue; from studio_tasks import write_slowly\n"
+        "import sys, pathlib; from airmuscle.outlets.studio.fit_routes import FitQueue; from studio_tasks import write_slowly\n"
         "if __name__ == '__main__':\n"
         "    queue = FitQueue(write_slowly, count=1); task = queue.submit('set', pathlib.Path(sys.argv[1]), 600.0)\n"
         "    while queue.status(task)['fraction'] != 0.5: pass\n"

@@ -14,7 +14,7 @@ from airmuscle import load
 from airmuscle.design import JointRequirement, LiftRequirement, SizingConditions, choose, scenario_text, size_muscles
 from airmuscle.errors import ParameterError, SolveError
 from airmuscle.outlets.studio import create_app, joint_names, read_request
-from airmuscle.outlets.studio.size_sheet import size_sheet
+from airmuscle.outlets.studio.tasks import size_sheet
 
 pytestmark = pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning")
 LIFT = {"load": "20 kg", "stroke": "40 mm", "supply": "6 bar", "max_length": "400 mm", "max_count": "1", "sort": "length"}  # fmt: skip

@@ -70,15 +70,15 @@ def fit_known_joint(
           damping, offset, weight and dry friction of the mechanism, the lags and the zeros
 
     The objective is the robust error of the free run over windows, with exact gradients. Gains and inertia together are
-    separated by forces alone that do not grow with the pressure, such as that of the rubber. Other arguments and the result are those of `fit_joint`. Raises
-    IdentificationError for episodes that `inspect_episodes` refuses, ParameterError for another number of pressures or
-    angles, and for a path that the arm does not have.
+    separated by forces alone that do not grow with the pressure, such as that of the rubber. Other arguments and the
+    result are those of `fit_joint`. Raises IdentificationError for episodes that `inspect_episodes` refuses,
+    ParameterError for another number of pressures or angles, and for a path that the arm does not have.
     """
     count, joints = len(arm.muscle), len(arm.mechanism.coordinates)
     if (episodes.muscles, episodes.joints) != (count, joints) or not 0.0 < left_out < 1.0 or len(episodes) < 4:
         raise ParameterError(
-            f"fit_known_joint: {len(episodes)} episodes have {episodes.muscles} pressures, {episodes.joints} angles, the "
-            f"arm {count} muscles and {joints} coordinates, and left_out is {left_out:g}; give as many columns in "
+            f"fit_known_joint: {len(episodes)} episodes have {episodes.muscles} pressures, {episodes.joints} angles, "
+            f"the arm {count} muscles and {joints} coordinates, and left_out is {left_out:g}; give as many columns in "
             "the order of the muscles, 4 episodes or more, and a share between 0 and 1."
         )
     inspection = inspect_episodes(episodes)
@@ -88,17 +88,17 @@ def fit_known_joint(
     progress(f"{len(paths)} parameters; delay of the pressures: {inspection.delay} rows")
     split = max(1, round((1.0 - left_out) * len(episodes)))
     train, judge = cut(episodes[:split], inspection.delay, rows), cut(episodes[split:], inspection.delay, rows)
-    search = KnownSearch(system, paths, train.part(_some(train)))
+    some = np.linspace(0, len(train) - 1, min(SAMPLE, len(train))).astype(int)
+    search = KnownSearch(system, paths, train.part(some))
     system = search.run()
     errors = np.nan_to_num(_run(system, (), judge)[0], nan=OUTLIER)
     progress(f"{np.degrees(np.sqrt(np.mean(errors**2))):.3g} deg rms over {rows} rows on episodes left out")
     estimates, covariance, remarks = search.separate(system)
     own = [i for i, path in enumerate(paths) if path.startswith("arm.")]
-    pairs = tuple((2 * j + 1, 2 * j + 2) for j in range(joints))
     return ArmFit(
-        system.arm, inspection, pairs, errors, judge.episode, baseline_errors(episodes[:split], episodes[split:], rows),
-        band(errors), tuple(estimates[i] for i in own), (*inspection.remarks, *remarks), split,
-        covariance=covariance[np.ix_(own, own)],
+        system.arm, inspection, tuple((2 * j + 1, 2 * j + 2) for j in range(joints)), errors, judge.episode,
+        baseline_errors(episodes[:split], episodes[split:], rows), band(errors), tuple(estimates[i] for i in own),
+        (*inspection.remarks, *remarks), split, covariance=covariance[np.ix_(own, own)],
     )  # fmt: skip
 
 
@@ -119,10 +119,6 @@ def _paths(system: ReadPressures, free: Sequence[str]) -> list[str]:
             )
         found += own
     return list(dict.fromkeys(found))
-
-
-def _some(windows: Windows) -> Array:
-    return np.linspace(0, len(windows) - 1, min(SAMPLE, len(windows))).astype(int)
 
 
 def _run(system: ReadPressures, paths: Sequence[str], windows: Windows) -> tuple[Array, Array]:
@@ -157,7 +153,6 @@ class KnownSearch:
         typical = [SIZES.get(field, abs(value) or 1.0) for field, value in zip(fields, self.start, strict=True)]
         self.sizes = np.maximum(np.abs(self.start), typical)
         self.low, self.high = (np.array([leaves[path].declared.bounds[i] for path in paths]) for i in (0, 1))
-        self.low = np.where(np.array(fields) == "lags", np.maximum(self.low, 2e-3), self.low)
         self._last: tuple[bytes, Array, Array] = (b"", np.zeros(0), np.zeros(0))
 
     def _evaluate(self, scaled: Array) -> tuple[Array, Array]:
@@ -204,5 +199,4 @@ class KnownSearch:
                 f"the record does not separate {', '.join(names[:NAMED])}: combinations of them may have any value; "
                 "fix or measure one of them"
             )
-        known = inverse[:, ~weak]
-        return estimates, known @ known.T, remarks
+        return estimates, inverse[:, ~weak] @ inverse[:, ~weak].T, remarks

@@ -11,7 +11,7 @@ import numpy as np
 from ...core import FileError, suggestion
 from .channels import Channel, RawTable, merge_channels
 from .downsampling import Decimation, Downsampling, Reduction, check_reduced_lengths, read_reduced, with_reduction
-from .separate_process import import_lab_package, read_in_separate_process, run_reader
+from .separate_process import import_lab_package, in_separate_process, run_reader
 
 
 class StoredTable(NamedTuple):
@@ -23,17 +23,11 @@ class StoredTable(NamedTuple):
     reduction: Reduction
 
 
-def read_parquet_tables(path: Path, group: str | None = None) -> tuple[RawTable, ...]:
+def read_parquet_tables_here(path: Path, group: str | None = None) -> tuple[RawTable, ...]:
     """Read the table of a Parquet file; the metadata `unit` of a column states its unit, that of the file constants.
 
     A Parquet file has no groups; `group` is not used. Raises FileError or ColumnError.
     """
-    tables: tuple[RawTable, ...] = read_in_separate_process("pyarrow", __name__, "read_parquet_tables_here", path)
-    return tables
-
-
-def read_parquet_tables_here(path: Path) -> tuple[RawTable, ...]:
-    """As `read_parquet_tables`, in this process."""
     parquet = import_lab_package("pyarrow.parquet", path)
 
     def read() -> tuple[RawTable, ...]:
@@ -52,7 +46,7 @@ def read_parquet_tables_here(path: Path) -> tuple[RawTable, ...]:
     return run_reader(path, "Parquet", read)
 
 
-def read_hdf5_tables(
+def read_hdf5_tables_here(
     path: Path, group: str | None = None, downsampling: Downsampling = Decimation()
 ) -> tuple[RawTable, ...]:
     """Read one table from each group with vectors, or from the named group; the attribute `unit` states a unit.
@@ -60,16 +54,6 @@ def read_hdf5_tables(
     A dataset of records (named fields) is a table of its own, and so is a matrix with an attribute `columns`. A table
     of more than `downsampling.max_rows` rows is read by pieces and reduced. Raises FileError or ColumnError.
     """
-    tables: tuple[RawTable, ...] = read_in_separate_process(
-        "h5py", __name__, "read_hdf5_tables_here", path, group, downsampling
-    )
-    return tables
-
-
-def read_hdf5_tables_here(
-    path: Path, group: str | None, downsampling: Downsampling = Decimation()
-) -> tuple[RawTable, ...]:
-    """As `read_hdf5_tables`, in this process."""
     h5py = import_lab_package("h5py", path)
 
     def read() -> dict[str, StoredTable]:
@@ -91,6 +75,10 @@ def read_hdf5_tables_here(
         table = merge_channels(f"{path.name}, group '{name}'" if several else path.name, each.channels, each.constants)
         tables.append(with_reduction(table, each.reduction, downsampling))
     return tuple(tables)
+
+
+read_parquet_tables = in_separate_process("pyarrow", read_parquet_tables_here)
+read_hdf5_tables = in_separate_process("h5py", read_hdf5_tables_here)
 
 
 def check_own_values(h5py: Any, file: Any, path: Path) -> None:

@@ -18,7 +18,7 @@ from .downsampling import Decimation, Downsampling, Reduction, with_reduction
 from .mat_contents import is_plain_hdf5, read_contents
 from .mat_objects import READABLE, MatlabObject, find_objects, read_objects
 from .raw_columnar import read_hdf5_tables
-from .separate_process import read_in_separate_process, run_reader
+from .separate_process import in_separate_process, run_reader
 
 
 def read_mat_tables(
@@ -34,10 +34,7 @@ def read_mat_tables(
     """
     if is_plain_hdf5(path):
         return read_hdf5_tables(path, group, downsampling)
-    tables: tuple[RawTable, ...] = read_in_separate_process(
-        "scipy", __name__, "read_mat_tables_here", path, group, tuple(columns), downsampling
-    )
-    return tables
+    return in_separate_process("scipy", read_mat_tables_here)(path, group, tuple(columns), downsampling)
 
 
 def read_mat_tables_here(

@@ -11,13 +11,13 @@ import numpy as np
 from ...core import Array, FileError, listed, suggestion
 from .channels import Channel, RawTable, merge_channels
 from .downsampling import Decimation, Downsampling, read_reduced
-from .separate_process import import_lab_package, read_in_separate_process, run_reader
+from .separate_process import import_lab_package, in_separate_process, run_reader
 
 _TIME_MASTER = 1
 """Type of a master channel that contains time, in both versions of the format."""
 
 
-def read_mdf_tables(
+def read_mdf_tables_here(
     path: Path, group: str | None = None, downsampling: Downsampling = Decimation()
 ) -> tuple[RawTable, ...]:
     """Read one table from all channels, or from the named channel group. Raises FileError or ColumnError.
@@ -25,14 +25,6 @@ def read_mdf_tables(
     A channel group with more than `downsampling.max_rows` rows is read by pieces and reduced. The package for this
     format is native code, therefore a separate process reads the file.
     """
-    tables: tuple[RawTable, ...] = read_in_separate_process(
-        "asammdf", __name__, "read_mdf_tables_here", path, group, downsampling
-    )
-    return tables
-
-
-def read_mdf_tables_here(path: Path, group: str | None, downsampling: Downsampling) -> tuple[RawTable, ...]:
-    """As `read_mdf_tables`, in this process."""
     asammdf = import_lab_package("asammdf", path)
 
     def read() -> tuple[RawTable, ...]:
@@ -48,6 +40,9 @@ def read_mdf_tables_here(path: Path, group: str | None, downsampling: Downsampli
             return (dataclasses.replace(table, notes=(*table.notes, *notes)),)
 
     return run_reader(path, "MDF", read)
+
+
+read_mdf_tables = in_separate_process("asammdf", read_mdf_tables_here)
 
 
 def _group_name(group: Any, index: int) -> str:

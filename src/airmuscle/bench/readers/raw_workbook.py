@@ -19,7 +19,7 @@ from .header import (
     parse_unit_row,
     stated_heading_row,
 )
-from .separate_process import import_lab_package, read_in_separate_process, run_reader
+from .separate_process import import_lab_package, in_separate_process, run_reader
 from .text_format import TextFormat
 from .time_base import seconds_from_clock
 
@@ -28,7 +28,7 @@ Rows = list[tuple[int, list[Any]]]
 """Non-empty rows of a worksheet with their numbers, counted from 1."""
 
 
-def read_workbook_tables(
+def read_workbook_tables_here(
     path: Path, sheet: str | None = None, text_format: TextFormat = TextFormat()
 ) -> tuple[RawTable, ...]:
     """Read one table from each worksheet that contains one, or from the named worksheet.
@@ -38,14 +38,6 @@ def read_workbook_tables(
     Of a formula, its stored value is read; a cell with an error is empty, and chart sheets have no cells. The package
     for these formats is native code, therefore a separate process reads the file. Raises FileError or ColumnError.
     """
-    tables: tuple[RawTable, ...] = read_in_separate_process(
-        "python_calamine", __name__, "read_workbook_tables_here", path, sheet, text_format
-    )
-    return tables
-
-
-def read_workbook_tables_here(path: Path, sheet: str | None, text_format: TextFormat) -> tuple[RawTable, ...]:
-    """As `read_workbook_tables`, in this process."""
     calamine = import_lab_package("python_calamine", path)
 
     def read() -> dict[str, Rows]:
@@ -67,6 +59,9 @@ def read_workbook_tables_here(path: Path, sheet: str | None, text_format: TextFo
         _parse_table(f"{path.name}, sheet '{name}'" if several else path.name, rows, text_format)
         for name, rows in sheets.items()
     )
+
+
+read_workbook_tables = in_separate_process("python_calamine", read_workbook_tables_here)
 
 
 def _nonempty_rows(sheet: Any) -> Rows:

@@ -1,18 +1,20 @@
 """Optional packages that read laboratory formats (extra `lab`), and a separate process for readers in native code."""
 
+import functools
 import importlib
 import importlib.util
 import threading
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, ParamSpec, TypeVar
 
 from ...core import AirmuscleError, FileError
 from ...engine.processes import Worker, WorkerError
 from .file_kind import check_regular_file
 
 Result = TypeVar("Result")
+Given = ParamSpec("Given")
 
 
 def is_installed(name: str) -> bool:
@@ -71,14 +73,21 @@ _worker = Worker(quiet=True)
 _lock = threading.Lock()
 
 
-def read_in_separate_process(package: str, module: str, function: str, path: Path, *arguments: Any) -> Any:
-    """Return what a reader in a module of this package reads, as `call_in_separate_process`, from a regular file.
+def in_separate_process(package: str, read: Callable[Given, Result]) -> Callable[Given, Result]:
+    """A reader of a module of this package as a function that the separate process evaluates, from a regular file.
 
-    Raises FileError if the package that the reader needs is not installed, or if the file is not regular.
+    It raises FileError if the package that the reader needs is not installed, or if the file is not regular.
     """
-    check_lab_package(package, path)
-    check_regular_file(path)
-    return call_in_separate_process(module, function, path, *arguments)
+
+    @functools.wraps(read)
+    def call(*arguments: Given.args, **named: Given.kwargs) -> Result:
+        path: Any = arguments[0]
+        check_lab_package(package, path)
+        check_regular_file(path)
+        found: Result = call_in_separate_process(read.__module__, read.__name__, path, *arguments[1:])
+        return found
+
+    return call
 
 
 def call_in_separate_process(module: str, function: str, path: Path, *arguments: Any) -> Any:

@@ -2,10 +2,10 @@ from ..requests.declaration import RequestError as RequestError
 from .app import MAX_PAGE as MAX_PAGE
 from .app import create_app as create_app
 from .app import library_list as library_list
-from .fit_queue import FIT_WORKERS as FIT_WORKERS
-from .fit_queue import MAX_WAITING as MAX_WAITING
-from .fit_queue import FitQueue as FitQueue
+from .fit_routes import FIT_WORKERS as FIT_WORKERS
 from .fit_routes import MAX_SETTINGS as MAX_SETTINGS
+from .fit_routes import MAX_WAITING as MAX_WAITING
+from .fit_routes import FitQueue as FitQueue
 from .fit_routes import FitService as FitService
 from .fit_task import run_fit as run_fit
 from .fit_uploads import UploadStore as UploadStore
@@ -27,8 +27,8 @@ from .server import bound_socket as bound_socket
 from .server import reachable_host as reachable_host
 from .server import serve as serve
 from .server import warning_of as warning_of
-from .size_sheet import read_request as read_request
 from .tasks import MAX_TEXT as MAX_TEXT
+from .tasks import read_request as read_request
 from .tasks import read_text_tables as read_text_tables
 from .tasks import sheet_of_any as sheet_of_any
 from .tasks import sheet_of_scenario_text as sheet_of_scenario_text

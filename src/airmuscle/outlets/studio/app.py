@@ -28,8 +28,15 @@ from .security import (
     limited_body,
     secured,
 )
-from .size_sheet import size_form, size_sheet
-from .tasks import MAX_TEXT, sheet_of_law, sheet_of_law_text, sheet_of_library_plant, sheet_of_scenario_text
+from .tasks import (
+    MAX_TEXT,
+    sheet_of_law,
+    sheet_of_law_text,
+    sheet_of_library_plant,
+    sheet_of_scenario_text,
+    size_form,
+    size_sheet,
+)  # fmt: skip
 from .worker import LimitError, WorkerPool
 
 WORKERS = 5
@@ -129,10 +136,10 @@ def create_app(
         Route("/web/{name:path}", handlers.web),
         Route("/program/{name}", handlers.program),
         Route("/api/library", handlers.library),
-        Route("/api/law", handlers.own_law, methods=["POST"]),
-        Route("/api/plant", handlers.own_plant, methods=["POST"]),
+        Route("/api/law", handlers.of_text(sheet_of_law_text), methods=["POST"]),
+        Route("/api/plant", handlers.of_text(sheet_of_scenario_text), methods=["POST"]),
         *(Route(f"/api/{kind}/{{name}}", handlers.of_library(kind)) for kind in SHEETS),
-        Route("/api/size", handlers.size, methods=["POST"]),
+        Route("/api/size", handlers.of_text(size_sheet, LIBRARY_LIMIT), methods=["POST"]),
         Route("/api/page", handlers.save_page, methods=["POST"]),
         *(fits or FitService(pool)).routes(),
     ]
@@ -196,20 +203,14 @@ class Handlers:
 
         return handle
 
-    async def own_law(self, request: Any) -> Any:
-        """The sheet of a text of a user."""
-        text = decoded(await limited_body(request, MAX_TEXT))
-        return await self._computed(self._sheets.of_text, sheet_of_law_text, text)
+    def of_text(self, task: Callable[[str], dict[str, Any]], limit: float | None = None) -> Callable[[Any], Any]:
+        """The handler of the sheets that a task makes of texts of users."""
 
-    async def own_plant(self, request: Any) -> Any:
-        """The sheet of a scenario of a user."""
-        text = decoded(await limited_body(request, MAX_TEXT))
-        return await self._computed(self._sheets.of_text, sheet_of_scenario_text, text)
+        async def handle(request: Any) -> Any:
+            text = decoded(await limited_body(request, MAX_TEXT))
+            return await self._computed(self._sheets.of_text, task, text, limit)
 
-    async def size(self, request: Any) -> Any:
-        """The sheet of a sizing."""
-        text = decoded(await limited_body(request, MAX_TEXT))
-        return await self._computed(self._sheets.of_text, size_sheet, text, LIBRARY_LIMIT)
+        return handle
 
     async def _computed(self, function: Callable[..., dict[str, Any]], *arguments: Any) -> Any:
         from starlette.concurrency import run_in_threadpool

@@ -1,18 +1,30 @@
-"""Tasks of the studio: sheets of laws and plants from the library or from a text of a user, within limits.
+"""Tasks of the studio: sheets of laws, plants and sizings from the library or from a text of a user, within limits.
 
 Files in the library folder may refer to other files. A text over the network must not, because it would read files of
 the machine of the server.
 """
 
 import dataclasses
+import hashlib
+import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
+import airmuscle as am
+
 from ...bench.readers.file_kind import parse_toml
-from ...core import ParameterError, is_known_unit
+from ...core import AirmuscleError, Array, ParameterError, is_known_unit
+from ...design.sizing.chapter import product_of, sizing_chapter
+from ...design.sizing.scenario import sizing_scenario
 from ...files.library import Location, is_path, list_plants, plant_tables, read_toml
 from ...files.library.entry_file import build_entry, check_describes_law, load_law
+from ...physics.muscle.characteristic.validity_range import validity_range_of
+from ...physics.muscle.isobars import compute_isobars
+from ...report.data import as_sheet, csv_text
+from ..requests import JOINT, LIFT, SizeRequest, build, form_fields, options_of
 from .law_sheet import law_sheet
 from .plant_sheet import sheet_of_plant, sheet_of_tables
 
@@ -106,3 +118,104 @@ def _refusal(path: str) -> str:
         f"{path[:200]}: a text in the studio must not refer to files; write the numbers themselves, or a name of the "
         "library. The command line reads files that refer to others."
     )
+
+
+# Sizings: ranked muscles for a lift or a joint with their charts and scenarios, for the tab Size
+
+OMITTED = ("count", "muscle")
+"""Fields of the command that the page does not have."""
+FIELDS = tuple(each.name for each in options_of(SizeRequest) if each.name not in OMITTED)
+"""Fields of the page; each is a text as a user types it, and may be empty where it is optional."""
+MAX_CHOICES = 30
+"""Maximum number of choices that the page receives (chosen)."""
+MAX_FIELD = 60
+"""Maximum length of a field (chosen)."""
+POINTS = 81
+"""Points of a curve (chosen)."""
+
+
+def size_form() -> dict[str, Any]:
+    """The fields of the form of the page: those of a lift, of a joint, and of both."""
+    fields = {each["name"]: each for each in form_fields(SizeRequest) if each["name"] not in OMITTED}
+    common = [each for name, each in fields.items() if name not in (*LIFT, *JOINT)]
+    return {"lift": [fields[name] for name in LIFT], "joint": [fields[name] for name in JOINT], "all": common}
+
+
+def size_sheet(text: str) -> dict[str, Any]:
+    """The sheet of a request in JSON. Raises InputError, or SolveError with what is reachable."""
+    given = read_request(text)
+    request = build(SizeRequest, given, lambda name: name.replace("_", " "))
+    result = request.evaluate()
+    chapter = sizing_chapter(result, sizing_scenario(result.choices, "in the page"))
+    sheet: dict[str, Any] = {
+        "tab": "size",
+        "name": "sizing",
+        "provenance": "the library",
+        "request": given,
+        "form": size_form(),
+        "own_text": text,
+        **as_sheet(chapter),
+        "title": result.requirement.describe(),
+        "csv": "\n".join(csv_text(table) for table in chapter.tables[1:3]),
+        "choices": [_choice(choice) for choice in result.choices[:MAX_CHOICES]],
+        "left_out": max(0, len(result.choices) - MAX_CHOICES),
+    }
+    sheet["id"] = hashlib.sha256(json.dumps(sheet).encode()).hexdigest()[:32]
+    return {**sheet, "script": '"use strict";\n'}
+
+
+def read_request(text: str) -> dict[str, str]:
+    """The fields of a request. Raises ParameterError for another form."""
+    try:
+        given = json.loads(text)
+    except (ValueError, RecursionError):
+        raise ParameterError("the request is not JSON.") from None
+    if not isinstance(given, dict) or set(given) - set(FIELDS):
+        raise ParameterError(f"the request must have the fields {', '.join(FIELDS)} and no others.")
+    if not all(isinstance(value, str) and len(value) <= MAX_FIELD for value in given.values()):
+        raise ParameterError(f"the fields of the request must be texts of at most {MAX_FIELD} characters.")
+    return {name: given.get(name, "").strip() for name in FIELDS}
+
+
+def _choice(choice: am.design.MuscleChoice) -> dict[str, Any]:
+    """A choice with its chart and its scenario, or the reason why it has none."""
+    try:
+        scenario, reason = am.design.scenario_text(choice), ""
+    except AirmuscleError as error:
+        scenario, reason = "", str(error.message)
+    radius = choice.design.radius
+    of_radius = "" if radius is None else f", pulley radius {1e3 * radius:.4g} mm"
+    return {
+        "name": choice.entry.name,
+        "label": f"{choice.total_count} × {product_of(choice)}, {1e3 * choice.length:.4g} mm{of_radius}",
+        "chart": _chart(choice),
+        "scenario": scenario,
+        "reason": reason,
+    }
+
+
+def _chart(choice: am.design.MuscleChoice) -> dict[str, Any]:
+    """Isobars of one muscle, its capacity, the load and both end points; contractions as ratios, forces in N."""
+    entry, muscle, design = choice.entry, choice.muscle, choice.design
+    curves = compute_isobars(entry.characteristic, validity_range_of(entry.characteristic, entry.validity_range))
+    grid = np.linspace(*muscle.contraction_range, POINTS)
+    points = [point._asdict() for point in (design.extended, design.contracted)]
+    chart = {
+        "pressures": curves.pressures.tolist(),
+        "contractions": _rounded(curves.contractions),
+        "forces": [_rounded(row) for row in curves.forces],
+        "capacity": {"contractions": _rounded(grid), "forces": _rounded(muscle.capacity(grid))},
+        "points": [{key: float(value) for key, value in point.items()} for point in points],
+        "load": None,
+    }
+    if isinstance(choice.requirement, am.design.LiftRequirement):
+        displacement, load = choice.requirement.path
+        contractions = design.extended.contraction + displacement / choice.length
+        chart["load"] = {"contractions": _rounded(contractions), "forces": _rounded(load / choice.count),
+                         "factor": choice.conditions.safety_factor}  # fmt: skip
+    return chart
+
+
+def _rounded(values: Array) -> list[float | None]:
+    """Numbers for a chart: seven digits, None where there is no value."""
+    return [float(f"{value:.7g}") if np.isfinite(value) else None for value in np.asarray(values, dtype=float)]
