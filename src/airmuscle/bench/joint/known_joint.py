@@ -75,11 +75,12 @@ def fit_known_joint(
     ParameterError for another number of pressures or angles, and for a path that the arm does not have.
     """
     count, joints = len(arm.muscle), len(arm.mechanism.coordinates)
-    if (episodes.muscles, episodes.joints) != (count, joints) or not 0.0 < left_out < 1.0 or len(episodes) < 4:
+    wrong = (episodes.muscles, episodes.joints, count) != (count, joints, 2 * joints)
+    if wrong or not 0.0 < left_out < 1.0 or len(episodes) < 4:
         raise ParameterError(
             f"fit_known_joint: {len(episodes)} episodes have {episodes.muscles} pressures, {episodes.joints} angles, "
-            f"the arm {count} muscles and {joints} coordinates, and left_out is {left_out:g}; give as many columns in "
-            "the order of the muscles, 4 episodes or more, and a share between 0 and 1."
+            f"the arm {count} muscles and {joints} coordinates, and left_out is {left_out:g}; give two "
+            "muscles for each angle in the order of the columns, 4 episodes or more, and a share between 0 and 1."
         )
     inspection = inspect_episodes(episodes)
     check_episodes(inspection)
@@ -88,15 +89,17 @@ def fit_known_joint(
     progress(f"{len(paths)} parameters; delay of the pressures: {inspection.delay} rows")
     split = max(1, round((1.0 - left_out) * len(episodes)))
     train, judge = cut(episodes[:split], inspection.delay, rows), cut(episodes[split:], inspection.delay, rows)
-    some = np.linspace(0, len(train) - 1, min(SAMPLE, len(train))).astype(int)
-    search = KnownSearch(system, paths, train.part(some))
+    search = KnownSearch(system, paths, train.part(range(0, len(train), -(-len(train) // SAMPLE))))
     system = search.run()
     errors = np.nan_to_num(_run(system, (), judge)[0], nan=OUTLIER)
     progress(f"{np.degrees(np.sqrt(np.mean(errors**2))):.3g} deg rms over {rows} rows on episodes left out")
     estimates, covariance, remarks = search.separate(system)
     own = [i for i, path in enumerate(paths) if path.startswith("arm.")]
+    signs = {action.muscle: action.sign for action in inspection.actions}
+    ways = [signs.get(2 * j + 1, 1) < 0 for j in range(joints)]
+    pairs = tuple((2 * j + 1 + way, 2 * j + 2 - way) for j, way in enumerate(ways))
     return ArmFit(
-        system.arm, inspection, tuple((2 * j + 1, 2 * j + 2) for j in range(joints)), errors, judge.episode,
+        system.arm, inspection, pairs, errors, judge.episode,
         baseline_errors(episodes[:split], episodes[split:], rows), band(errors), tuple(estimates[i] for i in own),
         (*inspection.remarks, *remarks), split, covariance=covariance[np.ix_(own, own)],
     )  # fmt: skip
@@ -150,8 +153,8 @@ class KnownSearch:
         self.system, self.paths, self.windows = system, list(paths), windows
         self.start = np.array([float(leaves[path].value) for path in paths])
         fields = [path.rsplit(".", 1)[-1].split("[")[0] for path in paths]
-        typical = [SIZES.get(field, abs(value) or 1.0) for field, value in zip(fields, self.start, strict=True)]
-        self.sizes = np.maximum(np.abs(self.start), typical)
+        pairs = zip(fields, np.abs(self.start), strict=True)
+        self.sizes = np.array([max(value, SIZES.get(field, value or 1.0)) for field, value in pairs])
         self.low, self.high = (np.array([leaves[path].declared.bounds[i] for path in paths]) for i in (0, 1))
         self._last: tuple[bytes, Array, Array] = (b"", np.zeros(0), np.zeros(0))
 

@@ -10,8 +10,6 @@ from ...core import InputError, attach_stub
 
 __getattr__, __dir__, __all__ = attach_stub(__name__, __file__)
 __all__ += ["register_environments"]
-ENVIRONMENTS = ("Joint", "JointOnOff", "Lift", "Arm")
-"""Registered environments; their identifiers are airmuscle/Joint-v0 and so on."""
 EPISODE_PERIODS = 500
 """Periods after which an episode of a registered environment is truncated."""
 
@@ -26,7 +24,7 @@ def register_environments() -> None:
         raise InputError("learning environments need the package gymnasium. Install it: pip install airmuscle[sim]")
     from gymnasium.envs import registration
 
-    for name in ENVIRONMENTS:
+    for name in ("Joint", "JointOnOff", "Lift", "Arm"):
         identifier = f"airmuscle/{name}-v0"
         if identifier not in registration.registry:
             registration.register(

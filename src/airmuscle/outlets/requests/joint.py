@@ -99,8 +99,8 @@ def fit_requested_arm(
             read_episodes(source, rules), arm, request.free, left_out=request.left_out, rows=request.horizon,
             progress=progress,
         )  # fmt: skip
-        written = {"scenario.toml": _scenarios(known, title)["scenario.toml"]}
-        return dataclasses.replace(known.chapter(), title=title), written
+        chapter = dataclasses.replace(known.chapter(), title=title)
+        return chapter, {"scenario.toml": _scenarios(known, title)["scenario.toml"]}
     fit = fit_joint(
         read_episodes(source, rules), pairs=rules.pairs, axes=rules.axes, left_out=request.left_out,
         rows=request.horizon, residual=request.residual, seed=request.seed, progress=progress,

@@ -46,9 +46,8 @@ class ArmSettings:
 def read_arm_settings(data: dict[str, Any]) -> ArmSettings:
     """The settings in a request of the page. Raises RequestError."""
     values = {field.name: data.get(field.name, "") for field in dataclasses.fields(ArmSettings)}
-    for name, value in values.items():
-        if not isinstance(value, str) or len(value) > MAX_MAPPING:
-            raise RequestError(f"{name} must be a text of at most {MAX_MAPPING} characters.", name)
+    for name in (n for n, value in values.items() if not isinstance(value, str) or len(value) > MAX_MAPPING):
+        raise RequestError(f"{name} must be a text of at most {MAX_MAPPING} characters.", name)
     return ArmSettings(**values)
 
 
