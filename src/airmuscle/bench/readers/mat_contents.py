@@ -124,7 +124,8 @@ def _value(h5py: Any, file: Any, item: Any, place: str, notes: list[str]) -> Any
     """A variable, a field or an element of a cell array; None if it is empty or not read."""
     if isinstance(item, h5py.Group) and "MATLAB_sparse" not in item.attrs:
         return _fields(h5py, file, item, f"{place}.", notes)
-    kind = _text(item.attrs.get("MATLAB_class", b""))
+    stated = item.attrs.get("MATLAB_class", b"")
+    kind = stated.decode(errors="replace") if isinstance(stated, bytes) else str(stated)
     if "MATLAB_empty" in item.attrs or item.attrs.get("MATLAB_object_decode", 0) == 3:  # an object, named elsewhere
         return None
     if kind == "char":
@@ -137,10 +138,6 @@ def _value(h5py: Any, file: Any, item: Any, place: str, notes: list[str]) -> Any
     what = "a sparse matrix" if isinstance(item, h5py.Group) else kinds.get(kind, "which contains no real numbers")
     notes.append(f"Not read: {place}, {what}.")
     return None
-
-
-def _text(value: Any) -> str:
-    return value.decode(errors="replace") if isinstance(value, bytes) else str(value)
 
 
 def _is_column(value: Any) -> bool:

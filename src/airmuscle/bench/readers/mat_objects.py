@@ -121,12 +121,9 @@ def _columns(frame: Any) -> dict[str, Any]:
         fields["time"] = _seconds(frame.index.to_numpy())
     fields |= {str(name): _numbers(frame[name].to_numpy()) for name in frame.columns}
     stated = dict(zip(map(str, frame.columns), units, strict=False))
-    stated |= {name: "s" for name in fields if name == "time" or _is_time(frame, name)}
+    dated = {str(name) for name in frame.columns if frame[name].dtype.kind in "mM"}
+    stated |= {name: "s" for name in fields if name == "time" or name in dated}
     return {name: values for name, values in fields.items() if values is not None} | {"units": stated}
-
-
-def _is_time(frame: Any, name: str) -> bool:
-    return name in frame.columns and frame[name].dtype.kind in "mM"
 
 
 def _numbers(values: Any) -> Array | None:

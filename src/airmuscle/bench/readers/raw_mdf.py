@@ -29,7 +29,9 @@ def read_mdf_tables_here(
 
     def read() -> tuple[RawTable, ...]:
         with asammdf.MDF(path) as file:
-            names = [_group_name(g, i) for i, g in enumerate(file.groups)]
+            names = [
+                str(getattr(g.channel_group, "acq_name", "") or f"group {i}") for i, g in enumerate(file.groups, 1)
+            ]
             if group is not None and group not in names:
                 raise FileError(
                     f"{path.name}: no group '{group}'; the groups are {listed(names)}.{suggestion(group, names)}"
@@ -45,10 +47,6 @@ def read_mdf_tables_here(
 read_mdf_tables = in_separate_process("asammdf", read_mdf_tables_here)
 
 
-def _group_name(group: Any, index: int) -> str:
-    return str(getattr(group.channel_group, "acq_name", "") or f"group {index + 1}")
-
-
 def _rows(group: Any) -> int:
     return int(group.channel_group.cycles_nr)
 
@@ -62,7 +60,9 @@ def _notes(group: Any, name: str, downsampling: Downsampling) -> list[str]:
 def _channels(file: Any, groups: list[int], downsampling: Downsampling) -> Iterator[Channel]:
     for i in groups:
         master = file.masters_db.get(i)
-        timed = master is not None and _is_time(file.groups[i].channels[master])
+        timed = (
+            master is not None and getattr(file.groups[i].channels[master], "sync_type", _TIME_MASTER) == _TIME_MASTER
+        )
         rows = _rows(file.groups[i])
         step = downsampling.step(max(rows, 1))
         time = None
@@ -87,10 +87,6 @@ def _times(file: Any, group: int, first: int, end: int) -> Array:
 
 def _samples(file: Any, group: int, channel: int, first: int, end: int) -> Any:
     return file.get(group=group, index=channel, record_offset=first, record_count=end - first).samples
-
-
-def _is_time(master: Any) -> bool:
-    return getattr(master, "sync_type", _TIME_MASTER) == _TIME_MASTER
 
 
 NO_DATE = np.datetime64("1904-01-01T00:00:00", "us")

@@ -49,7 +49,8 @@ def read_workbook_tables_here(
                 )
             return {name: _nonempty_rows(book.get_sheet_by_name(name)) for name in names if sheet in (None, name)}
 
-    sheets = {name: rows for name, rows in run_reader(path, "a workbook", read).items() if _contains_table(rows)}
+    found = run_reader(path, "a workbook", read)
+    sheets = {name: rows for name, rows in found.items() if any(_is_numeric(row) for _, row in rows)}
     if not sheets:
         raise FileError(
             f"{path.name}: no worksheet contains a table. A table consists of a row of headings and rows of numbers."
@@ -68,10 +69,6 @@ def _nonempty_rows(sheet: Any) -> Rows:
     """The rows with content, with their numbers, counted from 1."""
     rows = enumerate(sheet.to_python(skip_empty_area=False), 1)
     return [(i, row) for i, row in rows if any(cell not in (None, "") for cell in row)]
-
-
-def _contains_table(rows: Rows) -> bool:
-    return any(_is_numeric(row) for _, row in rows)
 
 
 def _parse_table(origin: str, rows: Rows, text_format: TextFormat) -> RawTable:

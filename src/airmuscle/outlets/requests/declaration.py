@@ -130,7 +130,8 @@ def options_of(cls: Any) -> tuple[Option, ...]:
 def _option(field: dataclasses.Field[Any], hint: Any) -> Option:
     declared = dict(field.metadata[_KEY])
     default = declared.pop("default")
-    kinds = [each for each in _parts(hint) if each is not type(None)]
+    parts = typing.get_args(hint) if isinstance(hint, types.UnionType) else (hint,)
+    kinds = [each for each in parts if each is not type(None)]
     repeated = typing.get_origin(kinds[0]) is tuple
     kind = typing.get_args(kinds[0])[0] if repeated else kinds[0]
     needed = default is dataclasses.MISSING
@@ -138,10 +139,6 @@ def _option(field: dataclasses.Field[Any], hint: Any) -> Option:
         field.name, kind if kind in (bool, int, float, str, Path) else str, repeated, needed=needed,
         default=None if needed or default in ((), None) else default, **declared,
     )  # fmt: skip
-
-
-def _parts(hint: Any) -> Sequence[Any]:
-    return typing.get_args(hint) if isinstance(hint, types.UnionType) else (hint,)
 
 
 def form_fields(cls: type[Any]) -> list[dict[str, Any]]:
@@ -161,7 +158,8 @@ def build(cls: type[T], given: Mapping[str, Any], where: Where) -> T:
         value = given.get(each.name)
         if value is None or value in ((), []) or (value == "" and not each.empty):
             if each.needed:
-                raise RequestError(f"{where(each.name)} is missing; {_demand(each)}.", each.name)
+                demand = "give a number with its unit" if each.unit else "give it"
+                raise RequestError(f"{where(each.name)} is missing; {demand}.", each.name)
             continue
         label = where(each.name)
         if each.repeated:
@@ -173,7 +171,3 @@ def build(cls: type[T], given: Mapping[str, Any], where: Where) -> T:
     if check is not None:
         check(where)
     return made
-
-
-def _demand(declared: Option) -> str:
-    return "give a number with its unit" if declared.unit else "give it"

@@ -53,7 +53,11 @@ def with_values(entry: Any, changes: Mapping[str, float | str]) -> Any:
                 f"{suggestion(path, known)}"
             )
     values = {path: quantity(value, known[path].declared.unit, where=path) for path, value in changes.items()}
-    changed = {name: _changed(part, name, values) for name, part in parts.items() if _concerned(name, values)}
+    changed = {
+        name: _changed(part, name, values)
+        for name, part in parts.items()
+        if any(p.startswith(f"{name}.") for p in values)
+    }
     law = changed.get("characteristic")
     if (
         law is not None
@@ -76,10 +80,6 @@ def _shown(paths: Iterable[str]) -> list[str]:
     for path in paths:
         stems.setdefault(path.partition("[")[0], []).append(path)
     return [group[0] if len(group) == 1 else f"{group[0]} to {group[-1]}" for group in stems.values()]
-
-
-def _concerned(name: str, values: Mapping[str, float]) -> bool:
-    return any(path.startswith(f"{name}.") for path in values)
 
 
 def _changed(part: Any, name: str, values: Mapping[str, float]) -> Any:

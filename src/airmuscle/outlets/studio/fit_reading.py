@@ -108,7 +108,8 @@ def _read_file(path: Path, settings: FitSettings, read: ReadSet) -> None:
         listed = read.columns.setdefault(path.name, [])
         listed += [each for each in columns if all(each.key != other.key for other in listed)]
         try:
-            mapped = apply_mapping(table, settings.mapping(_chosen(table, settings)))
+            chosen = {key: settings.columns[key] for key in _keys(table) if key in settings.columns}
+            mapped = apply_mapping(table, settings.mapping(chosen))
         except AirmuscleError as error:
             read.complain(error, "columns")
             continue
@@ -158,11 +159,6 @@ def _constants(path: Path, settings: FitSettings) -> dict[str, float | str]:
 def _keys(table: RawTable) -> list[str]:
     """The key of each column: its heading if it occurs once, otherwise its number."""
     return [h if h and table.headings.count(h) == 1 else str(i) for i, h in enumerate(table.headings, 1)]
-
-
-def _chosen(table: RawTable, settings: FitSettings) -> dict[str, str]:
-    """The corrections of the columns that this table has."""
-    return {key: settings.columns[key] for key in _keys(table) if key in settings.columns}
 
 
 def _columns(table: RawTable, settings: FitSettings) -> Iterator[FileColumn]:

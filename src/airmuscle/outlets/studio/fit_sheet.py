@@ -1,7 +1,7 @@
 """Sheet of uploaded files: columns, recordings with runs and findings, problems, and the points of the chart."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -86,7 +86,7 @@ def _recording(
         "ranges": {name: _range(name, recording) for name in recording if len(recording)},
         **({} if inspection is None else _inspected(inspection)),
         "left_out": [int(row) for row in np.flatnonzero(~kept_rows(recording, outliers)) if row % step == 0],
-        "points": {name: _rounded(recording[name][::step]) for name in columns},
+        "points": {name: [float(f"{x:.{DIGITS}g}") for x in recording[name][::step]] for name in columns},
     }
 
 
@@ -123,7 +123,3 @@ def _constant(name: str, value: float | str) -> str:
 def _range(name: str, recording: am.Recording) -> list[float]:
     factor, _ = display_scale(name)
     return [float(recording[name].min()) * factor, float(recording[name].max()) * factor]
-
-
-def _rounded(values: Iterable[float]) -> list[float]:
-    return [float(f"{value:.{DIGITS}g}") for value in values]

@@ -125,8 +125,9 @@ def joint_controllers(plant: am.Plant, statics: am.physics.JointStatics) -> tupl
     inverse = am.control.AntagonisticInverse(plant.muscles, plant.mechanism, *pressure_range, steps=steps)
     ahead = am.control.SetpointCommand(valves.pressures, AHEAD)
     controllers = []
+    pid = am.PID("angle", DIFFERENCE, gain=2.0 * BAR, integral_time=0.3, derivative_time=0.05, derivative_filter=5.0)
     for key, outer, gains, inside in (
-        ("pid", _pid(), PID_GAINS, ""),
+        ("pid", pid, PID_GAINS, ""),
         ("cascade", _speed_cascade(), SPEED_GAINS, "inner."),
     ):
         half = 0.5 * (pressure_range[1] - pressure_range[0])
@@ -146,10 +147,6 @@ def joint_controllers(plant: am.Plant, statics: am.physics.JointStatics) -> tupl
     )  # fmt: skip
     controllers.append(_with_valves(valves, pressure_range, "stiffness", law, "", "", TORQUE_GAINS, bias=False))
     return tuple(controllers)
-
-
-def _pid() -> am.PID:
-    return am.PID("angle", DIFFERENCE, gain=2.0 * BAR, integral_time=0.3, derivative_time=0.05, derivative_filter=5.0)
 
 
 def _speed_cascade() -> am.control.Cascade:

@@ -124,7 +124,7 @@ def _extended(script: str, programs: Mapping[str, str]) -> str:
 def _controller_row(controller: JointController) -> dict[str, Any]:
     law, averaged = controller.law, controller.averaged
     known, inner = list(leaves(law)), list(leaves(averaged))
-    prefix = "law." if _is_modulated(law) else ""
+    prefix = "law." if hasattr(law, "law") else ""
     return {
         "key": controller.key,
         "setpoints": list(law.setpoints),
@@ -143,10 +143,6 @@ def _controller_row(controller: JointController) -> dict[str, Any]:
         "gains": [{**dataclasses.asdict(gain), "path": f"{prefix}{gain.path}", "bounds": _bounds(averaged, gain.path)}
                   for gain in controller.gains],
     }  # fmt: skip
-
-
-def _is_modulated(law: Any) -> bool:
-    return hasattr(law, "law")
 
 
 def _bounds(law: Any, path: str) -> list[float | None]:

@@ -65,16 +65,16 @@ def law_sheet(entry: Entry) -> dict[str, Any]:
         "note": entry.note,
         "warning": entry.warning,
         "law": type(entry.characteristic).__name__,
-        "formula": _first_line(type(entry.characteristic).__doc__),
+        "formula": (type(entry.characteristic).__doc__ or "").strip().partition("\n")[0],
         "kind": kind,
         "functions": list(program.functions),
         "held": program.held,
         "limits": list(program.limits),
         "values": [leaf.value for _, leaf in rows],
         "parameters": [] if errors or len(rows) > MAX_PARAMETERS else _parameter_rows(rows, entry),
-        "resting_length": _resting_length(rows),
+        "resting_length": next((i for i, (path, _) in enumerate(rows) if path.endswith("resting_length")), None),
         "validity_range": None if limits is None else dataclasses.asdict(limits),
-        "ratings": _ratings(entry),
+        "ratings": {name: getattr(entry.ratings, name) for name in (entry.ratings.stated if entry.ratings else ())},
         "geometry": None if geometry is None else _geometry_sheet(geometry, "outline" in program.functions),
         "references": [str(reference) for reference in cite(entry)],
         "approximation": errors,
@@ -155,15 +155,6 @@ def _parameter_rows(rows: list[tuple[str, Leaf]], entry: Entry) -> list[dict[str
     return table
 
 
-def _resting_length(rows: list[tuple[str, Leaf]]) -> int | None:
-    """The index of the parameter that is the resting length."""
-    return next((i for i, (path, _) in enumerate(rows) if path.endswith("resting_length")), None)
-
-
-def _ratings(entry: Entry) -> dict[str, float]:
-    return {} if entry.ratings is None else {name: getattr(entry.ratings, name) for name in entry.ratings.stated}
-
-
 def _geometry_sheet(geometry: am.geometry.Geometry, printed: bool) -> dict[str, Any]:
     """The outline of a geometry: the number of its segments, and radii on a grid where there is no closed form."""
     segments = geometry.segments if isinstance(geometry, FibreTube) else 1
@@ -214,10 +205,6 @@ def _changed_template(entry: Entry) -> Template:
         both,
         sum(1 for _ in leaves(both)),
     )
-
-
-def _first_line(text: str | None) -> str:
-    return (text or "").strip().partition("\n")[0]
 
 
 def toml_template(write: Callable[[Any], str], model: Any, count: int) -> Template:

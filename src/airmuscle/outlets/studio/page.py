@@ -88,7 +88,7 @@ def self_contained_page(sheets: Sequence[Mapping[str, Any]], state: Mapping[str,
     embedded = json.dumps(data).replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
     scripts = [web_file(name) for name in SCRIPTS[:-1] if not name.startswith(SERVER_ONLY)]
     scripts += [sheet["script"] for sheet in sheets] + [web_file(SCRIPTS[-1])]
-    scripts = [_inside_page(text) for text in scripts]
+    scripts = [text.replace("</", "<\\/").replace("<!--", "<\\!--") for text in scripts]  # no text ends its element
     styles = [web_file(name) for name in STYLES if not name.startswith(SERVER_ONLY)]
     policy = (
         f"default-src 'none'; script-src {' '.join(map(_digest, scripts))}; "
@@ -104,11 +104,6 @@ def self_contained_page(sheets: Sequence[Mapping[str, Any]], state: Mapping[str,
     comment = f"<!--\nuPlot, in the first script, is used under this licence:\n\n{licence}\n-->"
     body = f'<script type="application/json" id="embedded">{embedded}</script>\n'
     return _filled(comment, head, body + "\n".join(f"<script>{text}</script>" for text in scripts))
-
-
-def _inside_page(script: str) -> str:
-    """A script whose texts cannot end the element in which it stands; the strings in it remain the same."""
-    return script.replace("</", "<\\/").replace("<!--", "<\\!--")
 
 
 def _digest(text: str) -> str:

@@ -67,7 +67,7 @@ class Access:
 
     def refusal(self, scope: Scope) -> tuple[int, str] | None:
         """Status and reason if a request is not allowed."""
-        headers = _headers(scope)
+        headers = {n.decode("latin-1").lower(): value.decode("latin-1") for n, value in scope["headers"]}
         host = headers.get("host", "")
         if self.hosts and _without_port(host).lower().removesuffix(".") not in self.hosts:
             return 421, "This server does not answer for this host."
@@ -121,10 +121,6 @@ def urlsplit_netloc(origin: str) -> str:
         return urlsplit(origin).netloc
     except ValueError:
         return ""
-
-
-def _headers(scope: Scope) -> dict[str, str]:
-    return {name.decode("latin-1").lower(): value.decode("latin-1") for name, value in scope["headers"]}
 
 
 def _without_port(host: str) -> str:
