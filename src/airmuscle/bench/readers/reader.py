@@ -101,14 +101,9 @@ def read_file(
     """The recordings in one file, as `read`; what concerns all files of a test rig is done by `complete_bench`."""
     return [
         interpret(part, mapping, mapping.constants_of(path))
-        for table in read_tables(path, mapping, downsampling, progress)
-        for part in split_specimens(apply_mapping(_with_printable_origin(table), mapping))
+        for table in read_tables(path, mapping, downsampling, progress)  # figures cannot contain every name of a file
+        for part in split_specimens(apply_mapping(dataclasses.replace(table, origin=printable(table.origin)), mapping))
     ]
-
-
-def _with_printable_origin(table: RawTable) -> RawTable:
-    """The table under a name that figures and reports can contain: a name of a file may be no text."""
-    return dataclasses.replace(table, origin=printable(table.origin))
 
 
 def complete_bench(recordings: Sequence[Recording], mapping: ColumnMapping) -> list[Recording]:

@@ -54,9 +54,9 @@ def with_values(entry: Any, changes: Mapping[str, float | str]) -> Any:
             )
     values = {path: quantity(value, known[path].declared.unit, where=path) for path, value in changes.items()}
     changed = {
-        name: _changed(part, name, values)
+        name: with_parameters(part, [values.get(f"{name}.{leaf.path}", leaf.value) for leaf in leaves(part)])
         for name, part in parts.items()
-        if any(p.startswith(f"{name}.") for p in values)
+        if any(path.startswith(f"{name}.") for path in values)
     }
     law = changed.get("characteristic")
     if (
@@ -80,7 +80,3 @@ def _shown(paths: Iterable[str]) -> list[str]:
     for path in paths:
         stems.setdefault(path.partition("[")[0], []).append(path)
     return [group[0] if len(group) == 1 else f"{group[0]} to {group[-1]}" for group in stems.values()]
-
-
-def _changed(part: Any, name: str, values: Mapping[str, float]) -> Any:
-    return with_parameters(part, [values.get(f"{name}.{leaf.path}", leaf.value) for leaf in leaves(part)])

@@ -93,7 +93,8 @@ def with_braid(entry: Entry, size: BraidSize | None, recordings: Sequence[Record
             f"--braid: {type(law).__name__} contains its geometry, which is also that of the muscle. Omit --braid, or "
             "give the geometry in [characteristic.geometry] of a muscle file, with --characteristic."
         )
-    lengths = resting_lengths(recordings) or _lengths_of(law)
+    inside = {float(leaf.value) for leaf in tree.leaves(law) if leaf.declared.name == "resting_length"}
+    lengths = resting_lengths(recordings) or tuple(inside)
     check_one_length(lengths)
     return dataclasses.replace(entry, geometry=braid_of_length(size, lengths[0]))
 
@@ -109,11 +110,6 @@ def problem_of_lengths(lengths: Sequence[float]) -> str:
     """What is wrong with the resting lengths [m] of the data of one braid; empty if there is exactly one."""
     stated = ", ".join(f"{1e3 * length:.4g} mm" for length in lengths) or "none"
     return "" if len(lengths) == 1 else f"a braid has exactly one resting length; the data state {stated}."
-
-
-def _lengths_of(law: object) -> tuple[float, ...]:
-    """The resting lengths [m] inside a law."""
-    return tuple({float(leaf.value) for leaf in tree.leaves(law) if leaf.declared.name == "resting_length"})
 
 
 def braid_of_length(size: BraidSize, resting_length: float) -> Braid:
