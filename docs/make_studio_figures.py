@@ -9,6 +9,7 @@ from __future__ import annotations
 import io
 import shutil
 import sys
+import zipfile
 from pathlib import Path
 from typing import Any
 
@@ -69,6 +70,46 @@ def save_fit(page: Any) -> None:
     save(page, "fit")
 
 
+def episodes() -> bytes:
+    """A computed record of a joint of two muscles of the library, 24 episodes of 0.95 s as a ZIP archive of CSV files;
+    random pressures, noise of the angle 0.03 deg (both chosen)."""
+    import numpy as np
+
+    import airmuscle as am
+
+    plant, rng, rows = am.load("joint-dmsp-20-matrix").plant, np.random.default_rng(0), 0.01 * np.arange(95)
+    truth, data = am.physics.PressureDriven(plant.muscles, plant.mechanism, (0.03, 0.03)), io.BytesIO()
+    with zipfile.ZipFile(data, "w") as archive:
+        for number in range(24):
+            levels = rng.uniform(1e5, 4e5, (2, 12))
+            signal = {f"{p}measured_pressure": list(zip(np.linspace(0, 0.94, 12), row, strict=True))
+                      for p, row in zip(truth.prefixes, levels, strict=True)}  # fmt: skip
+            start = dict.fromkeys((s.name for s in truth.states), 0.0)
+            start |= {f"{p}pressure": level for p, level in zip(truth.prefixes, levels[:, 0], strict=True)}
+            run = am.simulate(
+                truth, am.SampledSignal(signal), duration=0.95, initial_state=start, output_times=rows,
+                integrator=am.RungeKutta4(1e-3),
+            )  # fmt: skip
+            at = np.searchsorted(run["time"], rows - 1e-9)
+            angle = np.degrees(run["angle"][at]) + 0.03 * rng.standard_normal(95)
+            columns = (angle, *(run[name][at] / 1e3 for name in signal))
+            lines = [",".join(f"{v:.6g}" for v in row) for row in zip(*columns, strict=True)]
+            archive.writestr(f"{number:02d}.csv", "\n".join(["angle,p1,p2", *lines]))
+    return data.getvalue()
+
+
+def save_arm(page: Any) -> None:
+    """Write the figure of the tab Fit with the episodes of an arm."""
+    file = {"name": "episodes.zip", "mimeType": "application/zip", "buffer": episodes()}
+    page.get_by_label("Measurement files").set_input_files(file)
+    page.wait_for_selector("#panel-fit[data-read='1']")
+    page.get_by_role("button", name="Identify the arm").click()
+    page.wait_for_selector("#panel-fit[data-task=done]", timeout=1_200_000)
+    page.evaluate("scrollTo(0, 0)")
+    page.wait_for_timeout(300)
+    save(page, "arm")
+
+
 def main(address: str) -> None:
     """Write the figures of the tabs, in light, dark and on a phone."""
     from playwright.sync_api import sync_playwright
@@ -85,6 +126,7 @@ def main(address: str) -> None:
         page.wait_for_timeout(300)
         save(page, "muscle")
         save_fit(opened(browser, address, "Fit", "ready", viewport={"width": 1200, "height": 1250}))
+        save_arm(opened(browser, address, "Fit", "ready", viewport={"width": 1200, "height": 1400}))
         page = opened(browser, address, "Plant", "lift-dmsp-20", color_scheme="dark", **wide)
         page.get_by_label("Plant of the library").select_option("joint-dmsp-20-proportional")
         page.wait_for_selector('#panel-plant[data-shown="joint-dmsp-20-proportional"]')
