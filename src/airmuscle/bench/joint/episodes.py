@@ -1,16 +1,12 @@
 """Episodes: short records of an arm, each with its own initial state, in SI units; and their windows."""
 
-from __future__ import annotations
-
 import dataclasses
 import functools
 from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ...core.arrays import Array
-from ...core.errors import IdentificationError, ParameterError
-from ...core.short_repr import ShortRepr
+from ...core import Array, IdentificationError, ParameterError, ShortRepr
 from ...engine import InputSignal, PiecewiseLinear
 from ...physics import PressureDriven, WithStickSlip
 
@@ -59,7 +55,7 @@ class Episodes:
     def __len__(self) -> int:
         return len(self.runs)
 
-    def __getitem__(self, part: slice) -> Episodes:
+    def __getitem__(self, part: slice) -> "Episodes":
         return dataclasses.replace(self, runs=self.runs[part])
 
     @property
@@ -152,7 +148,7 @@ class Windows:
         pieces = [w * padded[:, i : i + count] for i, w in enumerate(weights)]
         return np.asarray(np.sum(pieces, axis=0))
 
-    def part(self, which: Sequence[int] | Array, rows: int | None = None) -> Windows:
+    def part(self, which: Sequence[int] | Array, rows: int | None = None) -> "Windows":
         """Some of the windows, with the first `rows` rows of their predictions."""
         end = None if rows is None else HISTORY + 1 + rows
         columns = {n: getattr(self, n)[which][:, :end] for n in ("angle", "speed", "rate", "pressure")}

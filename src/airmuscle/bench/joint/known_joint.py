@@ -5,9 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ...core import ParameterError, StateVariable, System, Value, Values, suggestion, tree
-from ...core.arrays import Array
-from ...core.declaration import model, parameter
+from ...core import Array, ParameterError, StateVariable, System, Value, Values, model, parameter, suggestion, tree
 from ...engine import WithSensitivities, sensitivity
 from ...physics import PressureDriven
 from .descent import CLIP, OUTLIER, over, with_values

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 import typer
 
 from ...core import Reference, reference
-from ...files.library import UNITS, load
+from ...files.library import UNITS, load, model_class
 from ...files.library import evaluate as evaluate_entry
 from ...files.library.files import (  # fmt: skip
     DATA,
@@ -23,7 +23,6 @@ from ...files.library.files import (  # fmt: skip
     list_products,
     list_valves,
 )
-from ...files.library.models import model_class
 from ...physics.muscle.characteristic import ForceLaw
 from ...physics.muscle.isobar_plot import describe_point, isobar_table
 from ...report.write import rendered_figure, save_table
