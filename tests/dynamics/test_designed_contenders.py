@@ -87,11 +87,17 @@ def test_the_sum_of_both_commands_keeps_its_range(name: str):
 
 @pytest.mark.parametrize("name", [LQG, MPC, ADRC])
 def test_a_disturbance_leaves_no_offset_and_the_pressures_keep_their_limits(name: str):
-    """A torque that the model does not know, and a step that saturates the command."""
+    """A torque that the model does not know, and a step that saturates the command.
+
+    With its present gains, LQG oscillates about the angle by 0.4 degrees on truth 11, but on no truth from 1 to 6.
+    """
     law, truth = complete(JOINT, CONTENDERS[name]).law, JOINT.truths[0]
     pushed = ControlTask("pushed", StepMotion(0.0, 0.1), 1.5, begin=1.2, torque=((0.0, 0.0), (0.2, 0.0), (0.21, -1.0)))
-    run = run_task(JOINT, truth, law, pushed)
-    assert run.metrics.rmse < 0.25
+    found = run_task(JOINT, truth, law, pushed).recording
+    assert abs(math.degrees(np.mean(found["angle"][found["time"] > 1.2]))) < 0.05
+    other = proportional_joint((2,))
+    contender = next(each for each in standard_contenders(other) if each.name == name)
+    assert run_task(other, other.truths[0], complete(other, contender).law, pushed).metrics.rmse < 0.05
     stepped = run_task(JOINT, truth, law, ControlTask("step", StepMotion(math.radians(40.0), 0.1), 0.6))
     for column in JOINT.pressures:
         pressure = stepped.recording[column]
