@@ -86,3 +86,16 @@ pressure = [["0 s", "1 bar"], ["0.1 s", "2 bar"]]
 duration = "0.3 s"
 initial_state = {{ pressure = "1 bar" }}
 """
+
+HELD_STUDY = """
+scenario = "scenario.toml"
+chunk_size = 4
+[vary]
+"mechanism.contraction" = { model = "Uniform", low = "2 %", high = "10 %" }
+[design]
+model = "MonteCarlo"
+count = 48
+[metrics]
+pressure = { model = "Final", column = "pressure" }
+"""
+"""A study of the scenario HELD_FILL in scenario.toml."""

@@ -142,7 +142,7 @@ def test_the_command_inspects_and_fits(tmp_path):
     )
     names = [str(tmp_path / "all.npz"), "--mapping", str(tmp_path / "arm.toml")]
     shown = airmuscle("fit-joint", *names, "--inspect").output
-    assert "12 episodes of 95 to 95 rows at 100 Hz" in shown
+    assert "12 episodes of 95 rows at 100 Hz" in shown
     shown = airmuscle("fit-joint", *names, "--out", tmp_path / "out", "--left-out", "0.25", "--horizon", "12").output
     assert "free run over 0.12 s on 3 episodes left out" in " ".join(shown.split())
     assert (tmp_path / "out" / "report.html").exists()

@@ -9,22 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import airmuscle
-from scenario_files import HELD_FILL, MUSCLE_FILE, PRESSURE_LOOP
+from scenario_files import HELD_FILL, HELD_STUDY, MUSCLE_FILE, PRESSURE_LOOP
 
 from airmuscle import Recording, load, load_data
 from airmuscle.bench import write
 
-STUDY = """
-scenario = "scenario.toml"
-chunk_size = 4
-[vary]
-"mechanism.contraction" = { model = "Uniform", low = "2 %", high = "10 %" }
-[design]
-model = "MonteCarlo"
-count = 12
-[metrics]
-pressure = { model = "Final", column = "pressure" }
-"""
 COMMANDS = {
     "compare": ("fit", "map.csv", "--compare", "--characteristic", "Sarosi2012", "--characteristic", "Hunt2017"),
     "study": ("study", "study.toml"),
@@ -49,7 +38,12 @@ def cluster() -> Iterator[str]:
 @pytest.fixture
 def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The input of all commands: a force map, a loop, a scenario with a controller and a study."""
-    contents = {"muscle": MUSCLE_FILE, "scenario": HELD_FILL, "loop": PRESSURE_LOOP, "study": STUDY}
+    contents = {
+        "muscle": MUSCLE_FILE,
+        "scenario": HELD_FILL,
+        "loop": PRESSURE_LOOP,
+        "study": HELD_STUDY.replace("48", "12"),
+    }
     for name, content in contents.items():
         (tmp_path / f"{name}.toml").write_text(content, encoding="utf-8")
     write(load_data("dmsp-20-300"), tmp_path / "map.csv")

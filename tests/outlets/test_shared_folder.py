@@ -18,7 +18,7 @@ from pathlib import Path
 import pytest
 from command_line import airmuscle
 from scenario_files import HELD_FILL as SCENARIO
-from scenario_files import MUSCLE_FILE, PRESSURE_LOOP
+from scenario_files import HELD_STUDY, MUSCLE_FILE, PRESSURE_LOOP
 
 from airmuscle import load_data
 from airmuscle.bench import write
@@ -29,22 +29,10 @@ from airmuscle.engine.processes import check_running
 from airmuscle.errors import AirmuscleError, FileError, InputError
 from airmuscle.units import display
 
-STUDY = """
-scenario = "scenario.toml"
-chunk_size = 4
-[vary]
-"mechanism.contraction" = { model = "Uniform", low = "2 %", high = "10 %" }
-[design]
-model = "MonteCarlo"
-count = 48
-[metrics]
-pressure = { model = "Final", column = "pressure" }
-"""
-
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
-    for name, content in (("muscle", MUSCLE_FILE), ("scenario", SCENARIO), ("study", STUDY)):
+    for name, content in (("muscle", MUSCLE_FILE), ("scenario", SCENARIO), ("study", HELD_STUDY)):
         (tmp_path / f"{name}.toml").write_text(content, encoding="utf-8")
     return tmp_path
 

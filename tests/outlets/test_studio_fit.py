@@ -725,7 +725,7 @@ def test_an_archive_of_episodes_is_read_by_the_mapping_that_is_proposed(app, fol
     assert sheet["ready"], sheet["problems"]
     assert 'columns = ["pressure1", "pressure2"]\nscale = "1 kPa"' in sheet["mapping"]
     text = " ".join(sheet["lines"])
-    assert text.startswith("20 episodes of 95 to 95 rows at 100")
+    assert text.startswith("20 episodes of 95 rows at 100")
     assert "pressure 1 raises angle 1 (t = " in text
 
 

@@ -76,10 +76,10 @@ class EpisodeInspection:
     def __str__(self) -> str:
         e = self.episodes
         lengths = [len(run) for run in e.runs]
-        total = sum(lengths) * e.sample_time
+        total, rows = sum(lengths) * e.sample_time, " to ".join(dict.fromkeys(map(str, (min(lengths), max(lengths)))))
         lines = [
-            f"{len(e)} episodes of {min(lengths)} to {max(lengths)} rows at {1 / e.sample_time:.4g} Hz, {total:.4g} s; "
-            f"{e.joints} joints, {e.muscles} pressures that lag the motion by {self.delay} rows",
+            f"{len(e)} episodes of {rows} rows at {1 / e.sample_time:.4g} Hz, {total:.4g} s; "
+            f"{e.joints} joint{'s' * (e.joints > 1)}, {e.muscles} pressures that lag the motion by {self.delay} rows",
             *e.notes,
             *(_range_line(f"angle {i}", np.degrees(x), "deg") for i, x in enumerate(e.rows("angle").T, 1)),
             *(_range_line(f"pressure {i}", x / 1e3, "kPa") for i, x in enumerate(e.rows("pressure").T, 1)),
