@@ -79,11 +79,10 @@ def study_fingerprint(study: Study) -> str:
     return fingerprint(program_fingerprint(), study.fingerprint(), study.values)
 
 
-def chunk_file_name(study: Study, index: int) -> str:
-    """The name of the file of a chunk."""
-    runs = study.chunk_runs(index)
-    values = study.values[runs.start : runs.stop]
-    return f"{fingerprint(program_fingerprint(), study.fingerprint(), values)}.npz"
+def chunk_file_names(study: Study) -> list[str]:
+    """The names of the files of all chunks."""
+    common, runs = (program_fingerprint(), study.fingerprint()), map(study.chunk_runs, study.chunks)
+    return [f"{fingerprint(*common, study.values[each.start : each.stop])}.npz" for each in runs]
 
 
 def register_study(study: Study) -> str:
@@ -190,25 +189,28 @@ def run_study(
             f"{chunk_folder}: cannot be created ({error.strerror or error}). Choose a folder with write permission."
         ) from None
     nominal = _nominal_values(study)  # before the workers start, so that kernels are compiled only once
-    files = [chunk_folder / chunk_file_name(study, index) for index in study.chunks]
-    missing = [index for index in study.chunks if read_chunk(files[index]) is None]
+    files = [chunk_folder / name for name in chunk_file_names(study)]
+    chunks = {index: chunk for index, file in enumerate(files) if (chunk := read_chunk(file))}
+    missing = [index for index in study.chunks if index not in chunks]
     done = len(study) - sum(len(study.chunk_runs(index)) for index in missing)
     report = progress or (lambda done, total: None)
     report(done, len(study))
     for index, chunk in _compute_missing(study, missing, executor):
-        write_chunk(chunk, files[index])
+        chunks[index] = chunk
+        if read_chunk(files[index]) is None:  # else a process that shares both folders has written it
+            write_chunk(chunk, files[index])
         done += len(study.chunk_runs(index))
         report(done, len(study))
     for leftover in chunk_folder.glob(".*.part"):  # of studies that were killed
         leftover.unlink(missing_ok=True)
-    return _combine(study, [_read_finished(file) for file in files], nominal)
+    return _combine(study, [chunks[index] for index in study.chunks], nominal)
 
 
 def count_finished_runs(study: Study, folder: Path | str) -> int:
     """The number of runs of a study that are saved in `folder`/chunks."""
     chunk_folder = Path(folder) / CHUNK_FOLDER
-    files = {index: chunk_folder / chunk_file_name(study, index) for index in study.chunks}
-    return sum(len(study.chunk_runs(index)) for index, file in files.items() if read_chunk(file) is not None)
+    files = enumerate(chunk_file_names(study))
+    return sum(len(study.chunk_runs(index)) for index, name in files if read_chunk(chunk_folder / name) is not None)
 
 
 def _compute_missing(study: Study, missing: Sequence[int], executor: Executor | None) -> Iterator[tuple[int, Chunk]]:
@@ -216,16 +218,6 @@ def _compute_missing(study: Study, missing: Sequence[int], executor: Executor | 
     study_file = str(study.path.resolve()), register_study(study)
     for place, chunk in DistributedCalls(executor, run_chunk, study_file).completed(missing):
         yield missing[place], chunk
-
-
-def _read_finished(file: Path) -> Chunk:
-    chunk = read_chunk(file)
-    if chunk is None:
-        raise FileError(
-            f"{file}: was deleted or damaged while the study was running. Run the same command again to compute the "
-            "missing runs."
-        )
-    return chunk
 
 
 def _nominal_values(study: Study) -> dict[str, float]:
