@@ -23,7 +23,7 @@ FILES = sorted(SOURCE.rglob("*.py"))
 PACKAGES = sorted(path.parent for path in SOURCE.rglob("__init__.py"))
 PHYSICS = re.compile(r"(?<![a-z])(muscle|pressure|valve|gas|contraction|force)(s|es)?(?![a-z])", re.IGNORECASE)
 # May be imported by other laws: the base, the solver, the validity range, the rubber of a wall.
-SHARED_LAWS = {"data_scales", "base", "solve", "validity_range", "rubber"}
+SHARED_LAWS = {"base", "solve", "validity_range", "rubber"}
 # Laws made of other laws, and the package itself.
 COMPOSITES = {"__init__", "scaled", "tangent", "polynomial_surrogate"}
 

@@ -11,6 +11,7 @@ from widths import widened
 
 from airmuscle import Status, load
 from airmuscle.core import Columns, DiagnosticCode
+from airmuscle.core.system import state_vector
 from airmuscle.engine import (
     PiecewiseLinear,
     Problem,
@@ -24,7 +25,6 @@ from airmuscle.engine import (
 )
 from airmuscle.engine.compile import compile_system
 from airmuscle.engine.run import bound_integrator
-from airmuscle.engine.state import state_vector
 from airmuscle.errors import AirmuscleError, SimulationError
 from airmuscle.physics import (
     EnergyBalance,

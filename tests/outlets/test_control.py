@@ -470,7 +470,7 @@ def test_a_study_varies_the_numbers_of_a_controller(tmp_path: Path):
 
 def test_a_fingerprint_leaves_out_rooms_that_exist_and_no_controllers():
     """A study depends on the program of its controllers, the stages of a campaign on none."""
-    from airmuscle.core.fingerprint import EXCLUDED_ROOMS
+    from airmuscle.core.tree import EXCLUDED_ROOMS
     from airmuscle.outlets.cli.campaign import OMITTED_ROOMS
 
     rooms = {path.parent.name for path in Path(am.__file__).parent.glob("*/__init__.py")}

@@ -30,7 +30,7 @@ from command_line import airmuscle
 from scenario_files import HELD_FILL as SCENARIO
 from scenario_files import MUSCLE_FILE
 
-from airmuscle.core import fingerprint
+from airmuscle.core import tree
 from airmuscle.design import dask_cluster, load_study, process_pool, run_study
 from airmuscle.design.study import DESIGNS, METRICS, VARIATIONS, chunk, study_chapter, write_study
 from airmuscle.engine import simulate, solve
@@ -402,13 +402,13 @@ def test_a_chunk_is_computed_again_if_something_it_depends_on_changes(folder, mo
 
 def test_another_program_version_computes_all_chunks_again(folder: Path, monkeypatch: pytest.MonkeyPatch):
     run(folder)
-    monkeypatch.setattr(fingerprint.metadata, "version", lambda name: "another")
-    fingerprint.program_fingerprint.cache_clear()
+    monkeypatch.setattr(tree.metadata, "version", lambda name: "another")
+    tree.program_fingerprint.cache_clear()
     try:
         before = {p.name for p in (folder / "out" / "chunks").glob("*.npz")}
         assert not before & set(chunk.chunk_file_names(load_study(folder / "study.toml")))
     finally:
-        fingerprint.program_fingerprint.cache_clear()
+        tree.program_fingerprint.cache_clear()
 
 
 def test_a_damaged_chunk_is_computed_again(folder: Path, monkeypatch: pytest.MonkeyPatch):

@@ -93,7 +93,6 @@ from .errors import UnknownNameError as UnknownNameError
 from .errors import listed as listed
 from .errors import quotable as quotable
 from .errors import suggestion as suggestion
-from .fingerprint import program_fingerprint as program_fingerprint
 from .ops import Value as Value
 from .ops import Values as Values
 from .ops import pi as pi
@@ -118,6 +117,7 @@ from .system import add_prefix as add_prefix
 from .system import select_prefix as select_prefix
 from .system import united as united
 from .system import with_prefix as with_prefix
+from .tree import program_fingerprint as program_fingerprint
 from .tree import with_ambient as with_ambient
 from .units import AMBIENT_PRESSURE as AMBIENT_PRESSURE
 from .units import UnitConversion as UnitConversion

@@ -9,8 +9,7 @@ import numpy as np
 
 from ..core import Array, Reference, check_field_types, conversion, one_line
 from ..core.errors import AirmuscleError, ColumnError, HintedText, ParameterError, listed, suggestion
-from .columns import ZERO_NOT_STATED, display_scale, quantity_of
-from .heading import split_unit
+from .columns import ZERO_NOT_STATED, display_scale, quantity_of, split_unit
 from .notebook import Card, NotebookDisplay
 from .plot import plot_columns
 

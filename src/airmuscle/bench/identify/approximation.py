@@ -10,7 +10,7 @@ from ...core import Array, IdentificationError, SolveError, contraction_text, qu
 from ...physics.muscle.characteristic import Characteristic, ValidityRange
 from ...recording import Recording
 from ...report.chapter import Chapter, NamedValue, Table, TableColumn
-from ...report.parameters import parameter_table
+from ...report.shown import parameter_table
 from ..reported import Reported
 from .static_fit import fit
 from .weighting import UNCENSORED

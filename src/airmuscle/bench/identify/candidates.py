@@ -12,7 +12,7 @@ from ...core import Array, HintedText, IdentificationError, ShortRepr, SolveErro
 from ...physics.muscle import characteristic
 from ...physics.muscle.characteristic import Characteristic, ContractileSurface, LogarithmicLength, PooledLengthLaw
 from ...physics.muscle.characteristic.base import ContractionLaw, ForceLaw
-from ...physics.muscle.characteristic.data_scales import DataScales
+from ...physics.muscle.characteristic.validity_range import DataScales
 from ...recording import Recording
 
 FORCE_GRID_POINTS = 801

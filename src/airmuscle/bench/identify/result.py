@@ -12,7 +12,7 @@ from ...core import Array, ParameterError, contraction_text, quantity_text, sugg
 from ...physics.muscle.characteristic import Characteristic, ValidityRange
 from ...recording import Recording
 from ...report.chapter import Chapter, NamedValue, Plot, Table
-from ...report.parameters import estimate_table
+from ...report.shown import estimate_table
 from ..reported import Reported
 from .data_checks import Remarks, Scatter
 from .parameter_covariance import ParameterCovariance

@@ -17,7 +17,7 @@ from ...report.chapter import BY_ROW, Chapter, DisplayedEquation, NamedValue, Pl
 from ...report.equation import LawEquation, law_equation
 from ...report.equation.source_code import REMARKS, displayed_lines, source_codes
 from ...report.formatting import format_number
-from ...report.parameters import parameter_table
+from ...report.shown import parameter_table
 from . import Fit
 from .cross_validation import is_pressure_ramp, levels_of
 from .curve_plots import band_plot, ramp_plot

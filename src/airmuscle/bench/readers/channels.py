@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core import Array, ColumnError
-from ...recording.heading import find_quantity_name, split_unit
+from ...recording.columns import find_quantity_name, split_unit
 
 Cells = npt.NDArray[np.float64] | list[str]
 """A column: numbers if the reader found only numbers, otherwise texts."""

@@ -10,8 +10,7 @@ from typing import Any, TextIO
 import numpy as np
 
 from ...core import AMBIENT_PRESSURE, ColumnError, FileError, ParameterError, UnitConversion, abridged
-from ...recording.columns import displacement_columns
-from ...recording.heading import find_quantity_name
+from ...recording.columns import displacement_columns, find_quantity_name
 from .channels import RawTable
 from .header import is_number
 from .interpret import interpret, resolve_headings, unit_conversion

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from ...core import ColumnError, Hint, UnitError, conversion
-from ...recording.heading import parse_heading
+from ...recording.columns import parse_heading
 from .constants import CONSTANT_UNITS, parse_constant_name
 
 COMMA_NUMBER = re.compile(r"[-+]?\d*,\d+(?:[eE][-+]?\d+)?")

@@ -11,8 +11,15 @@ import numpy as np
 
 from ...core import Array, ColumnError, Hint, HintedText, UnitError, listed, suggestion
 from ...core.units import AMBIENT_PRESSURE, STANDARD_GRAVITY, UnitConversion, conversion, quantity
-from ...recording.columns import QUANTITIES, displacement_columns, proposal
-from ...recording.heading import UNIT_SPELLINGS, Heading, find_quantity_name, parse_heading
+from ...recording.columns import (
+    QUANTITIES,
+    UNIT_SPELLINGS,
+    Heading,
+    displacement_columns,
+    find_quantity_name,
+    parse_heading,
+    proposal,
+)
 from ...recording.recording import Recording
 from .channels import Cells, RawTable
 from .constants import check_constants, collect_constants, constant_from_column, label_texts, parse_constant_name

@@ -31,8 +31,7 @@ from pathlib import Path
 from typing import Any
 
 from ...core import AirmuscleError, ColumnError, ParameterError, abridged, check_field_types, listed, suggestion
-from ...recording.columns import QUANTITIES
-from ...recording.heading import parse_heading
+from ...recording.columns import QUANTITIES, parse_heading
 from .channels import RawTable
 from .constants import SPECIMEN, parse_constant_name
 from .file_kind import read_toml

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core import Array, ColumnError, Hint, HintedText, check_field_types, one_line
-from ...recording.heading import Heading
+from ...recording.columns import Heading
 from ...recording.recording import RowNote, list_rows
 from .channels import Cells, RawTable
 from .constants import parse_constant_name

@@ -11,8 +11,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from ...core import STANDARD_GRAVITY, AirmuscleWarning, Array, ColumnError, Hint, HintedText, UnitError, conversion
-from ...recording.columns import quantity_of
-from ...recording.heading import Heading
+from ...recording.columns import Heading, quantity_of
 from ...recording.recording import Recording
 from ..checks.contractions import code_of
 from .channels import Cells, RawTable

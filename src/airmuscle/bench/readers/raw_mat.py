@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ...core import ColumnError, FileError, Hint, suggestion
-from ...recording.heading import parse_heading
+from ...recording.columns import parse_heading
 from .channels import Channel, RawTable, merge_channels
 from .downsampling import Decimation, Downsampling, Reduction, with_reduction
 from .mat_contents import is_plain_hdf5, read_contents

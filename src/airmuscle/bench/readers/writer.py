@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...core import AirmuscleError, FileError, ParameterError, abridged, atomic_file, one_line
-from ...recording.heading import split_unit
+from ...recording.columns import split_unit
 from ...recording.recording import Recording, column_heading
 from .channels import Cells, RawTable, to_cells
 from .constants import CONSTANT_UNITS

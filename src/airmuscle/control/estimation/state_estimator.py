@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from ...core import Array, ParameterError, ShortRepr, SolveError, Status, System, check_field_types, tree
+from ...core.system import check_system, state_vector
 from ...engine.compile.cache.kernel import evaluate
 from ...engine.compile.function import AugmentedRates, augmented_rates, states_and_outputs
 from ...engine.compile.program import CompiledSystem, compile_system
 from ...engine.loop.control_loop import COMMAND
-from ...engine.state import check_system, state_vector
 from ...recording.recording import Recording
 from .estimates import BoundFilter, FilterArrays, Innovation, MeasuredRows, Pass, StateEstimate
 from .riccati import DISTURBANCE, check_known

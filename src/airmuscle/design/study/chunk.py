@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core import AirmuscleError, Array, FileError, SimulationError, atomic_file, check_writable, program_fingerprint
-from ...core.fingerprint import fingerprint
+from ...core.tree import fingerprint
 from ...engine.distribution import DistributedCalls
 from ...engine.processes import check_running
 from ...engine.run import Problem, solve

@@ -26,7 +26,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core import ParameterError, ShortRepr, abridged, ambient_pressure, suggestion
-from ...core.fingerprint import fingerprint
+from ...core.tree import fingerprint
 from ...files.library import Location, TableReader, check_keys, located_errors, read_text, read_toml
 from ...files.scenario.scenario import Scenario, build_scenario, load_scenario, run_column_units
 from .design import DESIGNS, Design

@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 
 from ...core import Array, Diagnostic, DiagnosticCode, Status, tree
+from ...recording.columns import column_units
 from ..loop import COMMAND, MEASURED, SETPOINT, ControlLaw, ControlLoop, ControlLoopState, PiecewiseLinear, Schedule
-from ..state import column_units
 from .bound_integrator import RawSolution
 from .compiled_law import parameters_of
 from .compiled_loop import CompiledLoop, CompiledRun

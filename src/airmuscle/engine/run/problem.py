@@ -10,10 +10,10 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core import FEW, NUMBERS, Array, ParameterError, Reference, ShortRepr, System, as_float, cite
+from ...core.system import check_system, state_vector
 from ..compile.program import CompiledSystem, compile_system
 from ..loop import InputSignal, PiecewiseLinear, Schedule, WithDrivers, check_input_signal
 from ..loop.control_loop import ControlLoop, ControlLoopState, designed_loop
-from ..state import check_system, state_vector
 from .integrators import Integrator, default_integrator
 from .output_times import output_times
 

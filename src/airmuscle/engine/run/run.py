@@ -8,10 +8,10 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core import NUMBERS, ParameterError, SimulationError, Status, System, as_float, one_line
+from ...core.system import check_system, state_vector
 from ...recording import Recording
 from ..compile.program import CompiledSystem, compile_system
 from ..loop import ControlLoop, InputSignal, PiecewiseLinear, Schedule
-from ..state import check_system, state_vector
 from .bound_integrator import INTERRUPT_CHECK_STEPS, BoundIntegrator, RawSolution
 from .closed_loop import solve_closed_loop
 from .integrators import Integrator, default_integrator

@@ -6,11 +6,11 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ...core import Diagnostic, Reference, SimulationError, Status
 from ...recording import Recording
+from ...recording.columns import column_units
 from ...recording.notebook import Card, NotebookDisplay
 from ...recording.plot import plot_columns
 from ...recording.recording import recording_card
 from ..loop.control_loop import ControlLoopState
-from ..state import column_units
 from .problem import Problem
 
 if TYPE_CHECKING:

@@ -10,9 +10,9 @@ import numpy.typing as npt
 
 from ...core import Array, ColumnLimit, DiagnosticCode, Status, System, one_line, tree
 from ...core.errors import ParameterError, SimulationError, suggestion
+from ...core.system import check_system, state_vector
 from ..compile.cache.kernel import begin_step, end_step
 from ..compile.program import CompiledSystem, compile_system
-from ..state import check_system, state_vector
 from .integrators import Integrator, default_integrator
 from .problem import LARGEST, check_inputs, default_state, initial_vector
 

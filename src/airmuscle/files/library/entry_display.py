@@ -12,7 +12,7 @@ from ...core.plotting import LINES, new_figure, relabel_in_display_units
 from ...physics.muscle import Ratings
 from ...physics.muscle.isobar_plot import plot_isobars
 from ...report.chapter import BY_ROW, Chapter, NamedValue, Plot, Table, TableColumn
-from ...report.parameters import leaf_table
+from ...report.shown import leaf_table
 
 PROVENANCES = (
     "printed", "corrected", "converted", "measured", "data sheet", "secondary source", "fitted", "chosen", "example",

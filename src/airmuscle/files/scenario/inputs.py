@@ -18,7 +18,7 @@ from ...bench.readers import read_csv
 from ...core import ColumnError, Input, ParameterError, abridged
 from ...engine.loop import Driver, SampledSignal, WithDrivers
 from ...engine.loop.inputs import NO_INPUT, InputSignal, Periodic, Schedule, check_input_names
-from ...recording.heading import split_unit
+from ...recording.columns import split_unit
 from ..library import PLANT_READER, Location, custom_field, located_errors, model_class, read_finite_number
 from .values import Number
 

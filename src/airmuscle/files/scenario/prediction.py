@@ -34,7 +34,7 @@ from ...engine.run import Integrator
 from ...physics.muscle.characteristic.base import ForceLaw
 from ...physics.muscle.muscle import LENGTH_TOLERANCE
 from ...recording import Recording
-from ...recording.heading import split_unit
+from ...recording.columns import split_unit
 from ..library import Entry, is_path, list_plants, plant_tables, read_toml, scale_to_length
 from ..library.location import Location, check_keys, located_errors
 from .identification import Record, build_records, with_observed

@@ -22,7 +22,7 @@ from ...bench.readers import ColumnMapping
 from ...bench.readers.reader import complete_bench, find_files, read_file
 from ...core import atomic_file, atomic_folder, check_writable, program_fingerprint
 from ...core.errors import AirmuscleError, ColumnError, FileError, IdentificationError
-from ...core.fingerprint import fingerprint
+from ...core.tree import fingerprint
 from ...engine.compile.cache.store import cache_folder, read_private
 from ...files.library import Entry, campaign_entry, resting_lengths, to_toml
 from ...files.scenario.campaign import RecordScenario, campaign_scenarios

@@ -12,7 +12,7 @@ from ...engine.compile.text.programs import CLanguage
 from ...engine.loop import MEASURED, SETPOINT, ControlLoop, Schedule, named_signal_units
 from ...engine.run import Problem, solve
 from ...engine.run.sampled_loop import SampledLoop, prepare_loop
-from ...engine.state import column_units
+from ...recording.columns import column_units
 from .compiler import Platform
 from .fmi_description import FmuDescription, FmuExperiment, xml_text
 from .fmi_package import FmuPackage, WrittenFmu, archive, check_target, token_of

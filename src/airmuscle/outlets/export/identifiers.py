@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ...core import ParameterError, abridged, cite, leaves, printable
-from ...core.fingerprint import fingerprint
+from ...core.tree import fingerprint
 from ...engine.compile.text.programs import CBody
 
 LONGEST = 48

@@ -11,8 +11,7 @@ from ...engine.compile.functions import ArraySizes, Extension, TracedSystem, imp
 from ...engine.compile.ir.emission import TargetLanguage
 from ...engine.compile.program import CompiledSystem
 from ...engine.compile.text.body import Label, Labels
-from ...engine.state import column_units
-from ...recording.columns import quantity_of
+from ...recording.columns import column_units, quantity_of
 from .identifiers import make_identifiers
 
 

@@ -10,7 +10,7 @@ from xml.etree import ElementTree as ET
 
 from ...core import STANDARD_GRAVITY, ParameterError, atomic_folder
 from ...physics.mechanism import AntagonisticJoint, Mechanism, MuscleRoute, PlanarArm, SerialArm
-from ...physics.mechanism.pulley_profile import ConstantRadius
+from ...physics.mechanism.antagonistic_joint import ConstantRadius
 from ...physics.plant import Plant
 from .identifiers import provenance
 from .mujoco_plugin import REST_LENGTH, MuscleActuator, write_mujoco_plugin

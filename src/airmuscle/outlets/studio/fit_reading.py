@@ -15,7 +15,7 @@ from ...bench.readers.mapping import apply_mapping
 from ...bench.readers.reader import check_bench, read_tables
 from ...bench.segment import Outlier, check_contents, find_bench_outliers
 from ...core import AMBIENT_PRESSURE, AirmuscleError, AirmuscleWarning, ColumnError, quantity
-from ...recording.heading import Heading, parse_heading
+from ...recording.columns import Heading, parse_heading
 from ..requests.declaration import RequestError
 from .fit_hints import as_field_error, in_page_words
 from .fit_settings import FitSettings

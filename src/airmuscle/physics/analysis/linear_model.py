@@ -9,9 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core import Array, ParameterError, System, suggestion
+from ...core.system import check_system, state_vector
 from ...engine.compile.jacobians import derivatives
 from ...engine.compile.program import CompiledSystem, compile_system
-from ...engine.state import check_system, column_units, state_vector
+from ...recording.columns import column_units
 from ..equilibrium import complete_inputs
 from ..plant.plant import Plant
 from .sampled_model import (

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from ...core import ShortRepr, Value, Values, autodiff
-from ...engine.state import state_vector
+from ...core.system import state_vector
 from ..muscle import ElasticSeriesElement, Muscle
 from ..plant.muscle_state import MuscleState
 from ..plant.plant import Plant

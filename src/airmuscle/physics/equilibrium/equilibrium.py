@@ -13,8 +13,7 @@ from ...engine.loop.inputs import check_input_names
 from .multi_dof import equilibria_of_several_coordinates
 from .single_dof import GRID_POINTS, equilibria_of_one_coordinate, grid
 from .stability import are_stable, no_equilibrium
-from .static_plant import StaticPlant
-from .statics import Rows, Statics
+from .statics import Rows, StaticPlant, Statics
 
 MuscleValues: TypeAlias = float | str | Sequence[float | str] | None
 """One number for all muscles, or one for each; None where the other quantity is given."""

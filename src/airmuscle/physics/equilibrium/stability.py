@@ -10,8 +10,7 @@ from ...core import Array, EquilibriumError, GeometryLimitError, PhysicsError
 from ...engine.compile.program import CompiledSystem, Program
 from .multi_dof import starts
 from .single_dof import grid
-from .static_plant import MAX_PRESSURE, StaticPlant
-from .statics import Statics
+from .statics import MAX_PRESSURE, StaticPlant, Statics
 
 MARGIN = 1e-9
 """Real part of an eigenvalue, relative to the largest eigenvalue, up to which it counts as zero (chosen)."""

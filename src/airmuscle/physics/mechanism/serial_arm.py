@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 from ...core import STANDARD_GRAVITY, ParameterError, Value, Values, model, ops, parameter
-from .arm import Arm, Matrix, MuscleRoute, solve_positive_definite
+from .planar_arm import Arm, Matrix, MuscleRoute, solve_positive_definite
 
 Vector = tuple[Value, Value, Value]
 AXES = {(1, 0, 0), (0, 1, 0), (0, 0, 1), (-1, 0, 0), (0, -1, 0), (0, 0, -1)}

@@ -17,8 +17,12 @@ from .passive_elements import LinearDamper as LinearDamper
 from .passive_elements import LinearSpring as LinearSpring
 from .passive_elements import NoStop as NoStop
 from .passive_elements import PressureDamper as PressureDamper
+from .passive_elements import RigidWall as RigidWall
 from .passive_elements import Spring as Spring
 from .passive_elements import Stop as Stop
+from .passive_elements import SwellingWall as SwellingWall
+from .passive_elements import ViscoelasticWall as ViscoelasticWall
+from .passive_elements import Wall as Wall
 from .ratings import RatedRange as RatedRange
 from .ratings import Ratings as Ratings
 from .series import CubicSeriesSpring as CubicSeriesSpring
@@ -26,7 +30,3 @@ from .series import ElasticSeriesElement as ElasticSeriesElement
 from .series import RigidSeriesElement as RigidSeriesElement
 from .series import SeriesElement as SeriesElement
 from .series import SeriesSpring as SeriesSpring
-from .wall import RigidWall as RigidWall
-from .wall import SwellingWall as SwellingWall
-from .wall import ViscoelasticWall as ViscoelasticWall
-from .wall import Wall as Wall

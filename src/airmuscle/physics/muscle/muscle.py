@@ -11,11 +11,10 @@ from .characteristic import HOSOVSKY_HILL, Characteristic, Clamped, ForceLaw, Va
 from .friction.base import Friction, NoFriction
 from .geometry.base import Geometry
 from .isobar_plot import component_rows, plot_isobars
-from .passive_elements import CreepElements, Damper, LinearDamper, LinearSpring, NoStop, Spring, Stop
+from .passive_elements import CreepElements, Damper, LinearDamper, LinearSpring, NoStop, RigidWall, Spring, Stop, Wall
 from .quantity_arguments import accept_quantities_in
 from .ratings import Ratings
 from .series import ElasticSeriesElement, RigidSeriesElement, SeriesElement, solve_inner_contraction, without_derivative
-from .wall import RigidWall, Wall
 
 RELAXED: Values = MappingProxyType({})
 """Relaxed state of a muscle: every state that is not given is 0."""

@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 from ...core import ColumnLimit, Columns, Diagnostic, DiagnosticCode, GeometryLimitError, Value, Values, model
 from ...core.system import Input, StateVariable, add_prefix, select_prefix, with_prefix
 from ..equilibrium.equilibrium import equilibria_at_ambient_pressure, equilibrium_at_ambient_pressure
-from ..equilibrium.static_plant import StaticPlant
+from ..equilibrium.statics import StaticPlant
 from ..mechanism import Mechanism
 from ..muscle import Muscle
 from ..pneumatics import DEFAULT_GAS, Air, Ambient, Circuit, CircuitFlows, Gas, key_by_muscle, key_by_port

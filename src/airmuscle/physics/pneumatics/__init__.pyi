@@ -3,7 +3,9 @@ from .circuit import Circuit as Circuit
 from .circuit import CircuitFlows as CircuitFlows
 from .circuit import ClosedChamber as ClosedChamber
 from .circuit import FillDischarge as FillDischarge
+from .circuit import Manifold as Manifold
 from .circuit import ThreePositionValve as ThreePositionValve
+from .circuit import WithLeak as WithLeak
 from .circuit import ambient_air as ambient_air
 from .conversion import in_parallel as in_parallel
 from .conversion import in_series as in_series
@@ -25,9 +27,7 @@ from .gas import Isothermal as Isothermal
 from .gas import Polytropic as Polytropic
 from .gas import absolute_pressure as absolute_pressure
 from .gas import gauge_pressure as gauge_pressure
-from .manifold import Manifold as Manifold
-from .manifold import WithLeak as WithLeak
-from .pressure_regulator import PressureRegulator as PressureRegulator
+from .proportional import PressureRegulator as PressureRegulator
 from .proportional import ProportionalRegulator as ProportionalRegulator
 from .proportional import ProportionalValve as ProportionalValve
 from .proportional import SecondOrderLag as SecondOrderLag

@@ -1,10 +1,12 @@
 """Proportional valves: 5/3 proportional directional valve and proportional pressure regulator."""
 
-from ...core import Input, ParameterError, StateVariable, Value, Values, model, ops, parameter
+from typing import ClassVar
+
+from ...core import Input, ParameterError, Reference, StateVariable, Value, Values, model, ops, parameter
 from .circuit import Circuit, CircuitFlows, ambient_air
 from .gas import NO_FLOW, Air, Ambient, absolute_pressure, gauge_pressure
 from .supply import AirSource
-from .valve import Orifice, orifice_flow, proportional_opening
+from .valve import ISO6358, Orifice, orifice_flow, proportional_opening
 
 
 @model
@@ -63,9 +65,8 @@ class ProportionalValve(Circuit):
         return proportional_opening(position - self.overlap, 1.0 - self.overlap)
 
     def supplied_flow(
-        self, inlet: Air, air_states: tuple[Air, ...], state: Values, inputs: Values,
-        ambient: Ambient,
-    ) -> CircuitFlows:  # fmt: skip
+        self, inlet: Air, air_states: tuple[Air, ...], state: Values, inputs: Values, ambient: Ambient
+    ) -> CircuitFlows:
         spool, flows, drawn, exhausted = state["spool"], [], NO_FLOW, NO_FLOW
         for air, position in zip(air_states, (spool, -spool), strict=False):
             inflow = orifice_flow(self.fill, inlet, air, self.opening(position))
@@ -108,9 +109,8 @@ class ProportionalRegulator(Circuit):
         return {"lagged_setpoint": gauge_pressure(air_states[0].pressure, ambient), "lagged_setpoint_rate": 0.0}
 
     def supplied_flow(
-        self, inlet: Air, air_states: tuple[Air, ...], state: Values, inputs: Values,
-        ambient: Ambient,
-    ) -> CircuitFlows:  # fmt: skip
+        self, inlet: Air, air_states: tuple[Air, ...], state: Values, inputs: Values, ambient: Ambient
+    ) -> CircuitFlows:
         (air,) = air_states
         setpoint, setpoint_rate = state["lagged_setpoint"], state["lagged_setpoint_rate"]
         error = absolute_pressure(setpoint, ambient) - air.pressure
@@ -119,3 +119,111 @@ class ProportionalRegulator(Circuit):
         first, second = self.lag.rates(setpoint, setpoint_rate, inputs["setpoint"])
         rates = {"lagged_setpoint": first, "lagged_setpoint_rate": second}
         return CircuitFlows((inflow - outflow,), inflow, outflow, rates)
+
+
+DELAY_STAGES = 4
+"""Number of equal lags that make up the dead time (chosen): 10 to 90 % of a step take 1.2 times the dead time."""
+
+ITV_LOGS = Reference(
+    "actuated-design-lab2026",
+    "Actuated Design Lab",
+    "Measurements of three SMC ITV2050 regulators on pneumatic artificial muscles, and models fitted to them",
+    "public repositories jetson_project (analysis/itv) and porcaro_2026",
+    2026,
+    note="step table, amplitude map, reversals; pilot with integral action, dead zone and leak (models B and BL)",
+)
+
+
+@model
+class PressureRegulator(Circuit):
+    """Electro-pneumatic pressure regulator (SMC ITV, Festo VPPM): command p_c to outlet pressure p, both gauge.
+
+        delay      d_1' = 4 (p_c - d_1)/L,   d_i' = 4 (d_(i-1) - d_i)/L,  i = 2, 3, 4
+        sensor     y' = (p - y)/T_f
+        error      e = d_4 - y,   i' = k_i e a,   a = clip(2 - |e + i|/B, 0, 1) if e (e + i) > 0, otherwise 1
+        pilot      v = clip((e + i)/B, -1, 1) + o clip(2 e/epsilon - 1, -1, 1)
+                   w' = 2 (v - w)/T_p,   x' = 2 (w - x)/T_p
+        fill       opening clip(x - o, 0, 1) + l clip((x + o)/(2 o), 0, 1)
+        discharge  opening clip(-x - o, 0, 1) + l clip((o - x)/(2 o), 0, 1)
+
+    x position of the main valve in units of its stroke from an edge to full opening, closed for |x| < o apart from the
+    leak l. The pilot stage brings it to the edge that the error needs, at rest to the discharge edge; after a reversal
+    of the error it crosses the overlap 2 o within the time of the pilot. Hence a step after rest passes whole, a fast
+    oscillation or a quick reversal of the same size hardly. Flows by the orifices, from the supply of the circuit and
+    to the surroundings. The form of v is chosen, because the published models of the ITV2050 (integral pilot action,
+    dead zone, leak) describe only one of the two. References: Actuated Design Lab (2026), ISO 6358.
+    """
+
+    references: ClassVar[tuple[Reference, ...]] = (ITV_LOGS, ISO6358)
+
+    supply: AirSource
+    fill: Orifice
+    discharge: Orifice
+    band: float = parameter("Pa", "B", "proportional band: control error at full opening", bounds=(100.0, 1e7))
+    pilot_time: float = parameter("s", "T_p", "time constant of the pilot stage", bounds=(1e-3, 2.0))
+    overlap: float = parameter("1", "o", "overlap on either side, relative to the stroke", bounds=(1e-3, 10.0))
+    dead_time: float = parameter("s", "L", "dead time of the command", bounds=(1e-3, 0.5), default=0.02)
+    integral_rate: float = parameter("1/s", "k_i", "rate of integral action", bounds=(0.0, 100.0), default=0.0)
+    sensitivity: float = parameter(
+        "Pa", "epsilon", "error at which the pilot leaves the discharge edge for the fill edge",
+        bounds=(1.0, 1e5), default=2e3,
+    )  # fmt: skip
+    leak: float = parameter("1", "l", "opening by leakage within the overlap", bounds=(0.0, 0.5), default=0.0)
+    filter_time: float = parameter("s", "T_f", "time constant of the sensor", bounds=(1e-4, 1.0), default=2e-3)
+    max_setpoint: float = parameter("Pa", "u_max", "maximum set point", bounds=(1e3, 5e6), fitted=False, default=1e6)
+
+    @property
+    def inputs(self) -> tuple[Input, ...]:
+        return (Input("setpoint", "Pa", 0.0, self.max_setpoint, "set gauge pressure"),)
+
+    def own_states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
+        delayed = [StateVariable(f"delayed_setpoint{i}", "Pa", 1e5, f"set pressure after {i} of {DELAY_STAGES} lags")
+                   for i in range(1, DELAY_STAGES + 1)]  # fmt: skip
+        return (
+            *delayed,
+            StateVariable("sensed_pressure", "Pa", 1e5, "gauge pressure of the sensor"),
+            StateVariable("integral_error", "Pa", 1e4, "integral of the control error times its rate"),
+            StateVariable("pilot_position", "1", 1.0, "position towards which the pilot moves the main valve"),
+            StateVariable("valve_position", "1", 1.0, "position of the main valve"),
+        )
+
+    def own_steady_state(self, air_states: tuple[Air, ...], ambient: Ambient) -> dict[str, Value]:
+        pressure = gauge_pressure(air_states[0].pressure, ambient)
+        delayed = {f"delayed_setpoint{i}": pressure for i in range(1, DELAY_STAGES + 1)}
+        rest = {"integral_error": 0.0, "pilot_position": -self.overlap, "valve_position": -self.overlap}
+        return {**delayed, "sensed_pressure": pressure, **rest}
+
+    def openings(self, position: Value) -> tuple[Value, Value]:
+        """Openings of fill and discharge at a position of the main valve."""
+        return self._opening(position), self._opening(-position)
+
+    def _opening(self, position: Value) -> Value:
+        leakage = self.leak * ops.clip((position + self.overlap) / (2.0 * self.overlap), 0.0, 1.0)
+        return ops.clip(position - self.overlap, 0.0, 1.0) + leakage
+
+    def supplied_flow(
+        self, inlet: Air, air_states: tuple[Air, ...], state: Values, inputs: Values, ambient: Ambient
+    ) -> CircuitFlows:
+        (air,) = air_states
+        opened, vented = self.openings(state["valve_position"])
+        inflow = orifice_flow(self.fill, inlet, air, opened)
+        outflow = orifice_flow(self.discharge, air, ambient_air(ambient), vented)
+        rates = self._rates(state, inputs["setpoint"], gauge_pressure(air.pressure, ambient))
+        return CircuitFlows((inflow - outflow,), inflow, outflow, rates)
+
+    def _rates(self, state: Values, setpoint: Value, pressure: Value) -> dict[str, Value]:
+        chain = [setpoint, *(state[f"delayed_setpoint{i}"] for i in range(1, DELAY_STAGES + 1))]
+        lag = self.dead_time / DELAY_STAGES
+        rates = {f"delayed_setpoint{i}": (chain[i - 1] - chain[i]) / lag for i in range(1, DELAY_STAGES + 1)}
+        error, sensed = chain[-1] - state["sensed_pressure"], state["sensed_pressure"]
+        demand = (error + state["integral_error"]) / self.band
+        spare = ops.clip(2.0 - ops.absolute_value(demand), 0.0, 1.0)
+        edge = self.overlap * ops.clip(2.0 * error / self.sensitivity - 1.0, -1.0, 1.0)
+        target, stage = ops.clip(demand, -1.0, 1.0) + edge, self.pilot_time / 2.0
+        return {
+            **rates,
+            "sensed_pressure": (pressure - sensed) / self.filter_time,
+            "integral_error": self.integral_rate * error * ops.where(demand * error > 0.0, spare, 1.0),
+            "pilot_position": (target - state["pilot_position"]) / stage,
+            "valve_position": (state["pilot_position"] - state["valve_position"]) / stage,
+        }

@@ -176,9 +176,8 @@ class WithTubes(CircuitWrapper):
         return warnings
 
     def supplied_flow(
-        self, inlet: Air, air_states: tuple[Air, ...], state: Values, inputs: Values,
-        ambient: Ambient,
-    ) -> CircuitFlows:  # fmt: skip
+        self, inlet: Air, air_states: tuple[Air, ...], state: Values, inputs: Values, ambient: Ambient
+    ) -> CircuitFlows:
         tubes = [select_prefix(prefix, state) for prefix in self.prefixes]
         in_tubes = [self.tube.air_states(tube, ambient) for tube in tubes]
         inner = self.circuit.supplied_flow(inlet, tuple(segments[0] for segments in in_tubes), state, inputs, ambient)

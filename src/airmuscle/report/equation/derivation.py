@@ -7,9 +7,23 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 from ...core import Leaf, ShortRepr, leaves
-from .expression import ADD, COMPARISONS, NEGATIVE, PRODUCT, QUOTIENT, WHERE, Expressions, Node, in_order
+from .expression import (
+    ADD,
+    COMPARISONS,
+    NEGATIVE,
+    PRODUCT,
+    QUOTIENT,
+    WHERE,
+    Expressions,
+    Node,
+    assemble,
+    coefficients_by_monomial,
+    depends_on,
+    expand,
+    in_order,
+    summands,
+)
 from .intervals import Bounds, traced_expression, within
-from .polynomial import assemble, coefficients_by_monomial, depends_on, expand, summands
 
 MAX_OPERATIONS = 600
 """Maximum number of operations of an equation that is shown (chosen)."""

@@ -1,9 +1,8 @@
 """Source text of an equation for other programs: LaTeX, MATLAB, Excel and C."""
 
 from .derivation import LawEquation, Symbol
-from .expression import Node, in_order
+from .expression import Node, in_order, summands
 from .notation import C, Excel, Latex, Matlab, latex_symbol
-from .polynomial import summands
 
 TERMS_PER_LINE = 6
 """Number of terms in a line of a displayed sum (chosen)."""

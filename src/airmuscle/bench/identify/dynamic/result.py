@@ -13,7 +13,7 @@ from ....engine.compile import System
 from ....recording import Recording
 from ....recording.columns import display_scale
 from ....report.chapter import BY_ROW, Chapter, NamedValue, Plot, Table, TableColumn
-from ....report.parameters import estimate_table
+from ....report.shown import estimate_table
 from ...reported import Reported, unit_column
 from ..identifiability import Identifiability
 from ..result import MAX_ROWS, Estimate

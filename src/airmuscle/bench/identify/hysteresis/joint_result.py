@@ -9,7 +9,7 @@ import numpy as np
 from ....core import LINES, Array, given_axes, leaves, legend_below, new_figure, relabel_in_display_units
 from ....physics.muscle.friction import Friction, PressureScaledFriction
 from ....report.chapter import Chapter, Plot
-from ....report.parameters import parameter_table
+from ....report.shown import parameter_table
 from ...reported import Reported
 from ..identifiability import UndeterminedCombination
 from ..model_evidence import describe_reduction, effective_sample_size, f_test_p_value, format_p_value

@@ -7,10 +7,10 @@ import numpy as np
 import numpy.typing as npt
 
 from ....core import Array, ParameterError, Status, System, as_float, one_line, suggestion
+from ....core.system import check_system
 from ...compile.program import CompiledSystem, compile_system
 from ...loop import ControlLoop, InputSignal, PiecewiseLinear
 from ...processes import available_cores
-from ...state import check_system
 from ..bound_integrator import MAX_STEPS
 from ..integrators import ExplicitRungeKutta, Integrator, default_integrator
 from ..output_times import output_times as times_of

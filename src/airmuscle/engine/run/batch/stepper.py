@@ -8,10 +8,10 @@ import numpy as np
 import numpy.typing as npt
 
 from ....core import ParameterError, System
+from ....core.system import check_system
 from ...compile.cache.kernel import lane_blocks
 from ...compile.program import compile_system
 from ...processes import available_cores
-from ...state import check_system
 from ..integrators import ExplicitRungeKutta
 from .lanes import ALIGNMENT, Double, Precision
 

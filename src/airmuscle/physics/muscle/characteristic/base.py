@@ -11,8 +11,8 @@ from typing import Any, ClassVar, NamedTuple, Self
 
 from ....core import IdentificationError, ParameterError, Reference, Value, autodiff, model, ops, parameter
 from ..quantity_arguments import accept_quantities_in
-from .data_scales import MeasuredPoints
 from .solve import describe_range, find_first_root, warn_above_whole_length
+from .validity_range import MeasuredPoints
 
 _UNITS = {
     "force": ("Pa", "1"), "contraction": ("Pa", "N"), "pressure": ("1", "N"), "slopes": ("Pa", "1"),

@@ -7,8 +7,7 @@ from typing import ClassVar
 from ....core import ParameterError, Reference, Value, model, ops, parameter
 from ..geometry.base import check_degree
 from .base import Characteristic, ForceLaw
-from .data_scales import DataScales, MeasuredPoints
-from .validity_range import ValidityRange
+from .validity_range import DataScales, MeasuredPoints, ValidityRange
 
 HOSOVSKY_HILL = Reference(
     "hosovsky-hill",

@@ -4,7 +4,7 @@ from typing import ClassVar, Self
 
 from ....core import ParameterError, Reference, Value, model, ops, parameter
 from .base import PressureLaw
-from .data_scales import DataScales, MeasuredPoints
+from .validity_range import DataScales, MeasuredPoints
 
 HUNT_2017 = Reference(
     "hunt-2017",

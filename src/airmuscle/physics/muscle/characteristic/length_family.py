@@ -1,13 +1,99 @@
-"""Wrappers for muscles of one type and different lengths: a force law plus a length-dependent correction."""
+"""Wrappers for muscles of one type and different lengths: rigid ends, a correction by the length, partial pooling."""
 
 import abc
 import dataclasses
 from collections.abc import Callable
 from typing import Any, ClassVar, Self
 
-from ....core import Value, model, ops, parameter
+from ....core import ParameterError, Value, model, ops, parameter, suggestion
 from .base import Characteristic, ForceLaw
-from .data_scales import DataScales, MeasuredPoints
+from .validity_range import DataScales, MeasuredPoints
+
+_RANGE_FACTOR = 2.0
+"""Factor by which the contraction range of the inner surface exceeds that of the whole muscle (chosen)."""
+
+
+@model
+class EffectiveLength(ForceLaw):
+    """Force law of the active length: F = F_inner(p, (eps L_0 + d)/(L_0 - l_d)).
+
+    eps: contraction of the whole muscle; L_0: length between the fittings; l_d: length of the ends, which do not
+    contract; d: elongation of the ends under pressure, or zero error of the length measurement. Short muscles therefore
+    contract less. `with_resting_length` returns the model of another muscle of the same type. Developed for airmuscle;
+    the effect of the ends is from Tondu and Lopez (2000), whose end correction is L_0/(L_0 - l_d).
+    """
+
+    inner: ForceLaw
+    resting_length: float = parameter(
+        "m", "L_0", "length between the fittings, unpressurised and unloaded", bounds=(1e-3, 20.0), fitted=False
+    )
+    dead_length: float = parameter("m", "l_d", "length of the ends, which do not contract", bounds=(-1.0, 1.0))
+    end_shift: float = parameter(
+        "m", "d", "elongation of the ends, or zero error of the length", bounds=(-0.1, 0.1), default=0.0
+    )
+
+    @classmethod
+    def variants(cls, data: MeasuredPoints, surface: Callable[[int], ForceLaw]) -> dict[str, Characteristic]:
+        scales = DataScales.of(data).check_lengths()
+        return {
+            f"effective length, degree {n}": cls(surface(n), scales.resting_length, dead_length=0.005)
+            for n in range(2, 6)
+        }
+
+    def check(self) -> None:
+        if not self.dead_length < self.resting_length:
+            raise ParameterError(
+                f"EffectiveLength: dead_length {self.dead_length:g} m must be less than resting_length "
+                f"{self.resting_length:g} m."
+            )
+
+    @property
+    def contraction_range(self) -> tuple[float, float]:
+        low, high = self.inner.contraction_range
+        length, active = self.resting_length, self.resting_length - self.dead_length
+        return ((low * active - self.end_shift) / length, (high * active - self.end_shift) / length)
+
+    @property
+    def linear_in(self) -> tuple[str, ...]:
+        """The parameters in which the inner model is linear; the lengths are not among them."""
+        fields = getattr(self.inner, "linear_in", ())
+        return tuple(f"inner.{field}" for field in ((fields,) if isinstance(fields, str) else fields))
+
+    def with_resting_length(self, resting_length: float) -> "EffectiveLength":
+        """Return the model of a muscle of the same type with this resting length [m]."""
+        return dataclasses.replace(self, resting_length=resting_length)
+
+    def with_validity_range(self, pressure: tuple[float, float], contraction: tuple[float, float]) -> "EffectiveLength":
+        """Return the model with another validity range; that of the inner surface is wider in contraction."""
+        inner: Any = self.inner
+        if not hasattr(inner, "with_validity_range"):
+            return self
+        return dataclasses.replace(self, inner=inner.with_validity_range(pressure, _widen(contraction)))
+
+    def rescaled(self, pressure: tuple[float, float], contraction: tuple[float, float]) -> "EffectiveLength":
+        """Return the same force law on another validity range; that of the inner surface is wider in contraction."""
+        inner: Any = self.inner
+        if not hasattr(inner, "rescaled"):
+            return self
+        return dataclasses.replace(self, inner=inner.rescaled(pressure, _widen(contraction)))
+
+    def force(self, pressure: Value, contraction: Value) -> Value:
+        return self.inner.force(pressure, self._active_contraction(contraction))
+
+    def unclamped_force(self, pressure: Value, contraction: Value) -> Value:
+        return self.inner.unclamped_force(pressure, self._active_contraction(contraction))
+
+    def _active_contraction(self, contraction: Value) -> Value:
+        """Contraction [1] of the active length."""
+        shortening = contraction * self.resting_length + self.end_shift
+        return shortening / (self.resting_length - self.dead_length)
+
+
+def _widen(contraction: tuple[float, float]) -> tuple[float, float]:
+    """The validity range of the inner surface for this range of the whole muscle."""
+    low, high = contraction
+    margin = (_RANGE_FACTOR - 1) * (high - low) / 2
+    return low - margin, high + margin
 
 
 @model
@@ -117,3 +203,95 @@ def _linear_fields(law: ForceLaw) -> tuple[str, ...]:
     """The fields in which a law is linear."""
     fields: str | tuple[str, ...] = getattr(law, "linear_in", ())
     return (fields,) if isinstance(fields, str) else fields
+
+
+@model
+class PooledLengthLaw(ForceLaw):
+    """Mixed-effects law of muscles of one type: F = max(0, F_pop(p, eps; L_0) + s F_s(p, eps)).
+
+        s = 1 where F_pop >= 0, otherwise max(0, 1 + c F_pop)
+
+    F_pop: law of the population, for any resting length L_0; F_s: effect of specimen s (a random effect), drawn from a
+    normal distribution of mean 0; c: decay of the effects below zero force, so that a specimen is slack where the
+    population is far from pulling; 0 keeps the effects everywhere. A new muscle has the mean of this prior, F_s = 0;
+    `with_resting_length` returns its law. `for_specimen` returns the law of a measured muscle. Without names of
+    specimens the one effect gives the structure for a fit. Force limits of the inner models are not applied. Developed
+    for airmuscle; the prediction of random effects is from Robinson, Statistical Science 6:15 (1991).
+    """
+
+    population: ForceLaw
+    effects: tuple[ForceLaw, ...]
+    specimens: tuple[str, ...] = ()
+    specimen_lengths: tuple[float, ...] = parameter(
+        "m", "L_s", "resting lengths of the specimens", bounds=(1e-3, 20.0), fitted=False, default=()
+    )
+    specimen: str = ""
+    effect_decay: float = parameter(
+        "1/N", "c", "relative decay of the specimen effects below zero force of the population",
+        bounds=(0.0, 1e3), fitted=False, default=0.0,
+    )  # fmt: skip
+
+    def check(self) -> None:
+        named = len(self.specimens)
+        if not len(self.effects) == max(named, 1) or not len(self.specimen_lengths) == named:
+            raise ParameterError(
+                f"PooledLengthLaw has {named} specimens, {len(self.effects)} effects and {len(self.specimen_lengths)} "
+                "specimen_lengths; these numbers must be equal (without specimens: one effect)."
+            )
+        if len(set(self.specimens)) < named or "" in self.specimens:
+            raise ParameterError("PooledLengthLaw.specimens must be different names, none of them empty.")
+        if not self.specimen:
+            return
+        stated, own = self.specimen_lengths[self._index(self.specimen)], self.resting_length
+        if own is not None and abs(stated - own) > 1e-6:
+            raise ParameterError(
+                f"PooledLengthLaw: the resting length of {self.specimen} is {stated:g} m, but that of its population "
+                f"is {own:g} m. Write {stated:g} m there, or use for_specimen('{self.specimen}')."
+            )
+
+    @property
+    def resting_length(self) -> float | None:
+        """Resting length [m] of this muscle; None if the law of the population does not depend on it."""
+        length: float | None = getattr(self.population, "resting_length", None)
+        return length
+
+    @property
+    def contraction_range(self) -> tuple[float, float]:
+        return self.population.contraction_range
+
+    def with_resting_length(self, resting_length: float) -> "PooledLengthLaw":
+        """Return the law of a new muscle of the same type with this resting length [m]: its effect is zero."""
+        return dataclasses.replace(self, population=_of_length(self.population, resting_length), specimen="")
+
+    def for_specimen(self, specimen: str) -> "PooledLengthLaw":
+        """Return the law of a measured muscle, with its resting length and effect. Raises ParameterError."""
+        length = self.specimen_lengths[self._index(specimen)]
+        return dataclasses.replace(self, population=_of_length(self.population, length), specimen=specimen)
+
+    def force(self, pressure: Value, contraction: Value) -> Value:
+        return ops.maximum(self.unclamped_force(pressure, contraction), 0.0)
+
+    def unclamped_force(self, pressure: Value, contraction: Value) -> Value:
+        force = self.population.unclamped_force(pressure, contraction)
+        if not self.specimen:
+            return force
+        effect = self.effects[self.specimens.index(self.specimen)].unclamped_force(pressure, contraction)
+        return force + self.effect_share(force) * effect
+
+    def effect_share(self, force: Value) -> Value:
+        """The share s of the effects [1] at this unclamped force of the population [N]."""
+        return ops.clip(1.0 + self.effect_decay * force, 0.0, 1.0)
+
+    def _index(self, specimen: str) -> int:
+        if specimen not in self.specimens:
+            known = ", ".join(self.specimens) or "none"
+            raise ParameterError(
+                f"PooledLengthLaw: '{specimen}' is not among the specimens ({known}). Give one of these, or "
+                f"with_resting_length(...) for a new muscle.{suggestion(specimen, self.specimens)}"
+            )
+        return self.specimens.index(specimen)
+
+
+def _of_length(law: ForceLaw, resting_length: float) -> ForceLaw:
+    scaled: ForceLaw = law.with_resting_length(resting_length) if hasattr(law, "with_resting_length") else law
+    return scaled

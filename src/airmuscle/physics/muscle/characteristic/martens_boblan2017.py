@@ -5,7 +5,7 @@ from typing import ClassVar, Self
 from ....core import Reference, Value, model, ops, parameter
 from ..geometry.braid import Braid
 from .base import ForceLaw
-from .data_scales import DataScales, MeasuredPoints
+from .validity_range import DataScales, MeasuredPoints
 
 MARTENS_BOBLAN_2017 = Reference(
     "martens-boblan-2017",

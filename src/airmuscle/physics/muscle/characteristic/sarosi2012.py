@@ -4,7 +4,7 @@ from typing import ClassVar, Self
 
 from ....core import Reference, Value, model, ops, parameter
 from .base import ForceLaw
-from .data_scales import DataScales, MeasuredPoints
+from .validity_range import DataScales, MeasuredPoints
 
 SAROSI_2012 = Reference(
     "sarosi-2012",

@@ -5,7 +5,7 @@ from typing import ClassVar, Self
 from ....core import Reference, Value, model, ops, parameter
 from ..passive_elements import Damper, Spring
 from .base import ForceLaw
-from .data_scales import DataScales, MeasuredPoints
+from .validity_range import DataScales, MeasuredPoints
 
 SERRES_2009 = Reference(
     "serres-2009",

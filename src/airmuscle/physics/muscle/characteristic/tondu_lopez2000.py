@@ -5,8 +5,8 @@ from typing import ClassVar, Self
 from ....core import Reference, Value, model, ops, parameter
 from ..geometry.braid import Braid
 from .base import MIN_PRESSURE, ForceLaw
-from .data_scales import DataScales, MeasuredPoints
 from .solve import check_solution
+from .validity_range import DataScales, MeasuredPoints
 
 TONDU_LOPEZ_2000 = Reference(
     "tondu-lopez-2000",

@@ -1,9 +1,15 @@
-"""Validity range: the pressures and contractions for which a characteristic was measured, printed or fitted."""
+"""Ranges of data: where a characteristic is valid, and the scales of measured points, from which a fit starts."""
 
 import dataclasses
-from typing import Any
+import math
+from collections.abc import Sequence
+from typing import Any, NoReturn, Self
 
-from ....core import ParameterError, Value, model, parameter
+import numpy as np
+
+from ....core import IdentificationError, ParameterError, Value, model, parameter
+from ....recording import Recording
+from ..geometry.braid import Braid
 
 PRESSURE_BOUNDS = (-101_325.0, 1e8)
 CONTRACTION_BOUNDS = (-0.5, 1.0)
@@ -55,3 +61,67 @@ def validity_range_of(characteristic: Any, stated: ValidityRange | None = None) 
     if stated is not None or not all(hasattr(characteristic, name) for name in names):
         return stated
     return ValidityRange(*(getattr(characteristic, name) for name in names))
+
+
+BRAID_ANGLE = 0.45
+"""Initial braid angle [rad] (chosen); the angles of fluidic muscles lie within 0.15 of it."""
+
+
+@dataclasses.dataclass(frozen=True)
+class DataScales:
+    """Maxima of measured points, by which a law scales its initial parameters; all SI."""
+
+    force: float
+    pressure: float
+    contraction: float
+    max_length: float | None = None
+    """Maximum resting length [m]; None unless every recording states one."""
+    length_count: int = 0
+    """Number of different resting lengths; 0 unless every recording states one."""
+    specimen_count: int = 1
+
+    @classmethod
+    def of(cls, data: "MeasuredPoints") -> "DataScales":
+        """The scales of all rows of one recording or several; given scales as they are."""
+        if isinstance(data, DataScales):
+            return data
+        runs = [data] if isinstance(data, Recording) else list(data)
+        force, pressure, contraction = (
+            max(float(np.nanmax(run[name])) for run in runs) for name in ("force", "pressure", "contraction")
+        )
+        lengths = [run.constants.get("resting_length") for run in runs]
+        known = {float(length) for length in lengths if length is not None}
+        complete = len(lengths) > 0 and None not in lengths
+        specimens = {run.constants.get("specimen", length) for run, length in zip(runs, lengths, strict=True)}
+        length, count = (max(known), len(known)) if complete else (None, 0)
+        return cls(force, pressure, contraction, length, count, len(specimens))
+
+    @property
+    def resting_length(self) -> float:
+        """Maximum resting length [m]. Raises IdentificationError unless every recording states one."""
+        if self.max_length is None:
+            refuse_guess("not every recording states its resting length", "State the resting length.")
+        return self.max_length
+
+    @property
+    def braid(self) -> Braid:
+        """A braid of the resting length that exerts the maximum force at the maximum pressure, with a radius of 0.2 to
+        100 mm. Raises IdentificationError unless every recording states its resting length."""
+        area = math.pi * self.pressure * (3 / math.tan(BRAID_ANGLE) ** 2 - 1 / math.sin(BRAID_ANGLE) ** 2)
+        radius = min(max(math.sqrt(max(self.force, 1.0) / area), 2e-4), 0.1)
+        return Braid(radius, BRAID_ANGLE, self.resting_length)
+
+    def check_lengths(self) -> Self:
+        """These scales. Raises IdentificationError for fewer than two resting lengths."""
+        if self.length_count < 2:
+            refuse_guess("it needs recordings of two resting lengths or more")
+        return self
+
+
+MeasuredPoints = Recording | Sequence[Recording] | DataScales
+"""One recording or several with pressure, contraction and force, or their scales."""
+
+
+def refuse_guess(cause: str, remedy: str = "") -> NoReturn:
+    """Raise IdentificationError for initial parameters that do not follow from the data."""
+    raise IdentificationError(f"{cause[0].upper()}{cause[1:]}. {remedy}".rstrip(), cause=cause)

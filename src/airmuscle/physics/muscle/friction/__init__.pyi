@@ -1,10 +1,10 @@
 from .base import Friction as Friction
+from .base import IdentifiedFriction as IdentifiedFriction
 from .base import NoFriction as NoFriction
+from .base import PressureScaledFriction as PressureScaledFriction
 from .bouc_wen import BoucWen as BoucWen
 from .dahl import Dahl as Dahl
 from .lugre import LuGre as LuGre
 from .maxwell_slip import MaxwellSlip as MaxwellSlip
 from .path import LoopScales as LoopScales
 from .prandtl_ishlinskii import PrandtlIshlinskii as PrandtlIshlinskii
-from .wrapper import IdentifiedFriction as IdentifiedFriction
-from .wrapper import PressureScaledFriction as PressureScaledFriction

@@ -1,9 +1,9 @@
-"""Friction (interface): hysteresis models with internal bristle states."""
+"""Friction (interface): hysteresis models with internal bristle states, and the wrappers of a law."""
 
 import abc
 from typing import Any, ClassVar, NamedTuple, Self
 
-from ....core import Reference, StateVariable, Value, Values, model
+from ....core import ParameterError, Reference, StateVariable, Value, Values, model, ops, parameter
 from .path import LoopScales
 
 
@@ -94,3 +94,117 @@ class NoFriction(Friction):
     @property
     def presliding_distance(self) -> float:
         return 0.0
+
+
+class FrictionWrapper(Friction):
+    """Wrapper that forwards everything to the inner friction law; subclasses override single properties."""
+
+    inner: Friction
+
+    @property
+    def rate_independent(self) -> bool:  # type: ignore[override]
+        """Whether the force depends on the path only, not on the speed."""
+        return self.inner.rate_independent
+
+    @property
+    def states(self) -> tuple[StateVariable, ...]:
+        return self.inner.states
+
+    @property
+    def presliding_distance(self) -> float:
+        return self.inner.presliding_distance
+
+    @property
+    def identified_range(self) -> IdentifiedRange | None:
+        return self.inner.identified_range
+
+    def pressure_factor(self, pressure: Value) -> Value:
+        return self.inner.pressure_factor(pressure)
+
+    def rates(self, bristles: Values, speed: Value) -> dict[str, Value]:
+        return self.inner.rates(bristles, speed)
+
+    def force(self, bristles: Values, speed: Value) -> Value:
+        return self.inner.force(bristles, speed)
+
+    def force_along(self, displacement: Any, time: Any = None) -> Any:
+        return self.inner.force_along(displacement, time)
+
+
+@model
+class IdentifiedFriction(FrictionWrapper):
+    """Friction law with the range of its data; a simulation reports when and how far the range is left.
+
+    The force is that of the inner law, inside and outside the range. There is no lower limit of the speed, because
+    every motion begins and ends at rest.
+    """
+
+    inner: Friction
+    min_pressure: float = parameter(
+        "Pa", "p_low", "lower limit of the gauge pressure in the data", bounds=(-101325.0, 1e7), fitted=False
+    )
+    max_pressure: float = parameter(
+        "Pa", "p_high", "upper limit of the gauge pressure in the data", bounds=(-101325.0, 1e7), fitted=False
+    )
+    max_speed: float = parameter(
+        "m/s", "v_high", "maximum speed in the data; 100 m/s where it is not known", bounds=(1e-9, 100.0),
+        fitted=False, default=100.0,
+    )  # fmt: skip
+
+    def check(self) -> None:
+        if not self.min_pressure < self.max_pressure:
+            raise ParameterError(
+                f"IdentifiedFriction: min_pressure {self.min_pressure:g} must be less than max_pressure "
+                f"{self.max_pressure:g}."
+            )
+
+    @property
+    def identified_range(self) -> IdentifiedRange | None:
+        return IdentifiedRange((self.min_pressure, self.max_pressure), (-self.max_speed, self.max_speed))
+
+
+TONDU_LOPEZ2000 = Reference(
+    key="tondu-lopez-2000",
+    authors="Tondu, B., Lopez, P.",
+    title="Modeling and control of McKibben artificial muscle robot actuators",
+    where="IEEE Control Systems Magazine 20(2), 15-38",
+    year=2000,
+    doi="10.1109/37.833638",
+    note="dry friction between the threads, proportional to the contact pressure; the affine form is chosen here",
+)
+DAVIS_CALDWELL2006 = Reference(
+    key="davis-caldwell-2006",
+    authors="Davis, S., Caldwell, D. G.",
+    title="Braid effects on contractile range and friction modeling in pneumatic muscle actuators",
+    where="The International Journal of Robotics Research 25(4), 359-369",
+    year=2006,
+    doi="10.1177/0278364906063227",
+    note="friction of the threads of the braid, which increases with pressure",
+)
+
+
+@model
+class PressureScaledFriction(FrictionWrapper):
+    """Friction with a force scale: F = s(p) F_1,  s(p) = max(a + (1 - a) p/p_r, 0).
+
+    F_1: force of the inner law, which is the friction at the reference pressure p_r; p: gauge pressure; a: ratio of the
+    friction at ambient pressure to that at p_r. a = 0 is a friction proportional to the pressure between the threads,
+    as in Tondu and Lopez (2000) and Davis and Caldwell (2006); a = 1 does not depend on the pressure. The affine form
+    (chosen) adds the friction of the unpressurised braid. All terms of the inner law are scaled, so that the presliding
+    distance does not depend on the pressure (chosen).
+    """
+
+    references: ClassVar[tuple[Reference, ...]] = (TONDU_LOPEZ2000, DAVIS_CALDWELL2006)
+
+    inner: Friction
+    ambient_ratio: float = parameter(
+        "1", "a", "friction at ambient pressure relative to that at the reference pressure", bounds=(0.0, 10.0),
+        default=0.0,
+    )  # fmt: skip
+    reference_pressure: float = parameter(
+        "Pa", "p_r", "gauge pressure at which the scale is 1", bounds=(1e3, 1e7), fitted=False, default=1e5
+    )
+
+    def pressure_factor(self, pressure: Value) -> Value:
+        scale = self.ambient_ratio + (1.0 - self.ambient_ratio) * pressure / self.reference_pressure
+        return ops.maximum(scale, 0.0) * self.inner.pressure_factor(pressure)

@@ -1,6 +1,8 @@
 from .base import Geometry as Geometry
 from .braid import Braid as Braid
 from .chebyshev import ChebyshevGeometry as ChebyshevGeometry
+from .chebyshev import TabulatedGeometry as TabulatedGeometry
+from .chebyshev import Vessel as Vessel
 from .chebyshev import as_polynomial as as_polynomial
 from .meridian_shapes import Catenary as Catenary
 from .meridian_shapes import CircularArc as CircularArc
@@ -12,5 +14,3 @@ from .straight_fibre import PrintedFibreSum as PrintedFibreSum
 from .straight_fibre import StraightFibre as StraightFibre
 from .straight_fibre import UniformFibreSum as UniformFibreSum
 from .straight_fibre import UserDefinedFibreSum as UserDefinedFibreSum
-from .tabulated import TabulatedGeometry as TabulatedGeometry
-from .tabulated import Vessel as Vessel
