@@ -89,6 +89,22 @@ def test_a_growing_file_is_read_as_it_comes_and_a_partial_line_waits_for_its_res
     assert rows[0]["pressure"] == 1e5
 
 
+def test_a_stream_whose_beginning_is_no_table_is_refused():
+    """More headings than numbers, and a carriage return within a line of the header."""
+    wide = RowReader("log")
+    wide.read("time [s],pressure [kPa],force [N]," + ",".join(f"c{i}" for i in range(3000)))
+    with pytest.raises(
+        ColumnError, match=r"log, line 2: the line must have 3003 cells .*more\); it has 3\."
+    ) as refused:
+        wide.read("0,100,5")
+    assert len(str(refused.value)) < 600
+    binary = RowReader("port")
+    assert binary.read("\x00time\r,pressure [kPa]\r\n") is None
+    row = binary.read("0,1")
+    assert row is not None
+    assert row["pressure"] == 1e3
+
+
 def test_damaged_rows_of_a_serial_log_are_left_out_and_counted():
     reader = RowReader("port", ColumnMapping(columns={"1": "pressure [bar]", "2": "length [mm]", "3": "force [N]"}, constants={"resting_length": "200 mm"}))  # fmt: skip
     rows = [

@@ -440,6 +440,9 @@ def test_a_mapping_that_does_not_match_the_file_is_an_error(tmp_path: Path, colu
         ('delimiter = ","\ndecimal = ","', ParameterError, "are both ','"),
         ('decimal = "x"', ParameterError, "it must be '.' or ','"),
         ('delimiter = "x"', ParameterError, "it must be a comma, semicolon, tab, blank"),
+        ('ambient = "Rodas4"', UnitError, "rig.toml: ambient: 'Rodas4' is not a number with a unit"),
+        ("resting_length = 300", ColumnError, "rig.toml: resting_length is 300 m; allowed range: 0.001 to 20 m"),
+        ('[constants]\nlength = "7 furlong bar"', UnitError, "rig.toml: length: "),
     ],
 )
 def test_an_invalid_mapping_file(tmp_path: Path, content: str, kind, expected: str):

@@ -70,7 +70,9 @@ def conforms(value: Any, hint: Any, *, lists: bool = False) -> bool:
         )
     if origin in (Collection, Iterable) and isinstance(value, Collection) and np.ndim(value) > 0:  # type: ignore[arg-type]
         return all(conforms(item, arguments[0], lists=lists) for item in value)
-    if origin in (Callable, Collection, Iterable):
+    if origin is Callable:
+        return callable(value) and _takes(value, arguments[0])
+    if origin in (Collection, Iterable):
         return isinstance(value, origin) and not isinstance(value, np.ndarray)
     return hint is Any or not isinstance(hint, type) or getattr(hint, "_is_protocol", False) or isinstance(value, hint)
 
@@ -81,6 +83,19 @@ def is_numeric(value: Any) -> bool:
         return np.asarray(value).dtype.kind in "biuf"
     except (ValueError, TypeError, OverflowError):  # rows of unequal length, or no array at all
         return False
+
+
+def _takes(function: Callable[..., Any], arguments: Any) -> bool:
+    """Whether a function can be called with the declared arguments; a class that does not tell, as `int`, cannot."""
+    if not isinstance(arguments, list):
+        return True
+    try:
+        inspect.signature(function).bind(*arguments)
+    except TypeError:
+        return False
+    except ValueError:  # a function that is not written in Python
+        return not isinstance(function, type)
+    return True
 
 
 def _is_number(value: Any) -> bool:
@@ -102,7 +117,8 @@ def describe(hint: Any) -> str:
         others = [describe(each) for each in arguments if not (is_array and each in _ARRAY_LIKE)]
         return " or ".join(["an array of numbers"] * is_array + others)
     if origin is Callable:
-        return "a function"
+        given = [describe(each) for each in arguments[0]] if isinstance(arguments[0], list) else []
+        return f"a function of {' and '.join(given)}" if given else "a function"
     if origin in (Collection, Iterable):
         return f"several values, each of which is {describe(arguments[0])}"
     if origin is np.ndarray:

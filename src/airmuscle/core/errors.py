@@ -22,14 +22,13 @@ AirmuscleWarning             a result that may differ from what the user expects
 import dataclasses
 import difflib
 import itertools
-import math
 import re
 import unicodedata
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, Self
 
-MAX_LISTED, MAX_LISTED_NAME = 40, 60
-"""Number of names of a file that a message lists, and of characters of each (chosen)."""
+MAX_LISTED, MAX_LISTED_NAME, MAX_LISTED_TEXT = 40, 60, 400
+"""Number of names of a file that a message lists, and of characters of each and of all (chosen)."""
 MAX_WORD = 200
 """Maximum number of characters of an argument that a message quotes (chosen)."""
 _LONG_WORD = re.compile(rf"\S{{{MAX_WORD + 1},}}")
@@ -129,7 +128,7 @@ def quotable(text: str) -> str:
     return _LONG_WORD.sub(lambda word: f"{word[0][: MAX_WORD - 40]}…{word[0][-39:]}", printable(text))
 
 
-def listed(names: Iterable[str], characters: float = math.inf) -> str:
+def listed(names: Iterable[str], characters: int = MAX_LISTED_TEXT) -> str:
     """Names of a file, such as its headings, for a message: the first ones in so many characters, and how many more."""
     all_names = [name if len(name) <= MAX_LISTED_NAME else f"{name[: MAX_LISTED_NAME - 1]}…" for name in names]
     ends = itertools.accumulate(len(name) + 2 for name in all_names)

@@ -10,39 +10,23 @@ from collections.abc import Callable, Iterator, Sequence
 
 from ...core import AirmuscleWarning
 from ...recording.recording import Recording
-from .contractions import (
-    check_contraction_limit,
-    check_contraction_signs,
-    check_elongation,
-    check_length_and_contraction,
-    check_missing_codes,
-    without_missing_codes,
-)
-from .pressures import (
-    check_absolute_isobars,
-    check_force_area,
-    check_force_signs,
-    check_force_zero,
-    check_lowest_pressures,
-    check_mixed_pressures,
-    check_pressure_limit,
-)
+from . import contractions, pressures
 
-__all__ = ["find_suspicious", "warn_of_suspicious_values", "without_missing_codes"]
+__all__ = ["find_suspicious", "warn_of_suspicious_values"]
 
 BenchCheck = Callable[[Sequence[Recording]], Iterator[str]]
 CHECKS: tuple[BenchCheck, ...] = (
-    check_lowest_pressures,
-    check_mixed_pressures,
-    check_absolute_isobars,
-    check_force_signs,
-    check_force_zero,
-    check_contraction_signs,
-    check_contraction_limit,
-    check_length_and_contraction,
-    check_elongation,
-    check_pressure_limit,
-    check_force_area,
+    pressures.check_lowest_pressures,
+    pressures.check_mixed_pressures,
+    pressures.check_absolute_isobars,
+    pressures.check_force_signs,
+    pressures.check_force_zero,
+    contractions.check_contraction_signs,
+    contractions.check_contraction_limit,
+    contractions.check_length_and_contraction,
+    contractions.check_elongation,
+    pressures.check_pressure_limit,
+    pressures.check_force_area,
 )
 """The checks of values without those that are codes for missing values."""
 
@@ -50,8 +34,8 @@ CHECKS: tuple[BenchCheck, ...] = (
 def find_suspicious(recordings: Sequence[Recording]) -> tuple[str, ...]:
     """The findings of all checks on the recordings of one bench, as sentences with their remedy."""
     measured = [recording for recording in recordings if len(recording)]
-    values = without_missing_codes(measured)
-    return (*check_missing_codes(measured), *(text for check in CHECKS for text in check(values)))
+    values = contractions.without_missing_codes(measured)
+    return (*contractions.check_missing_codes(measured), *(text for check in CHECKS for text in check(values)))
 
 
 def warn_of_suspicious_values(recordings: Sequence[Recording]) -> None:

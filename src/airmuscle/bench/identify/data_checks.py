@@ -12,7 +12,8 @@ import numpy as np
 from ...core import Hint, HintedText
 from ...recording import Recording
 from ...report.chapter import NamedValue
-from ..checks import find_suspicious, without_missing_codes
+from ..checks import find_suspicious
+from ..checks.contractions import without_missing_codes
 from ..segment import Outlier, estimate_noise, estimate_sensors, find_outliers, remembered
 from .branch_residuals import SensorDelay, delay_notes, find_delay
 from .contradictions import contradiction_notes, repeatability

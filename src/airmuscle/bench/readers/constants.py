@@ -1,5 +1,6 @@
 """Constants of a run, by the user, a comment or a column with one value, and division of a table by its specimens."""
 
+import contextlib
 import dataclasses
 import re
 from collections.abc import Mapping
@@ -8,7 +9,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ...core import Array, ColumnError, conversion, quantity
+from ...core import Array, ColumnError, UnitError, conversion, quantity
+from ...core.units import AMBIENT_PRESSURE, STANDARD_GRAVITY
+from ...recording.columns import Heading, parse_heading
 from .channels import Cells, RawTable
 
 SPECIMEN = "specimen"
@@ -87,34 +90,50 @@ def parse_constant_name(text: str) -> tuple[str, str] | None:
     return None
 
 
-def collect_constants(table: RawTable, user_constants: Mapping[str, float | str]) -> dict[str, Any]:
-    """The constants of a run in SI units; those given by the user override those in the comments of the file.
-
-    Raises ColumnError or UnitError.
-    """
+def collect_constants(origin: str, stated: Mapping[str, float | str]) -> dict[str, Any]:
+    """The constants of a run in SI units; `origin` begins the messages. Raises UnitError."""
     constants: dict[str, Any] = {}
-    for text, value in {**table.constants, **user_constants}.items():
+    for text, value in stated.items():
         parsed = parse_constant_name(text)
         if parsed and parsed[1] and not isinstance(value, str):
             value = f"{value!r} {parsed[1]}"
         constants[parsed[0] if parsed else text] = value
     for name, unit in CONSTANT_UNITS.items():
         if name in constants:
-            constants[name] = quantity(constants[name], unit, ambient=0.0, where=f"{table.origin}: {name}")
+            constants[name] = quantity(constants[name], unit, ambient=0.0, where=f"{origin}: {name}")
     return constants
 
 
-def check_constants(table: RawTable, constants: Mapping[str, Any]) -> None:
+def check_constants(origin: str, constants: Mapping[str, Any]) -> None:
     """Raise ColumnError for a constant that is not positive, or outside its allowed range."""
     for name, (low, high) in CONSTANT_RANGES.items():
         value, unit = constants.get(name, low), CONSTANT_UNITS[name]
         if low > 0 and not value > 0:
-            raise ColumnError(f"{table.origin}: {name} is {value:g} {unit}; it must be positive.")
+            raise ColumnError(f"{origin}: {name} is {value:g} {unit}; it must be positive.")
         if not low <= value <= high:
             raise ColumnError(
-                f"{table.origin}: {name} is {value:g} {unit}; allowed range: {low:g} to {high:g} {unit}. Check the "
+                f"{origin}: {name} is {value:g} {unit}; allowed range: {low:g} to {high:g} {unit}. Check the "
                 "unit; a number without a unit is in SI units."
             )
+
+
+def check_stated(origin: str, stated: Mapping[str, float | str]) -> None:
+    """Check the constants and held quantities that a mapping states. Raises ColumnError or UnitError."""
+    check_constants(origin, collect_constants(origin, stated))
+    for name, value in stated.items():
+        if not parse_constant_name(name) and (heading := parse_heading(name)).known:
+            held_value(heading, value, AMBIENT_PRESSURE, f"{origin}: {name}")
+
+
+def held_value(heading: Heading, stated: float | str, ambient: float, where: str) -> float:
+    """The value of a held quantity in SI; a force may be stated as a load in g or kg, as in a column."""
+    value, target = stated, heading.target or "1"
+    if not isinstance(stated, str):
+        value = f"{stated!r} {heading.unit}" if heading.unit else stated
+    elif target == "N":
+        with contextlib.suppress(UnitError):
+            return quantity(stated, "kg") * STANDARD_GRAVITY
+    return quantity(value, target, ambient=ambient, where=where)
 
 
 def constant_from_column(table: RawTable, heading: str, unit: str | None, values: Array) -> tuple[str, float] | None:

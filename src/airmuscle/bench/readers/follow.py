@@ -9,7 +9,7 @@ from typing import Any, TextIO
 
 import numpy as np
 
-from ...core import AMBIENT_PRESSURE, ColumnError, FileError, ParameterError, UnitConversion, abridged
+from ...core import AMBIENT_PRESSURE, ColumnError, FileError, ParameterError, UnitConversion, abridged, listed
 from ...recording.columns import displacement_columns, find_quantity_name
 from .channels import RawTable
 from .header import is_number
@@ -55,7 +55,7 @@ class RowReader:
         if not has_content(line) or self._line <= (self.mapping.skip_rows or 0):
             return None
         if self._conversions is None:
-            return self._read_header(line.rstrip("\r\n"))
+            return self._read_header(line.strip("\r\n").replace("\r", " "))
         return None if is_comment(line) else self._read_row(line)
 
     def _read_header(self, line: str) -> dict[str, float] | None:
@@ -82,7 +82,12 @@ class RowReader:
         missing = [name for name in self._names if name not in {*header.headings, *map(str, range(1, len(first) + 1))}]
         if missing:
             raise ColumnError(
-                f"{self.origin}: there is no column '{missing[0]}'; the columns are {', '.join(header.headings)}."
+                f"{self.origin}: there is no column '{missing[0]}'; the columns are {listed(header.headings)}."
+            )
+        if len(headings) != len(first):
+            raise ColumnError(
+                f"{self.origin}, line {self._line}: the line must have {len(headings)} cells ({listed(headings)}); "
+                f"it has {len(first)}."
             )
         cells = tuple(np.array([value]) for value in first)
         rows = np.array([self._line], dtype=np.int64)

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ...core import Array, ColumnError, Hint, HintedText, UnitError, listed, suggestion
-from ...core.units import AMBIENT_PRESSURE, STANDARD_GRAVITY, UnitConversion, conversion, quantity
+from ...core.units import AMBIENT_PRESSURE, STANDARD_GRAVITY, UnitConversion, conversion
 from ...recording.columns import (
     QUANTITIES,
     UNIT_SPELLINGS,
@@ -22,7 +22,14 @@ from ...recording.columns import (
 )
 from ...recording.recording import Recording
 from .channels import Cells, RawTable
-from .constants import check_constants, collect_constants, constant_from_column, label_texts, parse_constant_name
+from .constants import (
+    check_constants,
+    collect_constants,
+    constant_from_column,
+    held_value,
+    label_texts,
+    parse_constant_name,
+)
 from .mapping import ColumnMapping
 from .plausibility import check_plausible, check_unique, check_width, without_repeated_columns
 from .time_base import TimeBase, seconds_from_clock
@@ -47,14 +54,16 @@ def interpret(table: RawTable, mapping: ColumnMapping, constants: Mapping[str, f
     check_width(table)
     table = without_repeated_columns(table)
     held = {name: value for name, value in constants.items() if _is_quantity(name)}
-    run_constants = collect_constants(table, {n: value for n, value in constants.items() if n not in held})
+    run_constants = collect_constants(
+        table.origin, {**table.constants, **{n: value for n, value in constants.items() if n not in held}}
+    )
     headings = resolve_headings(table, mapping.units)
     table = mapping.missing.treat(table, headings)
     for heading, cells in zip(headings, table.columns, strict=True):
         if not heading.known and not isinstance(cells, list):
             constant = constant_from_column(table, heading.text, heading.unit, cells)
             run_constants = {constant[0]: constant[1], **run_constants} if constant else run_constants
-    check_constants(table, run_constants)
+    check_constants(table.origin, run_constants)
     ambient = float(run_constants.get("ambient", AMBIENT_PRESSURE))
     columns: dict[str, Array] = {}
     notes: list[str] = [*table.notes, *_override_notes(table, headings)]
@@ -98,20 +107,11 @@ def _add_held(table: RawTable, columns: dict[str, Array], held: Mapping[str, flo
         where = f"{table.origin}: {heading.name}"
         if heading.name in columns:
             raise ColumnError(f"{where} is stated as a constant, but a column contains it. Omit one of them.")
-        number = f"{value!r} {heading.unit}" if heading.unit and not isinstance(value, str) else value
-        si = _held_value(number, heading.target or "1", ambient, where)
+        si = held_value(heading, value, ambient, where)
         columns[heading.name] = np.full(rows, si)
         unit = "" if heading.target == "1" else f" {heading.target}"
         notes.append(f"The {heading.name} is {si:.6g}{unit} in every row, as specified by the user.")
     return notes
-
-
-def _held_value(stated: float | str, target: str, ambient: float, where: str) -> float:
-    """The value of a held quantity in SI; a force may be stated as a load in g or kg, as in a column."""
-    if target == "N" and isinstance(stated, str):
-        with contextlib.suppress(UnitError):
-            return quantity(stated, "kg") * STANDARD_GRAVITY
-    return quantity(stated, target, ambient=ambient, where=where)
 
 
 def _apply_time_base(table: RawTable, columns: dict[str, Array], time_base: TimeBase) -> list[str]:

@@ -33,7 +33,7 @@ from typing import Any
 from ...core import AirmuscleError, ColumnError, ParameterError, abridged, check_field_types, listed, suggestion
 from ...recording.columns import QUANTITIES, parse_heading
 from .channels import RawTable
-from .constants import SPECIMEN, parse_constant_name
+from .constants import SPECIMEN, check_stated, parse_constant_name
 from .file_kind import read_toml
 from .header import FileNamePattern, bare_heading
 from .missing_values import MISSING_VALUES, MissingValues, RefuseMissing, parse_code
@@ -171,9 +171,12 @@ def mapping_of_tables(content: Mapping[str, Any], where: str, base: ColumnMappin
         "drop_outliers": OUTLIERS.get(given.pop("outliers", ""), base.drop_outliers),
     }
     try:
-        return dataclasses.replace(base, **values, **given)
+        mapping = dataclasses.replace(base, **values, **given)
     except AirmuscleError as error:
         raise error.located(where) from None
+    stated = {**content, **(content.get("constants") or {})}
+    check_stated(where, {name: value for name, value in mapping.constants_of().items() if name in stated})
+    return mapping
 
 
 def _check_numbers(content: Mapping[str, Any], where: str) -> None:

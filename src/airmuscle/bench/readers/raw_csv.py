@@ -9,7 +9,7 @@ from typing import BinaryIO
 
 import numpy as np
 
-from ...core import ColumnError, FileError, Hint, abridged
+from ...core import ColumnError, FileError, Hint, abridged, listed
 from ...recording.recording import list_rows
 from .channels import Cells, RawTable
 from .downsampling import Decimation, Downsampling, downsample
@@ -81,7 +81,7 @@ def _parse_by_cell(origin: str, header: TextHeader, body: NumberedLines, decimal
         if len(row) < width or any(row[width:]):
             hint = " If the comma is a decimal comma, separate the columns by ';' or tab."
             raise ColumnError(
-                f"{origin}, line {line}: the line must have {width} cells ({', '.join(header.headings)}); it has "
+                f"{origin}, line {line}: the line must have {width} cells ({listed(header.headings)}); it has "
                 f"{len(row)}."
                 f"{hint if header.delimiter == ',' else ''} Start lines that are not part of the table with '#'."
             )

@@ -7,18 +7,8 @@ from typing import Any
 import numpy as np
 
 from ...core import ColumnError, FileError, listed, suggestion
+from . import header
 from .channels import Cells, RawTable
-from .header import (
-    COMMA_NUMBER,
-    POINT_NUMBER,
-    are_headings,
-    count_cells,
-    is_number,
-    missing_header_error,
-    parse_constant_cells,
-    parse_unit_row,
-    stated_heading_row,
-)
 from .separate_process import import_lab_package, in_separate_process, run_reader
 from .text_format import TextFormat
 from .time_base import seconds_from_clock
@@ -74,22 +64,22 @@ def _nonempty_rows(sheet: Any) -> Rows:
 def _parse_table(origin: str, rows: Rows, text_format: TextFormat) -> RawTable:
     """The table of a worksheet; rows above the headings may state constants."""
     texts = ((i, [_text(cell) for cell in row]) for i, row in rows)
-    stated = stated_heading_row(texts, text_format.named, text_format.skip_rows)
+    stated = header.stated_heading_row(texts, text_format.named, text_format.skip_rows)
     if text_format.skip_rows is not None and stated is None:
         raise FileError(f"{origin}: there is no table below the {text_format.skip_rows} rows of skip_rows.")
     start = _find_heading_row(rows) if stated is None else stated
     constants = dict(
-        constant for _, row in rows[:start] if (constant := parse_constant_cells([_text(cell) for cell in row]))
+        constant for _, row in rows[:start] if (constant := header.parse_constant_cells([_text(cell) for cell in row]))
     )
     first, cells = rows[start]
     used = [j for j, cell in enumerate(cells) if cell not in (None, "")]
-    if are_headings([_text(c) for c in cells]):
+    if header.are_headings([_text(c) for c in cells]):
         headings, body = [_text(cells[j]) for j in used], rows[start + 1 :]
     elif text_format.headerless:
         headings, body = [str(n) for n in range(1, len(used) + 1)], rows[start:]
     else:
-        raise missing_header_error(f"{origin}, row {first}")
-    units = parse_unit_row(headings, [_text(body[0][1][j]) for j in used] if body else [])
+        raise header.missing_header_error(f"{origin}, row {first}")
+    units = header.parse_unit_row(headings, [_text(body[0][1][j]) for j in used] if body else [])
     body = body[1:] if units else body
     if not body:
         raise FileError(f"{origin}: no rows of numbers below the headings ({listed(headings)}).")
@@ -101,20 +91,20 @@ def _parse_table(origin: str, rows: Rows, text_format: TextFormat) -> RawTable:
 def _find_heading_row(rows: Rows) -> int:
     """The index of the last row above the numbers that is as wide as they are, or of the row above the unit row."""
     numeric = next((i for i, (_, row) in enumerate(rows) if _is_numeric(row)), 0)
-    width = count_cells(rows[numeric][1])
-    above = [i for i in range(numeric) if count_cells(rows[i][1]) >= width]
+    width = header.count_cells(rows[numeric][1])
+    above = [i for i in range(numeric) if header.count_cells(rows[i][1]) >= width]
     if not above:
         return numeric
     adjacent = len(above) > 1 and above[-2] == above[-1] - 1
     last = [_text(c) for c in rows[above[-1]][1]]
-    return above[-2] if adjacent and parse_unit_row([_text(c) for c in rows[above[-2]][1]], last) else above[-1]
+    return above[-2] if adjacent and header.parse_unit_row([_text(c) for c in rows[above[-2]][1]], last) else above[-1]
 
 
 def _is_numeric(row: list[Any]) -> bool:
     """Whether more than half of the cells of a row are numbers or times, also as texts; the others may be names."""
     cells = [c for c in row if c not in (None, "")]
     numbers = sum(
-        is_number(c) or seconds_from_clock((c,)) is not None if isinstance(c, str) else isinstance(c, _NUMBERS)
+        header.is_number(c) or seconds_from_clock((c,)) is not None if isinstance(c, str) else isinstance(c, _NUMBERS)
         for c in cells
     )
     return 2 * numbers > len(cells)
@@ -144,8 +134,8 @@ def _column(cells: list[Any]) -> Cells:
         return np.array(cells, dtype=float)
     texts = [_text(cell) for cell in cells]
     stored = [cell for cell in cells if isinstance(cell, str)]
-    if not any(POINT_NUMBER.fullmatch(text.strip()) for text in stored):
-        texts = [text.replace(",", ".") if COMMA_NUMBER.fullmatch(text) else text for text in texts]
+    if not any(header.POINT_NUMBER.fullmatch(text.strip()) for text in stored):
+        texts = [text.replace(",", ".") if header.COMMA_NUMBER.fullmatch(text) else text for text in texts]
     try:
         return np.array([float(text) for text in texts])
     except ValueError:

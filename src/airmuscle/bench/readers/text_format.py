@@ -7,16 +7,7 @@ import re
 from collections.abc import Mapping
 
 from ...core import FileError, ParameterError, abridged, listed
-from .header import (
-    are_headings,
-    count_cells,
-    is_number,
-    missing_header_error,
-    parse_constant_cells,
-    parse_constant_comment,
-    parse_unit_row,
-    stated_heading_row,
-)
+from . import header
 
 NumberedLines = list[tuple[int, str]]
 """Lines of a file with their numbers, counted from 1."""
@@ -134,13 +125,13 @@ def parse_header(origin: str, lines: NumberedLines, text_format: TextFormat) -> 
     delimiter = text_format.detect_delimiter(body[0][1])
     headings, count = _find_headings(origin, comments, body, delimiter, text_format.headerless)
     below = split_cells(body[count][1], delimiter) if len(body) > count else []
-    units = parse_unit_row(headings, below)
+    units = header.parse_unit_row(headings, below)
     count += 1 if units else 0
     if len(body) <= count:
         raise FileError(f"{origin}: no rows of numbers below the headings ({listed(headings)}).")
-    cells = [parse_constant_cells(split_cells(line, delimiter)) for _, line in preamble]
+    cells = [header.parse_constant_cells(split_cells(line, delimiter)) for _, line in preamble]
     constants = dict(
-        constant for constant in (*cells, *(parse_constant_comment(line) for _, line in comments)) if constant
+        constant for constant in (*cells, *(header.parse_constant_comment(line) for _, line in comments)) if constant
     )
     return TextHeader(tuple(headings), units, constants, delimiter, above + count)
 
@@ -152,7 +143,7 @@ def _lines_above_headings(body: NumberedLines, text_format: TextFormat) -> int:
     cells, or the line above the unit row.
     """
     cells_of = ((i, split_cells(line, text_format.detect_delimiter(line))) for i, line in body)
-    stated = stated_heading_row(cells_of, text_format.named, text_format.skip_rows)
+    stated = header.stated_heading_row(cells_of, text_format.named, text_format.skip_rows)
     if stated is not None:
         return stated
     rows: list[tuple[str, list[str]]] = []
@@ -160,9 +151,11 @@ def _lines_above_headings(body: NumberedLines, text_format: TextFormat) -> int:
         delimiter = text_format.detect_delimiter(line)
         cells = split_cells(line, delimiter)
         if _is_numeric(cells):
-            if not rows or (_is_numeric(rows[-1][1]) and is_number(cells[0]) and is_number(rows[-1][1][0])):
+            if not rows or (
+                _is_numeric(rows[-1][1]) and header.is_number(cells[0]) and header.is_number(rows[-1][1][0])
+            ):
                 return 0  # no heading is found above the first rows of numbers
-            above = _heading_above(rows, delimiter, count_cells(cells))
+            above = _heading_above(rows, delimiter, header.count_cells(cells))
             if above is not None:
                 return above
         rows.append((delimiter, cells))
@@ -174,21 +167,21 @@ def _heading_above(rows: list[tuple[str, list[str]]], delimiter: str, width: int
     last = [row for row in rows[-2:] if row[0] == delimiter]
     if not last or rows[-1][0] != delimiter or _is_numeric(last[-1][1]):
         return None
-    if len(last) == 2 and parse_unit_row(last[0][1], last[1][1]):
-        return len(rows) - 2 if max(count_cells(cells) for _, cells in last) >= width else None
-    return len(rows) - 1 if count_cells(last[-1][1]) >= width else None
+    if len(last) == 2 and header.parse_unit_row(last[0][1], last[1][1]):
+        return len(rows) - 2 if max(header.count_cells(cells) for _, cells in last) >= width else None
+    return len(rows) - 1 if header.count_cells(last[-1][1]) >= width else None
 
 
 def _are_numbers_and_blanks(line: str) -> bool:
     """Whether a line consists of two numbers or more between blanks."""
     cells = line.split()
-    return len(cells) > 1 and all(is_number(cell) and not cell.endswith(",") for cell in cells)
+    return len(cells) > 1 and all(header.is_number(cell) and not cell.endswith(",") for cell in cells)
 
 
 def _is_numeric(cells: list[str]) -> bool:
     """Whether a row has two cells or more, and more than half of them are numbers, clock times or dates."""
     filled = [cell for cell in cells if cell]
-    numbers = sum(is_number(cell) or not any(map(str.isalpha, cell)) for cell in filled)
+    numbers = sum(header.is_number(cell) or not any(map(str.isalpha, cell)) for cell in filled)
     return len(filled) > 1 and 2 * numbers > len(filled)
 
 
@@ -197,11 +190,11 @@ def _find_headings(
 ) -> tuple[list[str], int]:
     """The headings, and the number of table lines that they occupy: 0 if they are in the last comment above."""
     first, cells = body[0][0], split_cells(body[0][1], delimiter)
-    if are_headings(cells):
+    if header.are_headings(cells):
         return cells, 1
     above = [split_cells(line.lstrip("#% \t"), delimiter) for i, line in comments if i < first]
-    if above and len(above[-1]) == len(cells) and are_headings(above[-1]):
+    if above and len(above[-1]) == len(cells) and header.are_headings(above[-1]):
         return above[-1], 0
     if headerless:
         return [str(i) for i in range(1, len(cells) + 1)], 0
-    raise missing_header_error(f"{origin}, line {first}")
+    raise header.missing_header_error(f"{origin}, line {first}")

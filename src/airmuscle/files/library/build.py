@@ -13,16 +13,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
 from ...core import Parameter, ParameterError, abridged, check_field, parameters
-from .fields import (
-    accepts,
-    check_required,
-    describe_type,
-    describes_tables,
-    is_table,
-    item_type,
-    options,
-    read_parameter,
-)
+from . import fields
 from .location import Location, check_keys, located_errors
 from .models import allows, model_class, model_names
 
@@ -66,9 +57,9 @@ class TableReader:
         Raises ParameterError, UnitError, UnknownNameError, FileError or ColumnError with the location.
         """
         for cls, read in self.named.items():
-            if cls in options(kind) and (part := read(table, location, self)) is not None:
+            if cls in fields.options(kind) and (part := read(table, location, self)) is not None:
                 return part
-        if isinstance(table, str) and is_table(kind):
+        if isinstance(table, str) and fields.is_table(kind):
             table = {"model": table}
         cls = self._class(table, location, kind)
         given = given or {}
@@ -78,7 +69,7 @@ class TableReader:
         for key in values if is_named else ():
             with located_errors(location):
                 check_field(cls, key)
-        library = ["library"] if any(each in self.named for each in options(kind)) else []
+        library = ["library"] if any(each in self.named for each in fields.options(kind)) else []
         check_keys(values, [*(key for key in names if key), *library], location)
         values = {names[key]: value for key, value in values.items() if names[key] not in given}
         hints = typing.get_type_hints(cls)
@@ -86,13 +77,15 @@ class TableReader:
         signals = self.signals if self.signals is not None and self.signals.concerns(cls) else None
         parts = signals.parts(cls, hints) if signals else {}
         parts |= {n: self._part(v, cls, n, hints[n], location) for n, v in values.items() if n not in declared}
-        check_required(cls, {**values, **parts, **given}, hints, location, is_named)
+        fields.check_required(cls, {**values, **parts, **given}, hints, location, is_named)
         numbers = {name: value for name, value in values.items() if name in declared}
         if signals:
             return signals.make(cls, parts, numbers, location)
         with located_errors(location):
             units = cls.units_of_table(table) if hasattr(cls, "units_of_table") else {}
-        numbers = {n: read_parameter(v, _in_unit(declared[n], units), hints[n], location) for n, v in numbers.items()}
+        numbers = {
+            n: fields.read_parameter(v, _in_unit(declared[n], units), hints[n], location) for n, v in numbers.items()
+        }
         with located_errors(location):
             return cls(**parts, **numbers, **given)
 
@@ -100,7 +93,7 @@ class TableReader:
         """The class of a table. Raises ParameterError or UnknownNameError."""
         only = only_class(kind) if self.classes is None else None
         if not isinstance(table, Mapping):
-            of_kind = "" if kind is Any else f" of {describe_type(kind)}"
+            of_kind = "" if kind is Any else f" of {fields.describe_type(kind)}"
             content = f'model = "..."{of_kind} and its parameters in it'
             if only is not None:
                 content = f"its values in it: {', '.join(_keys(only))}"
@@ -117,7 +110,7 @@ class TableReader:
         if not allows(kind, cls):
             listed = "" if only else f": {', '.join(model_names(kind))}"
             raise ParameterError(
-                f"{location}: {cls.__name__} is not allowed here; {describe_type(kind)} is required{listed}."
+                f"{location}: {cls.__name__} is not allowed here; {fields.describe_type(kind)} is required{listed}."
             )
         return cls
 
@@ -131,17 +124,17 @@ class TableReader:
 
     def value(self, value: Any, hint: Any, location: Location, key: str, first: int | None = None) -> Any:
         """The value of a key by an annotation; `first` is the number of the first table of an array in messages."""
-        item = item_type(hint)
+        item = fields.item_type(hint)
         if isinstance(value, list) and item is not None:
             places = [f"{key}[{i}]" if first is None else f"{key} {i + first}" for i in range(len(value))]
             return tuple(self.value(v, item, location, p) for v, p in zip(value, places, strict=True))
-        if accepts(hint, value) and not isinstance(value, Mapping):
+        if fields.accepts(hint, value) and not isinstance(value, Mapping):
             return value
-        if describes_tables(hint) or (is_table(hint) and isinstance(value, Mapping | str)):
+        if fields.describes_tables(hint) or (fields.is_table(hint) and isinstance(value, Mapping | str)):
             return self.build(value, location.inside(key), kind=hint)
-        if isinstance(value, Mapping) and is_table(item):
+        if isinstance(value, Mapping) and fields.is_table(item):
             raise ParameterError(f"{location}: '{key}' must be an array of tables; write [[{key}]] above each.")
-        raise ParameterError(f"{location}: {key} is {abridged(value)}; it must be {describe_type(hint)}.")
+        raise ParameterError(f"{location}: {key} is {abridged(value)}; it must be {fields.describe_type(hint)}.")
 
 
 build = TableReader().build
@@ -158,7 +151,9 @@ def _keys(cls: type[Any]) -> list[str]:
 
 def only_class(kind: Any) -> type[Any] | None:
     """The class of a place where only one is possible."""
-    classes = [option for option in options(kind) if dataclasses.is_dataclass(option) and inspect.isclass(option)]
+    classes = [
+        option for option in fields.options(kind) if dataclasses.is_dataclass(option) and inspect.isclass(option)
+    ]
     if len(classes) != 1 or inspect.isabstract(classes[0]) or set(model_names(kind)) - {classes[0].__name__}:
         return None
     return classes[0]

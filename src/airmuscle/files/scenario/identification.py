@@ -55,19 +55,10 @@ from ...physics.plant.plant import Plant
 from ...recording import Recording
 from ..library import build_plant, custom_field, read_toml, scenario_toml
 from ..library.location import Location, check_keys, located_errors, read_text
+from . import values
 from .initial_state import build_initial_conditions, pressure_names
 from .inputs import build_input_signal
 from .plant_uncertainty import fit_uncertainty
-from .values import (
-    FitTable,
-    Number,
-    optional_table,
-    read_observed,
-    read_table,
-    required_table,
-    signal_unit,
-    table_reader,
-)
 
 
 def _read_mapping(value: Any, plant: Plant, where: Location) -> ColumnMapping:
@@ -85,15 +76,15 @@ class RecordTable:
     """One [[record]] of a file."""
 
     file: str = ""
-    start_time: float = custom_field(Number("s"), "time of the record at which the input begins", default=0.0)
-    initial_state: Mapping[str, Any] = custom_field(read_table, "initial values", default_factory=dict)
-    first: float = custom_field(Number("s"), "time of the first row that is used", default=-math.inf)
-    last: float = custom_field(Number("s"), "time of the last row that is used", default=math.inf)
+    start_time: float = custom_field(values.Number("s"), "time of the record at which the input begins", default=0.0)
+    initial_state: Mapping[str, Any] = custom_field(values.read_table, "initial values", default_factory=dict)
+    first: float = custom_field(values.Number("s"), "time of the first row that is used", default=-math.inf)
+    last: float = custom_field(values.Number("s"), "time of the last row that is used", default=math.inf)
     mapping: ColumnMapping = custom_field(_read_mapping, "what the file does not state", default=ColumnMapping())
     resting_length: float | str | None = None
     ambient: float | str | None = None
-    input: Mapping[str, Any] | None = custom_field(read_table, "input of this record", default=None)
-    plant: Mapping[str, Any] = custom_field(read_table, "parts of the plant that differ", default_factory=dict)
+    input: Mapping[str, Any] | None = custom_field(values.read_table, "input of this record", default=None)
+    plant: Mapping[str, Any] = custom_field(values.read_table, "parts of the plant that differ", default_factory=dict)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -114,8 +105,8 @@ class Record:
 
         Raises FileError, ParameterError, UnitError, UnknownNameError or ColumnError with the location.
         """
-        row: RecordTable = table_reader(self.shared).build(self.row, self.location, kind=RecordTable)
-        table = dict(optional_table(self.tables, "input", self.location) if row.input is None else row.input)
+        row: RecordTable = values.table_reader(self.shared).build(self.row, self.location, kind=RecordTable)
+        table = dict(values.optional_table(self.tables, "input", self.location) if row.input is None else row.input)
         if "file" in table:  # absolute, because the table is also written to other folders
             table["file"] = str((self.location.folder / str(table["file"])).resolve())
         in_input = self.location.inside("input")
@@ -134,7 +125,7 @@ class Record:
         file states another one."""
         tables = {**self.tables["plant"], **row.plant}
         plant = build_plant(tables, self.location.inside("plant")) if row.plant else self.shared
-        stated = {} if self.predicted else optional_table(tables, "ambient", self.location.inside("plant"))
+        stated = {} if self.predicted else values.optional_table(tables, "ambient", self.location.inside("plant"))
         measured = stated_ambient(recording, plant.ambient)
         free = {name: value for name, value in vars(measured).items() if name not in stated}
         ambient = dataclasses.replace(plant.ambient, **free)
@@ -181,7 +172,7 @@ def build_records(
 
 def with_observed(recording: Recording, observed: Mapping[str, tuple[float, str]], plant: Plant) -> Recording:
     """The recording with the observed columns under the names of the outputs [SI]. Raises ColumnError, UnitError."""
-    columns = {name: (column, signal_unit(name, plant)) for name, (_, column) in observed.items()}
+    columns = {name: (column, values.signal_unit(name, plant)) for name, (_, column) in observed.items()}
     return recording.with_columns(**{name: recording.in_unit(*column) for name, column in columns.items()})
 
 
@@ -258,12 +249,14 @@ def load_dynamic_fit(path: str | Path) -> DynamicFitSetup:
     file = Path(path)
     tables, location = read_toml(file), Location.of_file(file)
     check_keys(tables, ("title", "plant", "input", "observed", "fit", "record"), location)
-    plant = build_plant(required_table(tables, "plant", location), location.inside("plant"))
+    plant = build_plant(values.required_table(tables, "plant", location), location.inside("plant"))
     with ambient_pressure(plant.ambient.pressure):  # that of the texts
-        observed = read_observed(required_table(tables, "observed", location), plant, location.at("observed"))
+        observed = values.read_observed(
+            values.required_table(tables, "observed", location), plant, location.at("observed")
+        )
         records = build_records(tables, tables, plant, observed, location)
-        table = required_table(tables, "fit", location)
-        fit: FitTable = table_reader(plant).build(table, location.inside("fit"), kind=FitTable)
+        table = values.required_table(tables, "fit", location)
+        fit: values.FitTable = values.table_reader(plant).build(table, location.inside("fit"), kind=values.FitTable)
         return DynamicFitSetup(
             title=read_text(tables, "title", location, needed=False) or file.stem,
             plant=plant,

@@ -12,31 +12,12 @@ from ....physics.plant.plant import Plant
 from ....physics.pneumatics import FillDischarge
 from ..dynamic import DynamicFit, Experiment
 from ..dynamic.experiment import describe_ambient
-from .fill_records import (
-    CONDUCTANCE,
-    DISCHARGE,
-    SUPPLY,
-    ValveUnknowns,
-    at_record,
-    describe_skills,
-    describe_supply,
-    detected_experiment,
-    fill_baselines,
-    fit_pressure,
-    has_supply_volume,
-    held_contraction,
-    poor_ratios,
-    pressure_deviation,
-    rescaled,
-    vessel_plant,
-    with_instants,
-    with_supply_volume,
-)
+from . import fill_records as fills
 from .record import CampaignRecord
 from .transient import LeftOutStage
 from .volume import VolumeChange, VolumeEstimate, relate_volumes
 
-Fitted = Callable[[Sequence[Experiment], ValveUnknowns], DynamicFit]
+Fitted = Callable[[Sequence[Experiment], fills.ValveUnknowns], DynamicFit]
 NAME = "fills and volume"
 VOLUME = "muscle.geometry.enclosed_volume"
 REMEDY = (
@@ -90,7 +71,7 @@ class FillStage(ShortRepr):
     @property
     def misfit(self) -> str:
         """The remark that the model does not follow the pressure of the records, with its cause; empty if it does."""
-        noise = pressure_deviation(self.records)
+        noise = fills.pressure_deviation(self.records)
         change = max(abs(step.change) for record in self.records for step in record.steps)
         worst, rms = max(
             ((record, self.fit.rms("pressure", i)) for i, record in enumerate(self.records)), key=lambda each: each[1]
@@ -112,7 +93,7 @@ class FillStage(ShortRepr):
         if self.cross_rms:
             text = (
                 f"Each fill predicted by the parameters of the others: rms error {min(self.cross_rms) / 1e3:.3g} to "
-                f"{max(self.cross_rms) / 1e3:.3g} kPa{describe_skills(self.cross_rms, self.baselines)}. "
+                f"{max(self.cross_rms) / 1e3:.3g} kPa{fills.describe_skills(self.cross_rms, self.baselines)}. "
             )
         text += f"Joint fit of {len(rms)} records: rms residual {min(rms):.3g} to {max(rms):.3g} kPa."
         if self.estimate is not None:
@@ -180,16 +161,16 @@ class _RelativeFit:
 
     @classmethod
     def of(cls, records: Sequence[CampaignRecord]) -> "_RelativeFit":
-        def fitted(experiments: Sequence[Experiment], valves: ValveUnknowns) -> DynamicFit:
-            free = [*valves.shared, *([f"{DISCHARGE}.{CONDUCTANCE}"] if valves.both else [])]
-            return fit_pressure(records, experiments, free, (VOLUME,))
+        def fitted(experiments: Sequence[Experiment], valves: fills.ValveUnknowns) -> DynamicFit:
+            free = [*valves.shared, *([f"{fills.DISCHARGE}.{fills.CONDUCTANCE}"] if valves.both else [])]
+            return fills.fit_pressure(records, experiments, free, (VOLUME,))
 
-        experiments = [detected_experiment(record, vessel_plant(record)) for record in records]
-        return cls(_with_supply(records, experiments, ValveUnknowns.of(records), fitted)[0], tuple(records))
+        experiments = [fills.detected_experiment(record, fills.vessel_plant(record)) for record in records]
+        return cls(_with_supply(records, experiments, fills.ValveUnknowns.of(records), fitted)[0], tuple(records))
 
     @property
     def contractions(self) -> Array:
-        return np.array([held_contraction(record) for record in self.records])
+        return np.array([fills.held_contraction(record) for record in self.records])
 
     def _volumes(self) -> tuple[Array, Array]:
         """The relative volumes and their standard errors, shape (K,) each."""
@@ -207,13 +188,15 @@ class _RelativeFit:
 
     def experiments(self, records: Sequence[CampaignRecord], geometry: Geometry, scale: float) -> list[Experiment]:
         """All records with the volumes of a geometry, from the valves and instants of this fit."""
-        found = rescaled(self.fit.plant(), scale)
+        found = fills.rescaled(self.fit.plant(), scale)
         experiments = []
         for record in records:
-            plant = at_record(found, record, float(geometry.volume(held_contraction(record))))
-            experiment = detected_experiment(record, plant)
+            plant = fills.at_record(found, record, float(geometry.volume(fills.held_contraction(record))))
+            experiment = fills.detected_experiment(record, plant)
             known = record in self.records
-            experiments.append(with_instants(experiment, self.fit, self.records.index(record)) if known else experiment)
+            experiments.append(
+                fills.with_instants(experiment, self.fit, self.records.index(record)) if known else experiment
+            )
         return experiments
 
 
@@ -226,11 +209,11 @@ def _fit_jointly(
 ) -> FillStage:
     """The fit with the volumes of one curve, and the prediction of each record from the others."""
     everything = range(len(records))
-    valves = ValveUnknowns.of(records, sinks=any(has_supply_volume(each.plant) for each in experiments))
+    valves = fills.ValveUnknowns.of(records, sinks=any(fills.has_supply_volume(each.plant) for each in experiments))
     fit, experiments, valves = _with_supply(
         records, experiments, valves, lambda changed, free: _fit_common(records, changed, everything, free)
     )
-    if valves.both and (reason := poor_ratios(fit)):
+    if valves.both and (reason := fills.poor_ratios(fit)):
         valves = dataclasses.replace(valves, common_ratio=reason)
         fit = _fit_common(records, experiments, everything, valves)
     cross = []
@@ -238,44 +221,52 @@ def _fit_jointly(
         part = _fit_common(records, experiments, [k for k in everything if k != i], valves)
         cross.append(_prediction_rms(fit, part, i))
         progress(0.5 + 0.5 * (i + 1) / len(records))
-    contractions = np.array([held_contraction(record) for record in records])
+    contractions = np.array([fills.held_contraction(record) for record in records])
     supposed = (
-        *([describe_supply(fit)] if valves.sinks else []),
+        *([fills.describe_supply(fit)] if valves.sinks else []),
         *valves.supposed,
         *describe_ambient([record.recording for record in records]),
     )
-    others = fill_baselines(fit) if cross else ()
+    others = fills.fill_baselines(fit) if cross else ()
     return FillStage(
         fit, tuple(records), tuple(experiments), geometry, estimate, contractions, tuple(cross), others, supposed
     )
 
 
 def _fit_common(
-    records: Sequence[CampaignRecord], experiments: Sequence[Experiment], chosen: Sequence[int], every: ValveUnknowns
+    records: Sequence[CampaignRecord],
+    experiments: Sequence[Experiment],
+    chosen: Sequence[int],
+    every: fills.ValveUnknowns,
 ) -> DynamicFit:
     """The fit of the chosen records, with what is supposed of the valves of every record."""
-    valves = ValveUnknowns.of([records[i] for i in chosen], every.common_ratio, every.sinks)
-    return fit_pressure(records, [experiments[i] for i in chosen], [*valves.shared, *valves.paths(CONDUCTANCE)])
+    valves = fills.ValveUnknowns.of([records[i] for i in chosen], every.common_ratio, every.sinks)
+    return fills.fit_pressure(
+        records, [experiments[i] for i in chosen], [*valves.shared, *valves.paths(fills.CONDUCTANCE)]
+    )
 
 
 def _with_supply(
-    records: Sequence[CampaignRecord], experiments: Sequence[Experiment], valves: ValveUnknowns, fitted: Fitted
-) -> tuple[DynamicFit, Sequence[Experiment], ValveUnknowns]:
+    records: Sequence[CampaignRecord],
+    experiments: Sequence[Experiment],
+    valves: fills.ValveUnknowns,
+    fitted: Fitted,
+) -> tuple[DynamicFit, Sequence[Experiment], fills.ValveUnknowns]:
     """The fit with a constant supply; where it does not follow the records, with a volume before the valve.
 
     The volume is used where the records determine it and the fit then follows them.
     """
     constant = fitted(experiments, valves)
-    limit, everything = MAX_FOLLOWED * pressure_deviation(records), range(len(records))
+    limit, everything = MAX_FOLLOWED * fills.pressure_deviation(records), range(len(records))
     if not valves.fill or valves.sinks or all(constant.rms("pressure", i) <= limit for i in everything):
         return constant, experiments, valves
     sinking = dataclasses.replace(valves, sinks=True)
-    changed = [with_instants(with_supply_volume(each), constant, i) for i, each in enumerate(experiments)]
+    changed = [fills.with_instants(fills.with_supply_volume(each), constant, i) for i, each in enumerate(experiments)]
     try:
         fit = fitted(changed, sinking)
     except AirmuscleError:  # the simulation fails on the way
         return constant, experiments, valves
-    volume = fit[f"{SUPPLY}.volume"]
+    volume = fit[f"{fills.SUPPLY}.volume"]
     determined = not volume.on_bound and volume.stderr <= MAX_VOLUME_ERROR * volume.value
     follows = all(fit.rms("pressure", i) <= limit for i in everything)
     return (fit, changed, sinking) if determined and follows else (constant, experiments, valves)

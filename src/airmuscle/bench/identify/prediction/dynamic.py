@@ -21,15 +21,7 @@ from ..dynamic.fit import fit_dynamic
 from ..dynamic.record_model import ModelOutputs, RecordModel, commands_at
 from ..dynamic.reliability import RECORD_CONSEQUENCE
 from ..dynamic.result import DynamicFit
-from .result import (
-    NOISY_MARGIN,
-    QuantityPrediction,
-    RecordPrediction,
-    range_notes,
-    rate_notes,
-    rows_outside,
-    with_band_notes,
-)
+from . import result
 
 NORMAL_QUANTILE = 1.959963984540054
 """97.5 % quantile of the normal distribution."""
@@ -97,7 +89,7 @@ def predict_dynamic(
     uncertainty: PlantUncertainty | None = None,
     own: Sequence[RecordUnknown] = (),
     method: Integrator | None = None,
-) -> RecordPrediction:
+) -> result.RecordPrediction:
     """Predict quantities of a transient record by simulating an identified plant from its initial conditions.
 
     plant        the identified plant; that of the experiment replaces it, for example one in other ambient air, which a
@@ -130,15 +122,15 @@ def predict_dynamic(
         measured, predicted = recording[name], modelled.values[:, i]
         compared = np.isfinite(measured) & np.isfinite(predicted)
         band = "" if uncertainty is None else uncertainty.source(name)
-        quantities.append(QuantityPrediction(name, measured, predicted, half, compared, band))
+        quantities.append(result.QuantityPrediction(name, measured, predicted, half, compared, band))
     ranges, rates = ({}, {}) if uncertainty is None else (uncertainty.ranges, uncertainty.rates)
-    faster = rate_notes(recording, rates)
-    notes += [*range_notes(recording, ranges, NOISY_MARGIN), *faster]
+    faster = result.rate_notes(recording, rates)
+    notes += [*result.range_notes(recording, ranges, result.NOISY_MARGIN), *faster]
     notes += [f"the band of {q.name} is {q.band}" for q in quantities if q.half_width is None and q.band]
-    outside = rows_outside(recording, ranges, NOISY_MARGIN)
+    outside = result.rows_outside(recording, ranges, result.NOISY_MARGIN)
     driving = commands_at(plant, experiment.command, recording["time"] - experiment.start_time)
-    prediction = RecordPrediction(recording, tuple(quantities), tuple(notes), outside, driving)
-    return with_band_notes(prediction, [*other_air, *(["faster changes"] if faster else [])], USUAL)
+    prediction = result.RecordPrediction(recording, tuple(quantities), tuple(notes), outside, driving)
+    return result.with_band_notes(prediction, [*other_air, *(["faster changes"] if faster else [])], USUAL)
 
 
 def _describe_estimates(fit: DynamicFit) -> list[str]:

@@ -16,36 +16,32 @@ from ....physics.muscle.characteristic import ContractileSurface, ForceLaw, Vali
 from ....recording import Recording
 from ..result import Fit
 from ..static_fit import fit
-from .monotonicity import (
-    MonotonicityRule,
-    MonotonicityViolation,
-    bernstein_coefficients,
-    find_violations,
-    solve_constrained_least_squares,
-)
+from . import monotonicity
 
 _MIN_SLOPE = 1e-9
 """Minimum slope relative to the maximum force, on the validity range scaled to -1..1, so that rounding cannot change
 the sign; chosen."""
 LEAST_SHARE = 1e-3
 """Share of the validity range below which a region that violates the shape of a fitted law is not named (chosen)."""
-FALLS_WITH_PRESSURE = MonotonicityRule("force falls with pressure", "force", 0, -1.0)
-RISES_WITH_CONTRACTION = MonotonicityRule("force rises with contraction", "force", 1, 1.0)
+FALLS_WITH_PRESSURE = monotonicity.MonotonicityRule("force falls with pressure", "force", 0, -1.0)
+RISES_WITH_CONTRACTION = monotonicity.MonotonicityRule("force rises with contraction", "force", 1, 1.0)
 
 
 def find_shape_violations(
     law: ForceLaw, validity_range: ValidityRange, *, points: int = 101
-) -> tuple[MonotonicityViolation, ...]:
+) -> tuple[monotonicity.MonotonicityViolation, ...]:
     """The regions of a validity range where a force falls with pressure or rises with contraction, largest first.
 
     Exact slopes are evaluated on an even grid of `points` pressures and contractions.
     """
     check_whole("find_shape_violations", "points", points, 2)
     sides = (np.linspace(*validity_range.pressure, points), np.linspace(*validity_range.contraction, points))
-    return find_violations(law, (FALLS_WITH_PRESSURE, RISES_WITH_CONTRACTION), *np.meshgrid(*sides, indexing="ij"))
+    return monotonicity.find_violations(
+        law, (FALLS_WITH_PRESSURE, RISES_WITH_CONTRACTION), *np.meshgrid(*sides, indexing="ij")
+    )
 
 
-def shape_violations_of_fit(fit: Fit, *, points: int = 101) -> tuple[MonotonicityViolation, ...]:
+def shape_violations_of_fit(fit: Fit, *, points: int = 101) -> tuple[monotonicity.MonotonicityViolation, ...]:
     """The shape violations of a fitted law in the range of its data; none for laws that are no closed-form force."""
     law = fit.model
     varies = all(low < high for low, high in fit.data_ranges.values())
@@ -64,7 +60,7 @@ class ShapeConstrainedFit(ShortRepr):
     """Root mean square error over the fitted rows [N]."""
     unconstrained_rmse: float
     """The same without constraints [N]."""
-    unconstrained_violations: tuple[MonotonicityViolation, ...]
+    unconstrained_violations: tuple[monotonicity.MonotonicityViolation, ...]
     """The regions where the unconstrained surface violates a rule."""
 
 
@@ -96,7 +92,7 @@ def fit_shape_constrained(
     scale = float(np.abs(target).max())
     basis = _free_contraction_basis(surface, free)
     minimum = _MIN_SLOPE if free is None else 0.0
-    scaled = basis @ solve_constrained_least_squares(matrix @ basis, target / scale, rows @ basis, minimum)
+    scaled = basis @ monotonicity.solve_constrained_least_squares(matrix @ basis, target / scale, rows @ basis, minimum)
     model = dataclasses.replace(surface, coefficients=tuple(float(a) for a in scale * scaled))
     residuals = matrix @ (scale * scaled) - target
     rmse = float(np.sqrt(np.mean(residuals**2)))
@@ -134,10 +130,12 @@ def shape_constraints(degree: int, cells: tuple[int, int]) -> Array:
 def _bernstein_matrix(degree: int, cells: int, *, slope: bool) -> Array:
     """Bernstein coefficients, on equal cells of -1..1, of 1, x, .. x^degree or their slopes, one column each."""
     if not slope:
-        return bernstein_coefficients(lambda x: np.asarray(polynomial.polyvander(x, degree)), degree + 1, cells)
+        return monotonicity.bernstein_coefficients(
+            lambda x: np.asarray(polynomial.polyvander(x, degree)), degree + 1, cells
+        )
     powers = np.arange(1, degree + 1)
 
     def slopes(x: Array) -> Array:
         return np.column_stack([np.zeros(x.size), polynomial.polyvander(x, degree - 1) * powers])
 
-    return bernstein_coefficients(slopes, degree, cells)
+    return monotonicity.bernstein_coefficients(slopes, degree, cells)
