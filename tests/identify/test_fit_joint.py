@@ -144,7 +144,10 @@ def test_the_command_inspects_and_fits(tmp_path):
     shown = airmuscle("fit-joint", *names, "--inspect").output
     assert "12 episodes of 95 rows at 100 Hz" in shown
     shown = airmuscle("fit-joint", *names, "--out", tmp_path / "out", "--left-out", "0.25", "--horizon", "12").output
-    assert "free run over 0.12 s on 3 episodes left out" in " ".join(shown.split())
+    shown = " ".join(shown.split())
+    assert "free run over 0.12 s on 3 episodes left out" in shown
+    assert "the band comes from 3 episodes left out: it is no 95 % band" in shown
+    assert "those of a further episode with 75 %, n/(n + 1), and 19 episodes are needed" in shown
     assert (tmp_path / "out" / "report.html").exists()
     plant = am.files.load_scenario(tmp_path / "out" / "scenario.toml")
     assert len(plant.plant.muscles) == 2
@@ -155,7 +158,8 @@ def test_the_command_inspects_and_fits(tmp_path):
     for arguments in (
         ("simulate", tmp_path / "out" / "scenario.toml", "--out", tmp_path / "run"),
         ("simulate", controlled, "--out", tmp_path / "loop"),
-        ("tune", controlled, "--budget", "48", "--out", tmp_path / "tuning"),
+        ("evaluate", tmp_path / "out" / "muscles" / "m1.toml", "--pressure", "2 bar", "--contraction", "1 %"),
+        ("tune", controlled, "--budget", "80", "--out", tmp_path / "tuning"),
         ("export", controlled, "--to", "c", "--out", tmp_path / "c"),
         ("export", controlled, "--controller", "--to", "c", "--out", tmp_path / "controller"),
     ):

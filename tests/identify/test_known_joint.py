@@ -14,7 +14,7 @@ import airmuscle as am
 from airmuscle.bench import Episode, Episodes, fit_known_joint
 from airmuscle.core import tree
 from airmuscle.engine import RungeKutta4, SampledSignal, simulate_batch
-from airmuscle.errors import ParameterError
+from airmuscle.errors import IdentificationError, ParameterError
 from airmuscle.physics import PressureDriven
 
 STEP, ROWS, COUNT = 0.01, 95, 24
@@ -67,7 +67,7 @@ def test_the_numbers_of_the_plant_are_found_within_their_standard_errors(episode
         assert abs(found[path].value - value) < 4.0 * found[path].standard_error
     assert np.degrees(fit.rms[0]) < 0.06  # the noise of the angles is 0.03 deg
     assert fit.skill[0] > 0.9
-    zeros = [float(remark.partition(": ")[2].split()[0]) for remark in fit.remarks if remark.startswith("zeros of")]
+    zeros = [float(remark.partition(": ")[2].split()[0]) for remark in fit.remarks if remark.startswith("zero of")]
     np.testing.assert_allclose(zeros, ZEROS, atol=1500.0)
     assert lines[0].startswith("8 parameters")
     np.testing.assert_allclose(fit.uncertainty().covariance.shape, (6, 6))
@@ -84,7 +84,7 @@ def test_the_gains_of_the_readings_are_found_by_the_force_of_the_rubber(episodes
     """A known force that does not grow with the pressure fixes the scale of pressures and inertia together."""
     scaled = replace(episodes, runs=tuple(replace(run, pressure=run.pressure / [1.1, 0.95]) for run in episodes.runs))
     fit = fit_known_joint(scaled, known(**{"mechanism.inertia": 0.05}), ("mechanism.inertia", "gains", "zeros"))
-    gains = [float(remark.partition(": ")[2].split()[0]) for remark in fit.remarks if remark.startswith("gains of")]
+    gains = [float(remark.partition(": ")[2].split()[0]) for remark in fit.remarks if remark.startswith("gain of")]
     np.testing.assert_allclose(gains, [1.1, 0.95], rtol=0.02)
     assert fit.estimates[0].value == pytest.approx(0.03, rel=0.02)
 
@@ -92,10 +92,21 @@ def test_the_gains_of_the_readings_are_found_by_the_force_of_the_rubber(episodes
 def test_impossible_requests_are_refused(episodes):
     with pytest.raises(ParameterError, match=r"no parameter 'mechanism.inertai'; .* Did you mean"):
         fit_known_joint(episodes, JOINT, ("mechanism.inertai",))
-    with pytest.raises(
-        ParameterError, match="24 episodes have 2 pressures, 1 angles, the arm 2 muscles and 1 coordinates"
-    ):
+    with pytest.raises(ParameterError, match="left_out is 1 of 24 episodes; give 4 episodes or more"):
         fit_known_joint(episodes, JOINT, left_out=1.0)
+    twice = replace(episodes, runs=tuple(replace(run, angle=np.hstack([run.angle] * 2)) for run in episodes.runs))
+    with pytest.raises(ParameterError, match="have 2 pressures and 2 angles, the arm 2 muscles and 1 coordinates"):
+        fit_known_joint(twice, JOINT)
+    with pytest.raises(ParameterError, match=r"the mapping states the pairs \[\(2, 1\)\], the joint has \[\(1, 2\)\]"):
+        fit_known_joint(episodes, JOINT, pairs=((2, 1),))
+
+
+def test_pressures_in_the_order_of_the_other_muscles_are_named(episodes):
+    crossed = replace(episodes, runs=tuple(replace(run, pressure=run.pressure[:, ::-1]) for run in episodes.runs))
+    with pytest.raises(
+        IdentificationError, match=r"muscles are exchanged: .* pressure 1 raises angle 1, the record that"
+    ):
+        fit_known_joint(crossed, JOINT)
 
 
 def test_the_command_takes_the_scenario_of_a_joint(episodes, tmp_path):
@@ -110,8 +121,16 @@ def test_the_command_takes_the_scenario_of_a_joint(episodes, tmp_path):
     given = ("fit-joint", tmp_path / "all.npz", "--mapping", tmp_path / "arm.toml")
     done = airmuscle(*map(str, (*given, "--known", tmp_path / "joint.toml", "--out", tmp_path / "out")))
     assert done.exit_code == 0, done.output
-    plant = am.files.load_scenario(tmp_path / "out" / "scenario.toml").plant
-    assert plant.mechanism.inertia == pytest.approx(0.03, rel=0.05)
-    assert [path.name for path in Path(tmp_path / "out").glob("*.toml")] == ["scenario.toml"]
+    scenario = am.files.load_scenario(tmp_path / "out" / "scenario.toml")
+    assert scenario.plant.mechanism.inertia == pytest.approx(0.03, rel=0.05)
+    varied = am.environments.FitUncertainty(scenario.uncertainty).variations(scenario.plant, 50)["mechanism.inertia"]
+    assert 0.0 < varied.std() < 0.003
+    controlled = Path(tmp_path / "out" / "controlled.toml")
+    done = airmuscle(*map(str, ("tune", controlled, "--budget", "80", "--out", tmp_path / "tuning")))
+    assert done.exit_code == 0, done.output
+    assert "drawn 4" in done.output  # from the covariance of the fit
+    loop = am.files.load_scenario(tmp_path / "out" / "controlled-tuned.toml")
+    run = am.solve(loop.problem).recording
+    assert run["angle"][-1] == pytest.approx(run["setpoint.angle"][-1], rel=0.1)
     refused = airmuscle(*map(str, (*given, "--free", "mechanism.inertia")))
     assert "--free requires --known, the scenario of the joint" in " ".join(refused.output.split())

@@ -747,6 +747,13 @@ def test_several_files_are_a_folder_of_episodes(app):
          "mapping", "00.csv: no column 'q'; there are angle, speed, pressure1, pressure2"),
         ("a.zip", None, {"mapping": "x" * 30_000}, "mapping", "must be a text of at most 20000 characters"),
         ("a.zip", None, {"horizon": "2"}, "horizon", "horizon is 2; allowed range: 5 to 1000"),
+        ("a.zip", None, {"known": "joint-dmsp-20-matrx"}, "known", "Did you mean 'joint-dmsp-20-matrix'?"),
+        ("a.zip", None, {"known": "/etc/passwd"}, "known", "'/etc/passwd' is no plant of the library"),
+        ("a.zip", None, {"known": '[plant]\nmuscle = "../m.toml"'}, "known", "must not refer to files"),
+        ("a.zip", None, {"known": "[plant"}, "known", "known.toml"),
+        ("a.zip", None, {"known": "joint-dmsp-20-matrix", "residual": "yes"}, "residual", "known exclude each other"),
+        ("a.zip", None, {"residual": "no"}, "residual", "residual is 'no'; give yes, or nothing"),
+        ("a.zip", None, {"free": "zeros"}, "free", "free requires known"),
     ],
 )  # fmt: skip
 def test_an_impossible_record_names_the_field(app, name, content, settings, field, text):
@@ -771,9 +778,14 @@ def fitted(source, asked, progress):
     count = len(list(source.iterdir()))
     table = Table("joint-errors", "Errors", {"prediction by": ["model"], "joint 1": [0.1]})
     plots = (Plot("horizon", "Error against the horizon", Figure),)
-    values = {"summary": f"{count} files, horizon {asked.horizon}", "tables": (table,), "plots": plots}
+    values = {
+        "summary": f"{count} files, horizon {asked.horizon}, {asked.known}, {asked.free}",
+        "tables": (table,),
+        "plots": plots,
+    }
     return Chapter(name="joint", title="Identified arm", notes=("not separated",), **values), {
-        "scenario.toml": "a = 1\n"
+        "scenario.toml": "a = 1\n",
+        "muscles/m0.toml": "b = 1\n",
     }
 
 
@@ -781,14 +793,17 @@ def test_the_fit_is_that_of_the_command_and_offers_its_files(app, monkeypatch):
     monkeypatch.setattr(arm_task, "fit_requested_arm", fitted)
     files, answer = sheet_of(app, "episodes.zip", archive())
     settings = {"record": "arm", "mapping": answer.json()["mapping"], "horizon": "30"}
+    settings |= {"known": "joint-dmsp-20-matrix", "free": "mechanism.inertia, zeros"}
     task = post(app, "start", set=files, settings=settings).json()["task"]
     assert finished(app, task)["state"] == "done"
     result = request(app, "GET", f"/api/fit/task/{task}/result.json").json()
-    assert result["arm"]["paragraphs"] == ["20 files, horizon 30"]
+    assert result["arm"]["paragraphs"] == ["20 files, horizon 30, joint-dmsp-20-matrix, ('mechanism.inertia', 'zeros')"]
     assert result["arm"]["notes"] == ["not separated"]
     assert result["figures"][0]["src"].startswith("data:image/svg+xml;base64,")
     assert result["files"] == ["report.html", "scenario.toml", "report.zip"]
     assert request(app, "GET", f"/api/fit/task/{task}/scenario.toml").body == b"a = 1\n"
+    with zipfile.ZipFile(io.BytesIO(request(app, "GET", f"/api/fit/task/{task}/report.zip").body)) as packed:
+        assert packed.read("muscles/m0.toml") == b"b = 1\n"
 
 
 def test_an_error_of_the_fit_is_shown_at_the_fit(app, monkeypatch):

@@ -73,6 +73,24 @@ class Episodes:
         return np.concatenate([getattr(each, name) for each in self.runs])
 
 
+ENOUGH = 19
+"""Episodes from which errors can hold 95 % of further ones: the greatest of n holds the next with n/(n + 1)."""
+
+
+def count_fitted(episodes: Episodes, left_out: float | None) -> int:
+    """Number of the episodes, the first ones, that are fitted while a share of them is left out.
+
+    Without a share a tenth is left out, or ENOUGH if that is more, but a third at most. Raises ParameterError.
+    """
+    count = len(episodes)
+    share = min(max(0.1, ENOUGH / count), 1 / 3) if left_out is None else left_out
+    if not 0.0 < share < 1.0 or count < 4:
+        raise ParameterError(
+            f"left_out is {share:g} of {count} episodes; give 4 episodes or more, and a share between 0 and 1."
+        )
+    return max(1, round((1.0 - share) * count))
+
+
 def speed_of(angle: Array, sample_time: float) -> Array:
     """Speed [rad/s] from angles (n, J): slope of a parabola through five rows."""
     if len(angle) < 5:

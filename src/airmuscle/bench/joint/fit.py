@@ -19,7 +19,7 @@ from ...physics import (
 )
 from .descent import CLIP, Descent, SearchStage, gradients, typical_size
 from .episode_inspection import EpisodeInspection, check_episodes, inspect_episodes
-from .episodes import HISTORY, ROWS, Episodes, Windows, band, cut, in_pairs, rms
+from .episodes import HISTORY, ROWS, Episodes, Windows, band, count_fitted, cut, in_pairs, rms
 from .free_run import baseline_errors, fit_regulator_lags, free_run, from_commands, judged_residual
 from .result import ArmFit, ArmParameter
 
@@ -40,7 +40,7 @@ def fit_joint(
     *,
     pairs: Sequence[tuple[int, int]] = (),
     axes: Sequence[tuple[int, int, int]] = (),
-    left_out: float = 0.1,
+    left_out: float | None = None,
     rows: int = ROWS,
     residual: bool = False,
     seed: int = 0,
@@ -51,7 +51,8 @@ def fit_joint(
     pairs     for each joint the muscles, from 1, that raise and lower its angle; found from the record unless given
     axes      axes of the joints in the frames of their links, (0, 0, 1) for z: the inertial coupling of the links is
               then identified; without them every joint has its own inertia
-    left_out  share of the episodes, the last ones, on which the free run is judged
+    left_out  share of the episodes, the last ones, on which the free run is judged; by default a tenth, or 19 episodes
+              if that is more, but a third at most
     rows      horizon of the free run
     residual  whether a hybrid law is fitted to what physics leaves (GaussianResidual); a joint has one if it gains 15 %
               on fitted episodes held back, and loses at most 5 % on the 5 % of them farthest from the data
@@ -63,10 +64,10 @@ def fit_joint(
     robust error of the free run over windows of 40 rows, with exact gradients.
     Raises IdentificationError for episodes that `inspect_episodes` refuses, ParameterError for impossible arguments.
     """
-    inspection, found = _inspected(episodes, tuple(pairs), tuple(axes), left_out)
+    split = count_fitted(episodes, left_out)
+    inspection, found = _inspected(episodes, tuple(pairs), tuple(axes))
     progress(f"delay of the pressures: {inspection.delay} rows")
     ordered = in_pairs(episodes, found)
-    split = max(1, round((1.0 - left_out) * len(ordered)))
     fitted, left, delay = ordered[:split], ordered[split:], inspection.delay
     train, judge = cut(fitted, delay, rows), cut(left, delay, rows)
     arm, paths = _search(fitted, train, tuple(axes), seed, progress)
@@ -88,14 +89,9 @@ def fit_joint(
 
 
 def _inspected(
-    episodes: Episodes, pairs: tuple[tuple[int, int], ...], axes: tuple[tuple[int, int, int], ...], left_out: float
+    episodes: Episodes, pairs: tuple[tuple[int, int], ...], axes: tuple[tuple[int, int, int], ...]
 ) -> tuple[EpisodeInspection, tuple[tuple[int, int], ...]]:
     """The inspection of episodes that may be fitted, and the pairs; raises for impossible arguments."""
-    if not 0.0 < left_out < 1.0 or len(episodes) < 4:
-        raise ParameterError(
-            f"fit_joint: left_out is {left_out:g} of {len(episodes)} episodes; give 4 episodes or more, and a share "
-            "between 0 and 1."
-        )
     inspection = inspect_episodes(episodes, pairs)
     check_episodes(inspection)
     found = pairs or inspection.pairs
@@ -186,16 +182,21 @@ def separate(
     information = (
         np.einsum("nrp,nr,nrq->pq", scaled, weight, scaled) * (len(windows) / len(some)) / max(scale, 1e-9) ** 2
     )
+    estimates, covariance, shares = separated(information, paths, values, sizes)
+    return estimates, _words(joint, paths, shares), covariance
+
+
+def separated(
+    information: Array, paths: Sequence[str], values: Array, sizes: Array
+) -> tuple[list[ArmParameter], Array, Array]:
+    """Estimates by the Fisher information (P, P) of parameters over their sizes (P,), their covariance along what it
+    separates, and the share of each in the directions that it does not separate."""
     levels, directions = np.linalg.eigh(information)
     weak = levels < 1.0 / UNSEPARATED**2
-    inverse = directions / np.sqrt(np.maximum(levels, 1e-12 * levels[-1]))
-    deviations = np.sqrt(np.sum(inverse**2, axis=1)) * sizes
-    estimates = [
-        ArmParameter(path, float(value), float(deviation))
-        for path, value, deviation in zip(paths, values, deviations, strict=True)
-    ]
-    known = sizes[:, None] * inverse[:, ~weak]
-    return estimates, _words(joint, paths, np.sum(directions[:, weak] ** 2, axis=1)), known @ known.T
+    inverse = sizes[:, None] * directions / np.sqrt(np.maximum(levels, 1e-12 * levels[-1]))
+    rows = zip(paths, values.tolist(), np.sqrt(np.sum(inverse**2, axis=1)).tolist(), strict=True)
+    known = inverse[:, ~weak]
+    return [ArmParameter(*row) for row in rows], known @ known.T, np.sum(directions[:, weak] ** 2, axis=1)
 
 
 def _words(joint: int, paths: Sequence[str], shares: Array) -> list[str]:

@@ -10,15 +10,15 @@ from ...engine import WithSensitivities, sensitivity
 from ...physics import PressureDriven
 from .descent import CLIP, OUTLIER, over, with_values
 from .episode_inspection import check_episodes, inspect_episodes
-from .episodes import HISTORY, ROWS, Episodes, Windows, WindowSignal, band, cut, lagged
-from .fit import NAMED, SHARE, UNSEPARATED
+from .episodes import HISTORY, ROWS, Episodes, Windows, WindowSignal, band, count_fitted, cut, lagged
+from .fit import NAMED, SHARE, separated
 from .free_run import baseline_errors
 from .result import ArmFit, ArmParameter
 
 FIELDS = ("inertia", "damping", "offset", "weight_torque", "coulomb_torque")
 """Fields of a mechanism that are estimated unless others are named."""
-READINGS = ("zeros", "gains")
-"""Names that stand for the zeros and the gains of all pressures."""
+READINGS = {"zeros": " Pa", "gains": ""}
+"""Names that stand for the zeros and the gains of all pressures, with the units of their values."""
 SAMPLE, EVALUATIONS = 300, 40
 """Windows and evaluations of the search (chosen)."""
 SIZES = {"zeros": 1e4, "gains": 1.0, "offset": 0.05}
@@ -58,8 +58,8 @@ class ReadPressures(System):
 
 
 def fit_known_joint(
-    episodes: Episodes, arm: PressureDriven, free: Sequence[str] = (), *, left_out: float = 0.1, rows: int = ROWS,
-    progress: Callable[[str], None] = lambda text: None,
+    episodes: Episodes, arm: PressureDriven, free: Sequence[str] = (), *, pairs: Sequence[tuple[int, int]] = (),
+    left_out: float | None = None, rows: int = ROWS, progress: Callable[[str], None] = lambda text: None,
 ) -> ArmFit:  # fmt: skip
     """Estimate the unknown numbers of an arm of known muscles and geometry, such as those of the library.
 
@@ -70,37 +70,48 @@ def fit_known_joint(
     The objective is the robust error of the free run over windows, with exact gradients. Gains and inertia together are
     separated by forces alone that do not grow with the pressure, such as that of the rubber. Other arguments and the
     result are those of `fit_joint`. Raises IdentificationError for episodes that `inspect_episodes` refuses,
-    ParameterError for another number of pressures or angles, and for a path that the arm does not have.
+    ParameterError for another number of pressures or angles, other pairs, and a path that the arm does not have.
     """
     count, joints = len(arm.muscle), len(arm.mechanism.coordinates)
-    wrong = (episodes.muscles, episodes.joints, count) != (count, joints, 2 * joints)
-    if wrong or not 0.0 < left_out < 1.0 or len(episodes) < 4:
+    split = count_fitted(episodes, left_out)
+    if (episodes.muscles, episodes.joints, count) != (count, joints, 2 * joints):
         raise ParameterError(
-            f"fit_known_joint: {len(episodes)} episodes have {episodes.muscles} pressures, {episodes.joints} angles, "
-            f"the arm {count} muscles and {joints} coordinates, and left_out is {left_out:g}; give two "
-            "muscles for each angle in the order of the columns, 4 episodes or more, and a share between 0 and 1."
+            f"fit_known_joint: the episodes have {episodes.muscles} pressures and {episodes.joints} angles, the arm "
+            f"{count} muscles and {joints} coordinates; give two muscles for each angle, in the order of the columns."
         )
-    inspection = inspect_episodes(episodes)
+    own = _pairs(arm, episodes)
+    if pairs and tuple(pairs) != own:
+        raise ParameterError(
+            f"fit_known_joint: the mapping states the pairs {list(pairs)}, the joint has {list(own)}; leave pairs out "
+            "of the mapping file, or order its columns of pressures as the muscles of the joint."
+        )
+    inspection = inspect_episodes(episodes, own)
     check_episodes(inspection)
     system = ReadPressures(arm, (1.0,) * count, (0.0,) * count)
     paths = _paths(system, free)
     progress(f"{len(paths)} parameters; delay of the pressures: {inspection.delay} rows")
-    split = max(1, round((1.0 - left_out) * len(episodes)))
     train, judge = cut(episodes[:split], inspection.delay, rows), cut(episodes[split:], inspection.delay, rows)
     search = KnownSearch(system, paths, train.part(range(0, len(train), -(-len(train) // SAMPLE))))
     system = search.run()
     errors = np.nan_to_num(_run(system, (), judge)[0], nan=OUTLIER)
     progress(f"{np.degrees(np.sqrt(np.mean(errors**2))):.3g} deg rms over {rows} rows on episodes left out")
     estimates, covariance, remarks = search.separate(system)
-    own = [i for i, path in enumerate(paths) if path.startswith("arm.")]
-    signs = {action.muscle: action.sign for action in inspection.actions}
-    ways = [signs.get(2 * j + 1, 1) < 0 for j in range(joints)]
-    pairs = tuple((2 * j + 1 + way, 2 * j + 2 - way) for j, way in enumerate(ways))
+    of_arm = [i for i, path in enumerate(paths) if path.startswith("arm.")]
     return ArmFit(
-        system.arm, inspection, pairs, errors, judge.episode,
-        baseline_errors(episodes[:split], episodes[split:], rows), band(errors), tuple(estimates[i] for i in own),
-        (*inspection.remarks, *remarks), split, covariance=covariance[np.ix_(own, own)],
+        system.arm, inspection, own, errors, judge.episode,
+        baseline_errors(episodes[:split], episodes[split:], rows), band(errors), tuple(estimates[i] for i in of_arm),
+        (*inspection.remarks, *remarks), split, covariance=covariance[np.ix_(of_arm, of_arm)],
     )  # fmt: skip
+
+
+def _pairs(arm: PressureDriven, episodes: Episodes) -> tuple[tuple[int, int], ...]:
+    """For each coordinate its muscles, from 1, first the one with the greater moment arm at the median angles."""
+    names = [c.name for c in arm.mechanism.coordinates]
+    at = dict(zip(names, np.median(episodes.rows("angle"), axis=0).tolist(), strict=True))
+    unit = np.eye(len(arm.muscle)).tolist()
+    moments = [arm.mechanism.generalised_forces(at, each, arm.resting_lengths) for each in unit]
+    ways = [moments[2 * j + 1][name] > moments[2 * j][name] for j, name in enumerate(names)]
+    return tuple((2 * j + 1 + bool(way), 2 * j + 2 - bool(way)) for j, way in enumerate(ways))
 
 
 def _paths(system: ReadPressures, free: Sequence[str]) -> list[str]:
@@ -108,7 +119,7 @@ def _paths(system: ReadPressures, free: Sequence[str]) -> list[str]:
     leaves = [leaf.path for leaf in tree.leaves(system)]
     if not free:
         fields = [path for path in leaves if path.startswith("arm.mechanism.") and path.rsplit(".")[-1] in FIELDS]
-        free = [*(path.removeprefix("arm.") for path in fields), "lags", READINGS[0]]
+        free = [*(path.removeprefix("arm.") for path in fields), "lags", "zeros"]
     found = []
     for name in free:
         whole = name if name.split("[")[0] in READINGS else f"arm.{name}"
@@ -181,23 +192,18 @@ class KnownSearch:
         values = np.array([leaves[path] for path in self.paths])
         error, slope = self._evaluate(values / self.sizes)
         flat = slope.reshape(-1, len(self.paths))
-        levels, directions = np.linalg.eigh(flat.T @ flat / (np.mean(error**2) * self.windows.rows))
-        weak = levels < 1.0 / UNSEPARATED**2
-        inverse = self.sizes[:, None] * directions / np.sqrt(np.maximum(levels, 1e-12 * levels[-1]))
-        deviations = np.sqrt(np.sum(inverse**2, axis=1))
-        estimates = [
-            ArmParameter(path.removeprefix("arm."), float(value), float(deviation))
-            for path, value, deviation in zip(self.paths, values, deviations, strict=True)
-        ]
+        names = [path.removeprefix("arm.") for path in self.paths]
+        information = flat.T @ flat / (np.mean(error**2) * self.windows.rows)
+        estimates, covariance, shares = separated(information, names, values, self.sizes)
         remarks = [
-            f"{each.path.replace('[', ' of the reading of pressure ').rstrip(']')} (from 0): {each.value:.4g} ± "
-            f"{each.standard_error:.2g} (SI)" for each in estimates if each.path.split("[")[0] in READINGS
+            f"{field[:-1]} of pressure {int(number[:-1]) + 1}: {each.value:.4g} ± "
+            f"{float(f'{each.standard_error:.2g}'):g}{READINGS[field]}"
+            for each in estimates for field, _, number in [each.path.partition("[")] if field in READINGS
         ]  # fmt: skip
-        shares = np.sum(directions[:, weak] ** 2, axis=1)
-        names = [estimates[i].path for i in np.argsort(-shares) if shares[i] > SHARE]
-        if names:
+        weak = [names[i] for i in np.argsort(-shares) if shares[i] > SHARE]
+        if weak:
             remarks.append(
-                f"the record does not separate {', '.join(names[:NAMED])}: combinations of them may have any value; "
+                f"the record does not separate {', '.join(weak[:NAMED])}: combinations of them may have any value; "
                 "fix or measure one of them"
             )
-        return estimates, inverse[:, ~weak] @ inverse[:, ~weak].T, remarks
+        return estimates, covariance, remarks

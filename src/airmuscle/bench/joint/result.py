@@ -13,7 +13,7 @@ from ...report import Chapter, NamedValue, Plot, Table, TableColumn
 from ..identify.prediction import PlantUncertainty
 from ..reported import Reported
 from .episode_inspection import EpisodeInspection
-from .episodes import coverage, rms
+from .episodes import ENOUGH, coverage, rms
 from .free_run import RegulatorLag, ResidualGain
 
 SUPPLY = 6e5
@@ -137,8 +137,17 @@ class ArmFit(Reported):
             ),
             tables=(self._error_table(), self._joint_table(), self._band_table(), self._parameter_table()),
             plots=(Plot("horizon", caption, self._horizon_figure),),
-            notes=self.remarks,
+            notes=(*self._doubt(count), *self.remarks),
         )
+
+    def _doubt(self, count: int) -> list[str]:
+        """What a band of few episodes means."""
+        text = (
+            f"the band comes from {count} episodes left out: it is no 95 % band. Their greatest errors hold those of a "
+            f"further episode with {100 * count / (count + 1):.0f} %, n/(n + 1), and {ENOUGH} episodes are needed; "
+            "record more, or leave out a greater share"
+        )
+        return [text] if count < ENOUGH else []
 
     def _error_table(self) -> Table:
         found = {**self.by_baseline, "model": self.errors, "model, from commands": self.commanded}
@@ -151,6 +160,7 @@ class ArmFit(Reported):
         return Table("joint-errors", "Root mean square error of the free run", columns, brief=len(rows))
 
     def _joint_table(self) -> Table:
+        known = 1.0 if len(np.unique(self.episode)) >= ENOUGH else np.nan
         columns: dict[str, Any] = {
             "joint": list(range(1, len(self.pairs) + 1)),
             "raised by muscle": [raising for raising, _ in self.pairs],
@@ -158,7 +168,7 @@ class ArmFit(Reported):
             "skill": TableColumn(self.skill, digits=3),
             "best baseline": TableColumn(list(self.best_baseline), brief=False),
             "95 % band at the horizon ±": TableColumn(self.band[-1], "rad", "deg", 3),
-            "share inside the band": TableColumn(self.coverage, "1", "%", 3, short="inside"),
+            "share inside the band": TableColumn(known * self.coverage, "1", "%", 3, short="inside"),
         }
         return Table("joints", "Joints", columns, brief=len(self.pairs))
 

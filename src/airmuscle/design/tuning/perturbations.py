@@ -8,9 +8,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core import AirmuscleError, Leaf, ParameterError, abridged, check_field_types, leaves, with_parameters
+from ...bench.identify.prediction import PlantUncertainty
+from ...core import AirmuscleError, Array, Leaf, ParameterError, abridged, check_field_types, leaves, with_parameters
 from ...engine.loop import MAX_DELAY, ColumnSensor, ControlLaw, ControlLoop, WithSensors
 from ...files.library import ParameterUncertainty, located_errors
+from ...files.scenario.plant_uncertainty import SEPARATOR, parameter_uncertainty
 from ...physics.plant.plant import Plant
 from ...physics.pneumatics import Valve, WithLeak
 from .case import LoopCase
@@ -73,6 +75,7 @@ def perturbed_family(
     *,
     initial_state: InitialState = lambda plant: None,
     uncertainties: Sequence[ParameterUncertainty | None] = (),
+    fitted: PlantUncertainty | None = None,
     seed: int = 0,
 ) -> PerturbedFamily:
     """The nominal case and one case for each perturbation.
@@ -80,6 +83,8 @@ def perturbed_family(
     initial_state   function from a perturbed plant to its initial state; None is equilibrium at ambient pressure
     uncertainties   of the fitted parameters of each muscle, as `load(name).uncertainty`. Muscles with equal
                     uncertainty have equal deviations, because their parameters come from one fit
+    fitted          of the parameters of an identified plant, as `load_scenario(path).uncertainty`; draws of them are
+                    limited to the declared ranges
     seed            of the random draws
 
     A perturbation that the plant does not have, such as the load of an isometric muscle, is stated in the notes. Raises
@@ -99,9 +104,9 @@ def perturbed_family(
         leaking = _leaking(plant, perturbations.leak)
         notes += [] if leaking else ["no case with a leak: a circuit has no conductance"]
         changed += [("leak", leaking)] if leaking else []
-    drawn = list(_draws(plant, uncertainties, perturbations.draws, seed))
+    drawn = list(_draws(plant, uncertainties, fitted, perturbations.draws, seed))
     if perturbations.draws and not drawn:
-        notes.append("no drawn parameters: no muscle file states the uncertainty of its parameters")
+        notes.append("no drawn parameters: neither the scenario nor a muscle file states the uncertainty of parameters")
     changed += drawn
     for name, each in changed:
         with located_errors(f"case '{name}'"):
@@ -146,21 +151,29 @@ def _delayed(law: Any, delay: int) -> WithSensors:
 
 
 def _draws(
-    plant: Plant, uncertainties: Sequence[ParameterUncertainty | None], count: int, seed: int
+    plant: Plant,
+    uncertainties: Sequence[ParameterUncertainty | None],
+    fitted: PlantUncertainty | None,
+    count: int,
+    seed: int,
 ) -> Iterator[tuple[str, Plant]]:
     """Plants whose fitted parameters deviate by draws of a normal distribution that are within the declared ranges."""
     if len(uncertainties) not in (0, len(plant.muscles)):
         raise ParameterError(
             f"perturbed_family: {len(uncertainties)} uncertainties for {len(plant.muscles)} muscles; give one for each."
         )
-    if not any(each is not None for each in uncertainties):
+    of_plant = parameter_uncertainty(fitted) if fitted is not None and fitted.parameters else None
+    if of_plant is None and not any(each is not None for each in uncertainties):
         return
     random = np.random.default_rng(seed)
     for number in range(count):
-        yield f"drawn {number + 1}", _drawn(plant, uncertainties, random)
+        yield f"drawn {number + 1}", _drawn(plant, uncertainties, of_plant, random)
 
 
-def _drawn(plant: Plant, uncertainties: Sequence[ParameterUncertainty | None], random: np.random.Generator) -> Plant:
+def _drawn(
+    plant: Plant, uncertainties: Sequence[ParameterUncertainty | None], of_plant: ParameterUncertainty | None,
+    random: np.random.Generator,
+) -> Plant:  # fmt: skip
     known = list(leaves(plant))
     message = "no draw"
     for _ in range(MAX_ATTEMPTS):
@@ -174,6 +187,10 @@ def _drawn(plant: Plant, uncertainties: Sequence[ParameterUncertainty | None], r
                 deviations[uncertainty] = uncertainty.deviations(deviates)
             prefix = f"muscle[{i}]." if isinstance(plant.muscle, tuple) else "muscle."
             shifts |= dict(zip(muscle_paths(uncertainty, prefix), deviations[uncertainty].tolist(), strict=True))
+        if of_plant is not None:
+            shifts |= _within_ranges(
+                of_plant, of_plant.deviations(random.standard_normal(len(of_plant.parameters))), known
+            )
         _check_known(shifts, known)
         try:
             return with_parameters(plant, [leaf.value + shifts.get(leaf.path, 0.0) for leaf in known])
@@ -182,6 +199,13 @@ def _drawn(plant: Plant, uncertainties: Sequence[ParameterUncertainty | None], r
     raise ParameterError(
         f"perturbed_family: {MAX_ATTEMPTS} draws of the fitted parameters are all impossible; the last: {message}"
     )
+
+
+def _within_ranges(fitted: ParameterUncertainty, deviations: Array, known: Sequence[Leaf]) -> dict[str, float]:
+    """Deviations by path of the parameters of a plant, as far as the declared ranges permit."""
+    leaves = {leaf.path: leaf for leaf in known}
+    paths = [(path, d) for name, d in zip(fitted.parameters, deviations, strict=True) for path in name.split(SEPARATOR)]
+    return {p: float(np.clip(leaves[p].value + d, *leaves[p].declared.bounds)) - leaves[p].value for p, d in paths}
 
 
 def muscle_paths(uncertainty: ParameterUncertainty, prefix: str) -> list[str]:

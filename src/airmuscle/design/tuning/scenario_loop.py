@@ -52,13 +52,14 @@ class ScenarioLoop(ShortRepr):
         """The cases of the perturbed plants, each with the initial state that the scenario gives it."""
         return perturbed_family(
             self.scenario.plant, self.loop, perturbations, initial_state=self._initial_state,
-            uncertainties=self._uncertainties(), seed=seed,
+            uncertainties=self._uncertainties(), fitted=self.scenario.uncertainty, seed=seed,
         )  # fmt: skip
 
     def _initial_state(self, plant: Plant) -> Mapping[str, float]:
         if plant is self.scenario.plant:
             return self.scenario.initial_state
-        return build_scenario(self.tables, self.location, plant).initial_state
+        tables = {name: table for name, table in self.tables.items() if name != "uncertainty"}  # of the plant as fitted
+        return build_scenario(tables, self.location, plant).initial_state
 
     def _uncertainties(self) -> list[ParameterUncertainty | None]:
         """The uncertainty of each muscle, of the parameters that the scenario takes from the muscle file unchanged."""

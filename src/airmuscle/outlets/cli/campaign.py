@@ -109,11 +109,8 @@ class CampaignRequest:
     )
     braid: BraidSize | None = option(
         "Braid at rest, such as 'radius=10 mm, angle=24.4 deg'; default: the volume follows from the static law and "
-        "fills at several lengths.",
-        default=None,
-        metavar="SIZE",
-        read=read_braid,
-    )
+        "fills at several lengths.", default=None, metavar="SIZE", read=read_braid,
+    )  # fmt: skip
 
 
 @with_requests

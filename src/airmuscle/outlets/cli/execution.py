@@ -17,16 +17,14 @@ class Execution:
     """The processes that compute a command."""
 
     workers: int | None = option(
-        "Number of local processes; by default as many as cores, or one that uses all cores.",
-        default=None,
+        "Number of local processes; by default as many as cores, or one that uses all cores.", default=None,
         bounds=(1, 1024),
-    )
+    )  # fmt: skip
     dask: str | None = option("Use a running Dask cluster, such as tcp://host:8786.", default=None, metavar="ADDRESS")
     join: Path | None = option(
         "Share the computation with all processes that run the same command with this folder, on any machines.",
-        default=None,
-        metavar="FOLDER",
-    )
+        default=None, metavar="FOLDER",
+    )  # fmt: skip
 
     def check(self, where: Where) -> None:
         """Refuse a cluster together with local processes."""

@@ -69,26 +69,23 @@ class ExportRequest:
     controller: bool = option("Export only the controller of a scenario: c, arduino, fmu.", default=False)
     build: bool = option("Compile the C program with the compiler of this machine, and run it.", default=False)
     tunable: tuple[str, ...] = option(
-        "A parameter that the program can change; repeatable. Default: all, of a controller none.",
-        default=(),
+        "A parameter that the program can change; repeatable. Default: all, of a controller none.", default=(),
         metavar="PATH",
-    )
+    )  # fmt: skip
     fmi: int | None = option("Version of FMI for --to fmu and ssp. Default: 3.", default=None, metavar="2|3")
     sources_only: bool = option("An FMU without a binary; --to fmu, ssp.", default=False)
     platforms: tuple[str, ...] = option(
         f"Binaries of an FMU for a platform, by the package ziglang; repeatable: {', '.join(PLATFORMS)}. Default: this "
-        "machine.",
-        default=(),
-    )
+        "machine.", default=(),
+    )  # fmt: skip
     muscle: str = option("One muscle of the plant; --to mujoco, torch, warp, onnx.", default="")
     precision: Precision = option(
         "Type of the numbers of a controller.", choices=PRECISIONS, default="double", metavar="double|float"
     )
     processor: Processor | None = option(
         f"With --controller --build: run in the emulator QEMU as {' or '.join(PROCESSORS)}, not on this machine.",
-        choices=PROCESSORS,
-        default=None,
-    )
+        choices=PROCESSORS, default=None,
+    )  # fmt: skip
 
     def check(self, where: Where) -> None:
         """Raise RequestError for options that do not fit together."""

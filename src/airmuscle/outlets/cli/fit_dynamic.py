@@ -30,10 +30,9 @@ class DynamicFitRequest:
     """What a dynamic fit is asked for beyond its file."""
 
     profile: tuple[str, ...] = option(
-        "Profile likelihood of this parameter; 'weak': of all undetermined ones. Repeatable.",
-        default=(),
+        "Profile likelihood of this parameter; 'weak': of all undetermined ones. Repeatable.", default=(),
         metavar="PARAMETER",
-    )
+    )  # fmt: skip
     points: int = option("Values of a profile on either side of the estimate.", default=5, bounds=(2, 50))
     starts: int | None = option(
         "Number of initial guesses; default: that of the file.", default=None, bounds=(1, 10_000)

@@ -24,11 +24,8 @@ class SimulateRequest:
 
     set: tuple[Any, ...] = option(
         "Another value of a number of the scenario, by its path as in a study: 'mechanism.mass=12 kg', "
-        "run.duration=10. Repeatable.",
-        default=(),
-        metavar="PATH=VALUE",
-        read=read_pair,
-    )
+        "run.duration=10. Repeatable.", default=(), metavar="PATH=VALUE", read=read_pair,
+    )  # fmt: skip
 
 
 @with_requests

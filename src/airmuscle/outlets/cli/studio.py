@@ -20,10 +20,9 @@ class StudioRequest:
 
     port: int = option("Port of the server; 0 stands for any free one.", default=8765)
     host: str = option(
-        "Address of the server; 0.0.0.0 admits other machines, without encryption.",
-        default="127.0.0.1",
+        "Address of the server; 0.0.0.0 admits other machines, without encryption.", default="127.0.0.1",
         metavar="ADDRESS",
-    )
+    )  # fmt: skip
     browser: bool = option("Open the page in the browser.", default=True, flag="--browser/--no-browser")
     export: Path | None = option(
         "Write one self-contained page instead, without a server.", default=None, metavar="FILE.html"

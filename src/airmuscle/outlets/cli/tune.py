@@ -65,10 +65,8 @@ class TuneRequest:
 
     bounds: tuple[str, ...] = option(
         "Range of a gain, such as 'gain=5 1/m:500 1/m'; repeatable. Default: every gain and time that is not 0, from a "
-        "tenth of its present value to ten times it.",
-        default=(),
-        metavar="GAIN=MIN:MAX",
-    )
+        "tenth of its present value to ten times it.", default=(), metavar="GAIN=MIN:MAX",
+    )  # fmt: skip
     index: type[TrackingIndex] = option(
         f"Tracking index of a run: {', '.join(INDICES)}.", choices=INDICES, default="rmse"
     )

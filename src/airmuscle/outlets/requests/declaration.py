@@ -6,6 +6,7 @@ conversion of texts to SI units and the messages. A request may define `check(wh
 
 import dataclasses
 import math
+import re
 import types
 import typing
 from collections.abc import Callable, Mapping, Sequence
@@ -18,6 +19,8 @@ T = TypeVar("T")
 Where = Callable[[str], str]
 """The name of a field in the words of an outlet, such as --max-length."""
 _KEY = "option"
+YES = "yes"
+"""Text of a form for a box that is marked."""
 
 
 class RequestError(InputError):
@@ -80,6 +83,10 @@ class Option:
             value = quantity(value, self.unit, where=where)
         elif self.kind is int and isinstance(value, str):
             value = _whole_number(value, where)
+        elif self.kind is bool and isinstance(value, str):
+            if value != YES:
+                raise RequestError(f"{where} is '{value}'; give {YES}, or nothing.", self.name)
+            value = True
         if isinstance(value, int | float) and not isinstance(value, bool):
             self._check_bounds(value, where)
         return value
@@ -142,16 +149,19 @@ def _option(field: dataclasses.Field[Any], hint: Any) -> Option:
 
 
 def form_fields(cls: type[Any]) -> list[dict[str, Any]]:
-    """The fields of a form: name, label, hint, example, text at first, and offered values with their names."""
+    """The fields of a form: name, label, hint, example, text at first, offered values with their names, and the text of
+    a box that may be marked."""
     names = ("name", "label", "hint", "example", "filled")
-    return [{**{name: getattr(each, name) for name in names}, "offered": list(map(list, each.offered))}
+    return [{**{name: getattr(each, name) for name in names}, "offered": list(map(list, each.offered)),
+             "mark": YES if each.kind is bool else ""}
             for each in options_of(cls) if each.label]  # fmt: skip
 
 
 def build(cls: type[T], given: Mapping[str, Any], where: Where) -> T:
     """The request of the values that a user has given; None and empty texts stand for the default.
 
-    Raises InputError, with the name of the field in the words of the outlet.
+    In the text of a form the values of a repeated field stand between commas, spaces or lines. Raises InputError, with
+    the name of the field in the words of the outlet.
     """
     values: dict[str, Any] = {}
     for each in options_of(cls):
@@ -163,6 +173,7 @@ def build(cls: type[T], given: Mapping[str, Any], where: Where) -> T:
             continue
         label = where(each.name)
         if each.repeated:
+            value = re.split(r"[,;\s]+", value.strip(",; \n")) if isinstance(value, str) else value
             values[each.name] = tuple(each.convert(item, label) for item in value)
         else:
             values[each.name] = each.convert(value, label)

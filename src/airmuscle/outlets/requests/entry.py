@@ -22,11 +22,8 @@ class EntryRequest:
     )
     set: tuple[Any, ...] = option(
         "Another value of a parameter, by its path: characteristic.slope_factor=2, 'geometry.radius=10 mm'. "
-        "Repeatable.",
-        default=(),
-        metavar="PATH=VALUE",
-        read=read_pair,
-    )
+        "Repeatable.", default=(), metavar="PATH=VALUE", read=read_pair,
+    )  # fmt: skip
 
     def load(self, name: str, find: Callable[[str], Any] = load_law) -> Any:
         """The entry of a name or file, as changed. Raises ParameterError or UnitError."""

@@ -29,19 +29,13 @@ class BraidRequest:
     """The braid in two fields of a form, both or none."""
 
     braid_radius: float | None = option(
-        "Outer radius of the braid at rest.",
-        unit="m",
-        default=None,
-        label="Radius of the braid, for the geometry of the muscle file",
-        example="optional: 10 mm",
-    )
+        "Outer radius of the braid at rest.", unit="m", default=None,
+        label="Radius of the braid, for the geometry of the muscle file", example="optional: 10 mm",
+    )  # fmt: skip
     braid_angle: float | None = option(
-        "Angle between threads and axis at rest.",
-        unit="rad",
-        default=None,
-        label="Angle of the braid to the axis at rest",
-        example="optional: 24.4 deg",
-    )
+        "Angle between threads and axis at rest.", unit="rad", default=None,
+        label="Angle of the braid to the axis at rest", example="optional: 24.4 deg",
+    )  # fmt: skip
 
     def check(self, where: Where) -> None:
         """Raise RequestError for one field without the other, and for a braid that cannot be."""
@@ -158,66 +152,51 @@ class FitRequest:
 
     characteristic: str | None = option(
         "Initial law: a library entry, a muscle file (TOML), or a model that needs no initial values, such as "
-        "ContractileSurface.",
-        default=None,
-    )
+        "ContractileSurface.", default=None,
+    )  # fmt: skip
     compare: bool = option("Fit every characteristic that the data determine, and rank them.", default=False)
     leave_out: GroupSplit | None = option(
         "Groups of rows for cross-validation (--compare) and resampling (--bootstrap): run, specimen, contraction, "
-        "pressure, block.",
-        choices=SPLITS,
-        default=None,
-        metavar="GROUP",
-        label="Cross-validation leaves out",
+        "pressure, block.", choices=SPLITS, default=None, metavar="GROUP", label="Cross-validation leaves out",
         offered=SPLIT_NAMES,
-    )
+    )  # fmt: skip
     purpose: str | None = option(
         "Use of the law that --compare recommends: repeat (further runs of the measured muscles), length (other "
         "muscles of the type), both (one law for both). Default: both, if three specimens or more were each measured "
-        "in several runs.",
-        choices=tuple(PURPOSES),
-        default=None,
-        metavar="PURPOSE",
-    )
+        "in several runs.", choices=tuple(PURPOSES), default=None, metavar="PURPOSE",
+    )  # fmt: skip
     bootstrap: int | None = option(
         "Bootstrap with N refits to resampled groups of rows.", default=None, bounds=(20, 100_000)
     )
     profile: tuple[str, ...] = option(
-        "Profile-likelihood interval of this parameter; 'weak': of all weakly determined ones. Repeatable.",
-        default=(),
+        "Profile-likelihood interval of this parameter; 'weak': of all weakly determined ones. Repeatable.", default=(),
         metavar="PARAMETER",
-    )
+    )  # fmt: skip
     length_error: tuple[str, ...] = option(
         "Estimate the error of the recorded resting length of this specimen together with the law. Repeatable.",
-        default=(),
-        metavar="SPECIMEN",
-    )
+        default=(), metavar="SPECIMEN",
+    )  # fmt: skip
     shape: bool = option(
         "Constrain a ContractileSurface: force must not decrease with pressure nor increase with contraction.",
         default=False,
     )
     free_contraction: tuple[Any, ...] = option(
-        "With --shape: a point of zero force (free contraction), such as '3 bar=18 %'. Repeatable.",
-        default=(),
-        metavar="PRESSURE=CONTRACTION",
-        read=read_free_contraction,
-    )
+        "With --shape: a point of zero force (free contraction), such as '3 bar=18 %'. Repeatable.", default=(),
+        metavar="PRESSURE=CONTRACTION", read=read_free_contraction,
+    )  # fmt: skip
     braid: BraidSize | None = option(
         "Braid at rest, such as 'radius=10 mm, angle=24.4 deg' (outer radius; angle between threads and axis): the "
-        "[geometry] of a muscle whose law contains none. Requires the resting length.",
-        default=None,
-        metavar="SIZE",
+        "[geometry] of a muscle whose law contains none. Requires the resting length.", default=None, metavar="SIZE",
         read=read_braid,
-    )
+    )  # fmt: skip
     degree: int = option("Total degree of a ContractileSurface.", default=5, bounds=(1, 9))
     fix: tuple[str, ...] = option(
         "Keep this parameter at its initial value; repeatable.", default=(), metavar="PARAMETER"
     )
     robust: str | None = option(
         "Threshold of the Huber loss, such as '10 N' or '0.5 %'; default: squared. With --compare: a force.",
-        default=None,
-        metavar="QUANTITY",
-    )
+        default=None, metavar="QUANTITY",
+    )  # fmt: skip
     uncensored: bool = option("Fit rows at zero force as measured values, not as censored data.", default=False)
     equal_weights: bool = option("Equal weights; default: by the sensor resolution of each test rig.", default=False)
 

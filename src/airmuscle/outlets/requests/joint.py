@@ -1,7 +1,7 @@
 """Request of the identification of an arm from episodes, and its computation: the chapter and the scenarios."""
 
 import dataclasses
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +18,8 @@ from ...bench.joint import (
 )
 from ...bench.joint.episode_formats import propose_mapping
 from ...control.laws import PID, Cascade, CoContraction, Decentralised
-from ...files.library.write import model_table, scenario_toml
+from ...files.library import list_plants
+from ...files.library.write import entry_of, model_table, scenario_toml, to_toml
 from ...files.scenario import load_scenario
 from ...files.scenario.plant_uncertainty import uncertainty_table
 from ...physics import PressureDriven
@@ -39,25 +40,33 @@ class JointFitRequest:
         "Mapping file (TOML): which column is what. Without it one is proposed, and nothing is fitted.", default=None
     )
     inspect: bool = option("State what the record contains; fit nothing.", default=False)
-    left_out: float = option(
-        "Share of the episodes that judges the fit.", default=0.1, metavar="SHARE", bounds=(0.01, 0.9),
-        label="Share of the episodes that judges the fit", example="0.1", filled="0.1",
+    left_out: float | None = option(
+        "Share of the episodes, the last ones, that judges the fit; default: a tenth, or 19 episodes if that is more, "
+        "but a third at most.", default=None, metavar="SHARE", bounds=(0.01, 0.9),
+        label="Share of the episodes that judges the fit", hint="empty: at least 19 of them, a third at most",
+        example="0.1",
     )  # fmt: skip
     horizon: int = option(
         "Rows of the free run.", default=40, bounds=(5, 1000), metavar="ROWS", label="Rows of the free run",
         example="40", filled="40",
     )  # fmt: skip
     residual: bool = option(
-        "Fit a hybrid law to what physics leaves, used for joints that gain by it on episodes held back.", default=False
-    )
+        "Fit a hybrid law to what physics leaves, used for joints that gain by it on episodes held back.",
+        default=False, label="A hybrid law for what physics leaves (takes longer)",
+    )  # fmt: skip
     seed: int = option("Seed of the order of the windows.", default=0)
-    known: Path | None = option(
-        "Scenario of a joint of known muscles and geometry, such as those of the library: the numbers of --free are "
-        "estimated.", default=None,
+    known: str | None = option(
+        "A joint of known muscles and geometry, a scenario or a plant of the library: the numbers of --free are "
+        "estimated.", default=None, metavar="SCENARIO",
+        complete=lambda incomplete: [name for name in list_plants() if name.startswith(incomplete)],
+        label="Joint of known muscles and geometry", hint="a plant of the library, or the text of a scenario",
+        example="joint-dmsp-20-matrix",
     )  # fmt: skip
     free: tuple[str, ...] = option(
         "With --known: path of a parameter that is estimated, zeros, gains or lags. Repeatable; by default inertia, "
         "damping, offset, weight and friction of the mechanism, lags and zeros.", default=(), metavar="PATH",
+        label="Parameters of a known joint that are estimated", hint="empty: mechanism, lags and zeros",
+        example="mechanism.inertia, zeros",
     )  # fmt: skip
 
     def check(self, where: Where) -> None:
@@ -87,31 +96,52 @@ def _mapping(source: Path, request: JointFitRequest) -> EpisodeMapping:
 def fit_requested_arm(
     source: Path, request: JointFitRequest, progress: Callable[[str], None]
 ) -> tuple[Chapter, dict[str, str]]:
-    """The chapter of the fit, and the scenarios by the names of their files.
+    """The chapter of the fit, and the scenarios and muscle files by the names of their files.
 
     Raises RequestError without a mapping file, IdentificationError, ParameterError and others of the fit.
     """
     rules, title = _mapping(source, request), f"Arm identified from {source.name}"
-    if request.known is not None:
-        plant = load_scenario(request.known).plant
-        arm = PressureDriven(plant.muscles, plant.mechanism, (FIRST_LAG,) * len(plant.muscles))
-        known = fit_known_joint(
-            read_episodes(source, rules), arm, request.free, left_out=request.left_out, rows=request.horizon,
-            progress=progress,
+    episodes = read_episodes(source, rules)
+    if request.known is None:
+        fit = fit_joint(
+            episodes, pairs=rules.pairs, axes=rules.axes, left_out=request.left_out, rows=request.horizon,
+            residual=request.residual, seed=request.seed, progress=progress,
         )  # fmt: skip
-        chapter = dataclasses.replace(known.chapter(), title=title)
-        return chapter, {"scenario.toml": _scenarios(known, title)["scenario.toml"]}
-    fit = fit_joint(
-        read_episodes(source, rules), pairs=rules.pairs, axes=rules.axes, left_out=request.left_out,
-        rows=request.horizon, residual=request.residual, seed=request.seed, progress=progress,
+        files = _scenarios(fit, [muscle.name for muscle in fit.arm.muscle], title, CHOSEN)
+        return dataclasses.replace(fit.chapter(), title=title), files | _muscles(fit, title, SCALED)
+    plant = load_scenario(request.known).plant
+    arm = PressureDriven(plant.muscles, plant.mechanism, (FIRST_LAG,) * len(plant.muscles))
+    fit = fit_known_joint(
+        episodes, arm, request.free, pairs=rules.pairs, left_out=request.left_out, rows=request.horizon,
+        progress=progress,
     )  # fmt: skip
-    return dataclasses.replace(fit.chapter(), title=title), _scenarios(fit, title)
+    names = [fit.arm.muscle[number - 1].name for pair in fit.pairs for number in pair]
+    files = _scenarios(fit, names, title, IN_PLACE)
+    return dataclasses.replace(fit.chapter(), title=title), files | _muscles(fit, title, "")
 
 
-def _scenarios(fit: ArmFit, title: str) -> dict[str, str]:
+CHOSEN = "supply, orifices and volumes are chosen"
+IN_PLACE = "supply and orifices are chosen; pressure regulators stand in place of the circuits of the known joint"
+SCALED = "the scale of its forces is chosen: the record contains pressures and angles alone"
+
+
+def _muscles(fit: ArmFit, title: str, warning: str) -> dict[str, str]:
+    """The file of each muscle that has identified parameters."""
+    return {
+        f"muscles/{muscle.name}.toml": to_toml(
+            dataclasses.replace(entry_of(muscle), title=f"{muscle.name}: {title}", provenance="fitted", warning=warning)
+        )
+        for number, muscle in enumerate(fit.arm.muscle)
+        if any(each.path.startswith(f"muscle[{number}].") for each in fit.estimates)
+    }
+
+
+def _scenarios(fit: ArmFit, names: Sequence[str], title: str, note: str) -> dict[str, str]:
     """The arm with a pressure regulator for each muscle: at constant set points, and with a PID controller of
-    each angle to be tuned, which commands half the difference of the pressures of its pair."""
-    names = [muscle.name for muscle in fit.arm.muscle]
+    each angle to be tuned, which commands half the difference of the pressures of its pair.
+
+    names  of the muscles in the order of the pairs, first the one that raises the angle
+    """
     middle = np.median(fit.inspection.episodes.rows("pressure"), axis=0)
     levels = [max(float(middle[muscle - 1]), 0.0) for pair in fit.pairs for muscle in pair]
     held = {f"{name}.setpoint": [[0.0, level]] for name, level in zip(names, levels, strict=True)}
@@ -123,12 +153,13 @@ def _scenarios(fit: ArmFit, title: str) -> dict[str, str]:
         pair = CoContraction((f"{names[2 * j]}.setpoint", f"{names[2 * j + 1]}.setpoint"), mean)
         laws.append(Cascade(PID(c.name, "difference", mean / range_, 0.5), pair, (-mean,), (mean,)))
         wanted[c.name] = [[0.0, 0.0], [0.1, STEP * range_]]
-    controller = {**model_table(Decentralised(tuple(laws))), "sample_time": 0.01, "setpoint": wanted}
-    note = "supply, orifices and volumes are chosen"
+    law = laws[0] if len(laws) == 1 else Decentralised(tuple(laws))
+    controller = {**model_table(law), "sample_time": 0.01, "setpoint": wanted}
     tuned = f"{note}, and so are the gains: airmuscle tune finds better ones"
+    uncertainty = {"uncertainty": uncertainty_table(fit.uncertainty())}
     return {
-        "scenario.toml": scenario_toml(
-            title, fit.plant(), held, run, note, {"uncertainty": uncertainty_table(fit.uncertainty())}
+        "scenario.toml": scenario_toml(title, fit.plant(), held, run, note, uncertainty),
+        "controlled.toml": scenario_toml(
+            f"{title}, controlled", fit.plant(), {"controller": controller}, run, tuned, uncertainty
         ),
-        "controlled.toml": scenario_toml(f"{title}, controlled", fit.plant(), {"controller": controller}, run, tuned),
     }

@@ -26,19 +26,13 @@ class ReadingRequest:
     """How measurement files are read; each field has precedence over the mapping file, and this over the files."""
 
     resting_length: str | None = option(
-        "Length without pressure and load, such as '300 mm'.",
-        default=None,
-        metavar="QUANTITY",
-        label="Resting length, without pressure and load",
-        example="300 mm",
-    )
+        "Length without pressure and load, such as '300 mm'.", default=None, metavar="QUANTITY",
+        label="Resting length, without pressure and load", example="300 mm",
+    )  # fmt: skip
     ambient: str | None = option(
-        "Ambient pressure, subtracted from absolute pressures, such as '98 kPa'.",
-        default=None,
-        metavar="QUANTITY",
-        label="Ambient pressure (for absolute pressures)",
-        example="98 kPa",
-    )
+        "Ambient pressure, subtracted from absolute pressures, such as '98 kPa'.", default=None, metavar="QUANTITY",
+        label="Ambient pressure (for absolute pressures)", example="98 kPa",
+    )  # fmt: skip
     unit: Pairs = option(
         "Unit of a column whose header states none; repeatable.", default=(), metavar="COLUMN=UNIT", read=read_pair
     )
@@ -46,95 +40,61 @@ class ReadingRequest:
         "Column mapping (TOML) for headers without quantity or unit.", default=None, metavar="FILE"
     )
     column: Pairs = option(
-        "Header of a column, by name or number: 'Channel 1=pressure [bara]', '3=length [mm]'. Repeatable.",
-        default=(),
-        metavar="COLUMN=HEADER",
-        read=read_pair,
-    )
+        "Header of a column, by name or number: 'Channel 1=pressure [bara]', '3=length [mm]'. Repeatable.", default=(),
+        metavar="COLUMN=HEADER", read=read_pair,
+    )  # fmt: skip
     constant: Pairs = option(
-        "Quantity that was held and not recorded, 'length=73.2 mm', or specimen, run. Repeatable.",
-        default=(),
-        metavar="NAME=QUANTITY",
-        read=read_pair,
-    )
+        "Quantity that was held and not recorded, 'length=73.2 mm', or specimen, run. Repeatable.", default=(),
+        metavar="NAME=QUANTITY", read=read_pair,
+    )  # fmt: skip
     file_name: str | None = option(
-        "Values in the names of the files: 'cut{specimen}_held{length [cm]}cm'; {} is any text.",
-        default=None,
-        metavar="PATTERN",
-        label="Values in file names",
-        example="cut{specimen}_held{length [mm]}mm",
-    )
+        "Values in the names of the files: 'cut{specimen}_held{length [cm]}cm'; {} is any text.", default=None,
+        metavar="PATTERN", label="Values in file names", example="cut{specimen}_held{length [mm]}mm",
+    )  # fmt: skip
     time: str | None = option(
-        "Time base: recorded, uniform (by the number of rows, for rounded stamps), unordered or none.",
-        default=None,
-        metavar="BASE",
-        label="Time base",
-        offered=(
-            ("", "as recorded"),
-            ("uniform", "uniform, for rounded stamps"),
-            ("unordered", "unordered"),
-            ("none", "none"),
-        ),
-    )
+        "Time base: recorded, uniform (by the number of rows, for rounded stamps), unordered or none.", default=None,
+        metavar="BASE", label="Time base",
+        offered=(("", "as recorded"), ("uniform", "uniform, for rounded stamps"), ("unordered", "unordered"),
+                 ("none", "none")),
+    )  # fmt: skip
     displacement_zero: str | None = option(
         "Reading of a displacement, shortening or elongation at the resting length, such as '12 mm'; default: 0.",
-        default=None,
-        metavar="QUANTITY",
-        label="Displacement at the resting length",
-        example="0 mm",
-    )
+        default=None, metavar="QUANTITY", label="Displacement at the resting length", example="0 mm",
+    )  # fmt: skip
     skip_rows: int | None = option(
-        "Lines above the headings of text files and worksheets; default: detected, or found by --column.",
-        default=None,
-        bounds=(0, float("inf")),
-        label="Lines above the headings",
-        example="detected",
-    )
+        "Lines above the headings of text files and worksheets; default: detected, or found by --column.", default=None,
+        bounds=(0, float("inf")), label="Lines above the headings", example="detected",
+    )  # fmt: skip
     missing: str | None = option(
         "Missing values (empty, '---', NaN, '#N/A', --missing-code): error (default), drop (leave out the rows), "
-        "interpolate (short gaps in time; other rows are left out).",
-        default=None,
-        metavar="TREATMENT",
+        "interpolate (short gaps in time; other rows are left out).", default=None, metavar="TREATMENT",
         label="Missing values",
         offered=(("", "are an error"), ("drop", "leave out the rows"), ("interpolate", "interpolate short gaps")),
-    )
+    )  # fmt: skip
     missing_code: tuple[Any, ...] = option(
-        "Number or text that stands for a missing value: -999. Repeatable.",
-        default=(),
-        metavar="CODE",
-        read=lambda text, where: parse_code(text),
-        label="Codes of missing values",
-        example="-999, OL",
-    )
+        "Number or text that stands for a missing value: -999. Repeatable.", default=(), metavar="CODE",
+        read=lambda text, where: parse_code(text), label="Codes of missing values", example="-999, OL",
+    )  # fmt: skip
     outliers: str | None = option(
-        "Suspected outliers, as inspect lists them: keep (default) or drop (leave out).",
-        default=None,
-        metavar="TREATMENT",
-        label="Suspected outliers",
-        offered=(("", "keep"), ("drop", "leave out")),
-    )
+        "Suspected outliers, as inspect lists them: keep (default) or drop (leave out).", default=None,
+        metavar="TREATMENT", label="Suspected outliers", offered=(("", "keep"), ("drop", "leave out")),
+    )  # fmt: skip
     delimiter: str | None = option(
-        "Column delimiter of text files; default: detected.",
-        default=None,
-        metavar="CHARACTER",
+        "Column delimiter of text files; default: detected.", default=None, metavar="CHARACTER",
         label="Column delimiter of text files",
         offered=(("", "detected"), (";", "semicolon"), (",", "comma"), ("\t", "tab"), (" ", "blank")),
-    )
+    )  # fmt: skip
     decimal: str | None = option(
-        "Decimal mark of text files; default: detected.",
-        default=None,
-        metavar="CHARACTER",
-        label="Decimal mark of text files",
-        offered=(("", "detected"), (",", "comma"), (".", "point")),
-    )
+        "Decimal mark of text files; default: detected.", default=None, metavar="CHARACTER",
+        label="Decimal mark of text files", offered=(("", "detected"), (",", "comma"), (".", "point")),
+    )  # fmt: skip
     sheet: str | None = option(
         "Worksheet of an Excel file; default: all.", default=None, label="Worksheet of Excel files"
     )
     group: str | None = option(
-        "Group of a TDMS or MDF file, or struct of a MAT file.",
-        default=None,
+        "Group of a TDMS or MDF file, or struct of a MAT file.", default=None,
         label="Group or struct of TDMS, MDF, HDF5 and MAT files",
-    )
+    )  # fmt: skip
 
     def column_mapping(self, default: ColumnMapping = ColumnMapping(), **others: Any) -> ColumnMapping:
         """The mapping of the file, if any, or else `default`; the fields, and the further keys, have precedence.

@@ -46,62 +46,36 @@ class SizeRequest:
         "Supply pressure: '6 bar' (gauge).", unit="Pa", label="Supply pressure", hint="gauge", filled="6 bar"
     )
     load: Mapping[str, float] | None = option(
-        "Lift: mass or force of the load, '20 kg' or '200 N'.",
-        metavar="QUANTITY",
-        read=read_load,
-        default=None,
-        label="Load",
-        hint="mass or force",
-        filled="20 kg",
-    )
+        "Lift: mass or force of the load, '20 kg' or '200 N'.", metavar="QUANTITY", read=read_load, default=None,
+        label="Load", hint="mass or force", filled="20 kg",
+    )  # fmt: skip
     stroke: float | None = option(
         "Lift: stroke, such as '40 mm'.", unit="m", default=None, label="Stroke", filled="40 mm"
     )
     stiffness: float | None = option(
-        "Lift: stiffness of a spring, relaxed at the start: '2 N/mm'.",
-        unit="N/m",
-        default=None,
-        label="Stiffness of a spring",
-        hint="optional: 2 N/mm",
-    )
+        "Lift: stiffness of a spring, relaxed at the start: '2 N/mm'.", unit="N/m", default=None,
+        label="Stiffness of a spring", hint="optional: 2 N/mm",
+    )  # fmt: skip
     torque: float | None = option(
-        "Joint: torque in either direction, such as '5 N m'.",
-        unit="N m",
-        default=None,
-        label="Torque in either direction",
-        filled="5 N m",
-    )
+        "Joint: torque in either direction, such as '5 N m'.", unit="N m", default=None,
+        label="Torque in either direction", filled="5 N m",
+    )  # fmt: skip
     angle: float | None = option(
-        "Joint: range of the angle, such as '60 deg'.",
-        unit="rad",
-        default=None,
-        label="Range of the angle",
+        "Joint: range of the angle, such as '60 deg'.", unit="rad", default=None, label="Range of the angle",
         filled="60 deg",
-    )
+    )  # fmt: skip
     inertia: float | None = option(
-        "Joint: inertia, such as '0.05 kg m^2'.",
-        unit="kg m^2",
-        default=None,
-        label="Moment of inertia",
+        "Joint: inertia, such as '0.05 kg m^2'.", unit="kg m^2", default=None, label="Moment of inertia",
         hint="optional: 0.05 kg m^2",
-    )
+    )  # fmt: skip
     safety: float = option(
-        "Factor on the load that is held.",
-        unit="1",
-        metavar="NUMBER",
-        default="1.5",
-        label="Safety factor",
-        hint="on the load",
-        filled="1.5",
-    )
+        "Factor on the load that is held.", unit="1", metavar="NUMBER", default="1.5", label="Safety factor",
+        hint="on the load", filled="1.5",
+    )  # fmt: skip
     cycle_time: float = option(
-        "Time of a cycle, there and back.",
-        unit="s",
-        default="2 s",
-        label="Cycle time",
-        hint="there and back",
+        "Time of a cycle, there and back.", unit="s", default="2 s", label="Cycle time", hint="there and back",
         filled="2 s",
-    )
+    )  # fmt: skip
     max_length: float | None = option(
         "Maximum nominal length.", unit="m", default=None, label="Maximum length", hint="optional", filled="400 mm"
     )
@@ -114,13 +88,9 @@ class SizeRequest:
     count: int | None = option("Exact number of muscles in parallel.", default=None)
     muscle: tuple[str, ...] = option("Muscle or file instead of the catalogue; repeatable.", metavar="NAME", default=())
     sort: str = option(
-        f"Criterion of ranking: {', '.join(SORT_KEYS)}.",
-        choices=SORT_KEYS,
-        default="air",
-        metavar="KEY",
-        label="Rank by",
-        offered=SORTS,
-    )
+        f"Criterion of ranking: {', '.join(SORT_KEYS)}.", choices=SORT_KEYS, default="air", metavar="KEY",
+        label="Rank by", offered=SORTS,
+    )  # fmt: skip
 
     def check(self, where: Where) -> None:
         """Raise RequestError unless a lift or a joint is given."""

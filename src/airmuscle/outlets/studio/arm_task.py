@@ -7,48 +7,70 @@ import contextlib
 import dataclasses
 import tempfile
 import zipfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 from ...bench import propose_mapping
-from ...core import AirmuscleError, FileError, atomic_folder
+from ...bench.readers.file_kind import parse_toml
+from ...core import AirmuscleError, FileError, atomic_folder, suggestion
+from ...files.library import list_plants
 from ...report.data import as_json, as_sheet
 from ...report.write import write_into
-from ..requests import JointFitRequest, RequestError, build, fit_requested_arm, inspect_requested
+from ..requests import JointFitRequest, RequestError, build, fit_requested_arm, form_fields, inspect_requested
 from .fit_reading import without_folder
 from .fit_uploads import FILES
 from .plant_sheet import svg_uri
+from .tasks import check_self_contained
 
-ARCHIVE, MAPPING = ".zip", "mapping.toml"
+ARCHIVE, MAPPING, KNOWN = ".zip", "mapping.toml", "known.toml"
 MAX_UNPACKED, MAX_ENTRIES = 512 * 10**6, 20_000
 """Largest size [bytes] and number of the files of an archive (chosen)."""
-MAX_MAPPING = 20_000
-"""Largest size of a mapping [characters] (chosen)."""
+MAX_TEXT = 20_000
+"""Largest size of a mapping and of a scenario [characters] (chosen)."""
+
+
+FIELDS = ("mapping", *(each["name"] for each in form_fields(JointFitRequest)))
+"""Fields of the page; each is a text, and may be empty."""
 
 
 @dataclasses.dataclass(frozen=True)
 class ArmSettings:
-    """What the user states about episodes: the text of the mapping file, or "", and the texts of the request."""
+    """What the user states about episodes: the texts of FIELDS, that of the mapping file among them."""
 
-    mapping: str
-    left_out: str = ""
-    horizon: str = ""
+    texts: Mapping[str, str]
 
     def request(self, folder: Path) -> JointFitRequest:
-        """The request, whose mapping file is written to a folder."""
-        path = folder / MAPPING
-        path.write_text(self.mapping, encoding="utf-8")
-        given = {"mapping": path, "left_out": self.left_out, "horizon": self.horizon}
+        """The request, whose mapping file and known joint are written to a folder. Raises InputError."""
+        given: dict[str, Any] = dict(self.texts)
+        given["mapping"] = _written(folder / MAPPING, given["mapping"])
+        known = given["known"].strip()
+        if known and ("=" in known or "[" in known):
+            try:
+                check_self_contained(parse_toml(known, KNOWN))
+            except AirmuscleError as error:
+                raise RequestError(str(error.message), "known") from None
+            given["known"] = str(_written(folder / KNOWN, known))
+        elif known and known not in list_plants():
+            raise RequestError(
+                f"'{known[:60]}' is no plant of the library; write the name of one, or the text of a scenario."
+                f"{suggestion(known, list_plants())}", "known",
+            )  # fmt: skip
         return build(JointFitRequest, given, lambda name: name.replace("_", " "))
+
+
+def _written(path: Path, text: str) -> Path:
+    path.parent.mkdir(exist_ok=True)
+    path.write_text(text, encoding="utf-8")
+    return path
 
 
 def read_arm_settings(data: dict[str, Any]) -> ArmSettings:
     """The settings in a request of the page. Raises RequestError."""
-    values = {field.name: data.get(field.name, "") for field in dataclasses.fields(ArmSettings)}
-    for name in (n for n, value in values.items() if not isinstance(value, str) or len(value) > MAX_MAPPING):
-        raise RequestError(f"{name} must be a text of at most {MAX_MAPPING} characters.", name)
-    return ArmSettings(**values)
+    values = {name: data.get(name, "") for name in FIELDS}
+    for name in (n for n, value in values.items() if not isinstance(value, str) or len(value) > MAX_TEXT):
+        raise RequestError(f"{name} must be a text of at most {MAX_TEXT} characters.", name)
+    return ArmSettings(values)
 
 
 def sheet_of_episodes(folder: str, settings: ArmSettings) -> dict[str, Any]:
@@ -56,12 +78,12 @@ def sheet_of_episodes(folder: str, settings: ArmSettings) -> dict[str, Any]:
     names = sorted(path.name for path in (Path(folder) / FILES).iterdir())
     sheet: dict[str, Any] = {
         "files": [{"name": name, "columns": []} for name in names], "recordings": [], "remarks": [], "problems": [],
-        "mapping": settings.mapping, "lines": [], "ready": False,
+        "mapping": settings.texts["mapping"], "lines": [], "ready": False,
     }  # fmt: skip
     try:
         with _opened(Path(folder)) as (source, place):
-            sheet["mapping"] = settings.mapping or propose_mapping(source)
-            request = dataclasses.replace(settings, mapping=sheet["mapping"]).request(place)
+            sheet["mapping"] = sheet["mapping"] or propose_mapping(source)
+            request = ArmSettings({**settings.texts, "mapping": sheet["mapping"]}).request(place)
             found = inspect_requested(source, request)
             sheet["lines"] = [line for line in str(found).splitlines() if not line.startswith("error: ")]
             sheet["problems"] = [{"field": "mapping", "text": text} for text in found.errors]
@@ -92,7 +114,7 @@ def run_arm_fit(
     with atomic_folder(out) as staging:
         write_into(staging, [chapter], title="Identified arm")
         for name, text in files.items():
-            (staging / name).write_text(text, encoding="utf-8")
+            _written(staging / name, text)
         figures = [{"src": svg_uri(plot.draw()), "caption": plot.caption} for plot in chapter.plots]
         sheet = {"arm": as_sheet(chapter), "figures": figures, "files": pack(staging)}
         (staging / "result.json").write_text(as_json(sheet), encoding="utf-8")
@@ -111,7 +133,7 @@ def _opened(folder: Path, field: str = "mapping") -> Iterator[tuple[Path, Path]]
             yield (_unpacked(source, place / "episodes") if source.suffix.lower() == ARCHIVE else source), place
         except AirmuscleError as error:
             text = without_folder(without_folder(str(error.message), place), folder / FILES)
-            own = getattr(error, "field", "") or ("mapping" if MAPPING in text else field)
+            own = getattr(error, "field", "") or next((n for n in ("mapping", "known") if f"{n}.toml" in text), field)
             raise RequestError(text, own) from None
 
 

@@ -5,8 +5,8 @@
   const { element, source, fitSource, say, problemOf } = airmuscle;
   const PAUSE = 800;
   const SHOWN = ["resting_length", "outliers", "braid_radius", "braid_angle"];
-  const ARM = ["record", "mapping", "left_out", "horizon"];
-  const empty = (names) => ({ columns: {}, files: {}, rules: [], entry: "", leave_out: "", hysteresis: false, ...Object.fromEntries([...names, ...ARM].map((name) => [name, ""])) });
+  const LONG = ["known"];  /* fields whose text may have several lines */
+  const empty = (names) => ({ columns: {}, files: {}, rules: [], entry: "", leave_out: "", hysteresis: false, record: "", mapping: "", ...Object.fromEntries(names.map((name) => [name, ""])) });
 
   class FitTab {
     constructor(host, stateChanged) {
@@ -16,9 +16,18 @@
     }
 
     text(name, label, attributes = {}) {
-      const made = element("input", { type: "text", id: `fit-${name}`, autocomplete: "off", ...attributes });
+      const made = LONG.includes(name) ? element("textarea.short", { id: `fit-${name}`, rows: 2, spellcheck: false, ...attributes }) : element("input", { type: "text", id: `fit-${name}`, autocomplete: "off", ...attributes });
       made.addEventListener("change", () => { this.settings[name] = made.value.trim(); this.read(); });
       return this.labelled(name, label, made);
+    }
+
+    /* A box, whose text is "" unless it is marked. */
+    box(name, label, mark) {
+      const made = element("input", { type: "checkbox", id: `fit-${name}`, value: mark });
+      made.addEventListener("change", () => { this.settings[name] = made.checked ? mark : ""; this.read(); });
+      this.fields[name] = made;
+      this.places[name] = element("div", { role: "alert" });
+      return element("div.field", {}, element("label.row", { for: made.id }, made, label), this.places[name]);
     }
 
     choice(name, label, options) {
@@ -29,20 +38,23 @@
 
     /* A field as the program declares it. */
     declared(name) {
-      const { label, example, offered } = this.form[name];
+      const { label, example, offered, mark } = this.form[name];
+      if (mark) return this.box(name, label, mark);
       return offered.length ? this.choice(name, label, offered) : this.text(name, label, example ? { placeholder: example } : {});
     }
 
     labelled(name, label, made) {
+      const hint = this.form[name]?.hint;
       this.fields[name] = made;
       this.places[name] = element("div", { role: "alert" });
-      return element("div.field", {}, element("label", { for: made.id }, label), made, this.places[name]);
+      return element("div.field", {}, element("label", { for: made.id }, label), made, hint ? element("p.small.soft", {}, hint) : null, this.places[name]);
     }
 
     build(library) {
       this.texts = library.forms.fit.map((field) => field.name).filter((name) => name !== "leave_out");
       this.form = Object.fromEntries([...library.forms.fit, ...library.forms.arm].map((field) => [field.name, field]));
-      this.settings = empty(this.texts);
+      this.given = [...this.texts, ...library.forms.arm.map((field) => field.name), "record", "mapping", "entry", "leave_out"];
+      this.settings = empty(this.given);
       const card = (title, ...children) => element("section.card", {}, element("h2", {}, title), ...children);
       const hosts = { files: element("ul.files"), columns: element("div"), data: element("div") };
       this.message = element("div", { role: "alert" });
@@ -111,10 +123,10 @@
     restore(state) {
       const given = state.settings ?? {}, table = (value) => (value && typeof value === "object" && !Array.isArray(value) ? value : {});
       const rules = (Array.isArray(given.rules) ? given.rules : []).filter((rule) => Array.isArray(rule?.recordings) && (Array.isArray(rule.rows) || (rule.ranges && typeof rule.ranges === "object")));
-      this.settings = { ...empty(this.texts), columns: table(given.columns), files: table(given.files), rules, hysteresis: given.hysteresis === true };
-      for (const name of [...this.texts, ...ARM, "entry", "leave_out"]) if (typeof given[name] === "string") this.settings[name] = given[name];
+      this.settings = { ...empty(this.given), columns: table(given.columns), files: table(given.files), rules, hysteresis: given.hysteresis === true };
+      for (const name of this.given) if (typeof given[name] === "string") this.settings[name] = given[name];
       Object.assign(this, { set: state.set, task: typeof state.task === "string" ? state.task : "", names: [] });
-      for (const name of [...this.texts, ...ARM, "entry", "leave_out"]) this.fields[name].value = this.settings[name];
+      for (const name of this.given) this.fields[name][this.form[name]?.mark ? "checked" : "value"] = this.form[name]?.mark ? Boolean(this.settings[name]) : this.settings[name];
       this.fields.hysteresis.checked = this.settings.hysteresis;
       this.further.open = this.texts.some((name) => !SHOWN.includes(name) && this.settings[name]);
       this.data.rules = this.settings.rules;
