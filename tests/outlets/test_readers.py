@@ -178,6 +178,62 @@ def test_matlab_structs_matrices_and_simulink(tmp_path: Path):
     same(only(read(save_v5(tmp_path / "sim.mat", simulink))))
 
 
+def as_struct_array(runs: list[dict[str, np.ndarray]]) -> object:
+    array = np.zeros((1, len(runs)), dtype=[(name, object) for name in runs[0]])
+    for i, run in enumerate(runs):
+        array[0, i] = tuple(run.values())
+    return array
+
+
+def as_cell(values: list) -> np.ndarray:
+    cell = np.empty((1, len(values)), dtype=object)
+    cell[0, :] = values
+    return cell
+
+
+@pytest.mark.parametrize(
+    "written",
+    [as_struct_array, as_cell, lambda runs: {key: as_cell([run[key] for run in runs]) for key in runs[0]}],
+    ids=["struct array", "cell array of structs", "struct of cell arrays"],
+)
+def test_each_struct_of_an_array_of_matlab_is_a_run(tmp_path: Path, written):
+    runs = [{"time_s": TIME[:n], "pressure_kPa": PRESSURE[:n], "length_mm": LENGTH[:n], "force_N": FORCE[:n]}
+            for n in (TIME.size, 9)]  # fmt: skip
+    first, second = read(save_v5(tmp_path / "bench.mat", {"runs": written(runs), "L0_mm": 310.0}))
+    same(first)
+    assert (first.origin, second.origin, len(second)) == ("bench.mat, runs(1)", "bench.mat, runs(2)", 9)
+    assert second.constants["resting_length"] == pytest.approx(0.31)
+    assert len(only(read(tmp_path / "bench.mat", ColumnMapping(group="runs(2)")))) == 9
+
+
+def test_the_struct_array_of_a_file_of_version_7_3_is_a_run_each(tmp_path: Path):
+    h5py = pytest.importorskip("h5py")
+    path = save_v73(tmp_path / "bench.mat", {"L0_mm": 310.0})
+    with h5py.File(path, "r+") as file:
+        for name, values in {"time_s": TIME, "pressure_kPa": PRESSURE, "length_mm": LENGTH, "force_N": FORCE}.items():
+            for n in (TIME.size, 9):
+                file[f"#refs#/{name}{n}"] = values[:n].reshape(1, -1)
+                file[f"#refs#/{name}{n}"].attrs["MATLAB_class"] = np.bytes_("double")
+            places = [[file[f"#refs#/{name}{n}"].ref] for n in (TIME.size, 9)]
+            file.create_dataset(f"runs/{name}", data=np.array(places, dtype=h5py.ref_dtype))
+        file["runs"].attrs["MATLAB_class"] = np.bytes_("struct")
+    first, second = read(path)
+    same(first)
+    assert (first.origin, second.origin, len(second)) == ("bench.mat, runs(1)", "bench.mat, runs(2)", 9)
+
+
+@pytest.mark.parametrize("shape", [(1, -1), (-1, 1)])
+def test_a_vector_that_matlab_writes_to_hdf5_has_one_row(tmp_path: Path, shape):
+    h5py = pytest.importorskip("h5py")
+    with h5py.File(tmp_path / "bench.h5", "w") as file:
+        for name, values in {"time_s": TIME, "pressure_kPa": PRESSURE, "length_mm": LENGTH, "force_N": FORCE}.items():
+            file[name] = values.reshape(shape)
+        file.attrs["L0_mm"] = 310.0
+    same(only(read(tmp_path / "bench.h5")))
+    few = only(read(tmp_path / "bench.h5", downsampling=Decimation(max_rows=5)))
+    assert few["force"].tolist() == FORCE[:: -(-TIME.size // 5)].tolist()
+
+
 def test_the_function_workspace_of_a_matlab_file_is_no_column(tmp_path: Path):
     """MATLAB saves it as a matrix of bytes beside the variables of a file that contains an object."""
     path = tmp_path / "bench.mat"

@@ -153,10 +153,10 @@ _SYNONYMS = {
     "p": "pressure", "druck": "pressure", "gauge_pressure": "pressure",
     "f": "force", "load": "force", "tension": "force", "kraft": "force", "weight": "force",
     "k": "contraction", "eps": "contraction", "epsilon": "contraction", "ε": "contraction",
-    "kontraktion": "contraction", "l": "length", "länge": "length", "y": "position",
+    "kontraktion": "contraction", "l": "length", "länge": "length", "laenge": "length", "y": "position",
     "displacement": "position", "velocity": "speed", "a": "acceleration", "zeit": "time",
-    "temperatur": "temperature", "volumen": "volume",
-    "verkürzung": "shortening", "verlängerung": "elongation",
+    "temperatur": "temperature", "volumen": "volume", "verkürzung": "shortening", "verkuerzung": "shortening",
+    "verlängerung": "elongation", "verlaengerung": "elongation",
     **{quantity.symbol.lower(): name for name, quantity in QUANTITIES.items() if len(quantity.symbol) > 1},
     **{name: name for name in QUANTITIES},
 }  # fmt: skip

@@ -124,7 +124,7 @@ def _groups(
         if isinstance(item, h5py.Group):
             groups.append(item)
         elif item.size and item.ndim:
-            (vectors if item.ndim == 1 and item.dtype.names is None else tables).append(item)
+            (vectors if _is_vector(item) else tables).append(item)
     constants, numeric = {**outer, **_constants(group.attrs)}, [d for d in vectors if d.dtype.kind in "biuf"]
     reduction = Reduction.of((d.size for d in numeric), downsampling)
     channels = [
@@ -142,13 +142,23 @@ def _groups(
         yield from _groups(h5py, inner, origin, downsampling, constants)
 
 
+def _is_vector(dataset: Any) -> bool:
+    """Whether a dataset is a vector, which MATLAB writes as a matrix of one row."""
+    single = dataset.ndim == 2 and 1 in dataset.shape and "columns" not in dataset.attrs
+    return (dataset.ndim == 1 or single) and dataset.dtype.names is None
+
+
 def _values(dataset: Any, step: int, downsampling: Downsampling, field: str | None = None) -> Any:
     """The reduced rows of a dataset, or of one of its fields."""
 
-    def get(first: int, end: int) -> Any:
-        return dataset[first:end] if field is None else dataset[first:end][field]
+    row = dataset.ndim == 2 and dataset.shape[0] == 1
 
-    return read_reduced(get, dataset.shape[0], step, downsampling)
+    def get(first: int, end: int) -> Any:
+        if field is not None or not _is_vector(dataset):
+            return dataset[first:end] if field is None else dataset[first:end][field]
+        return (dataset[0, first:end] if row else dataset[first:end]).reshape(-1)
+
+    return read_reduced(get, dataset.size if _is_vector(dataset) else dataset.shape[0], step, downsampling)
 
 
 def _columns(dataset: Any, step: int, downsampling: Downsampling) -> list[Channel]:

@@ -1,5 +1,7 @@
 """Reader of MATLAB files, v5 to v7.3: one table for the vectors of each struct, and for those outside any struct.
 
+Each element of a struct array, `runs(2)`, and each struct in a cell array is a struct of its own; so are the elements
+of a struct of cell arrays, `runs.force{2}`, of which version 7.3 does not distinguish a struct array.
 Also supported: a matrix next to a list of column names (`importdata` writes `data` and `colheaders`), and the
 structure with time that Simulink saves; tables and timetables with the package mat-io.
 """
@@ -85,11 +87,33 @@ def _find_groups(name: str, fields: Mapping[str, Any]) -> Iterator[tuple[str, Ma
     if signals is not None:
         yield name, signals
         return
-    if any(_is_vector(value) or _is_matrix(value) for value in fields.values()):
+    if any(map(_is_array, fields.values())):
         yield name, fields
     for key, value in fields.items():
-        if isinstance(value, Mapping):
-            yield from _find_groups(f"{name}.{key}".lstrip("."), value)
+        inner = f"{name}.{key}".lstrip(".")
+        for i, element in enumerate(elements := _elements(value), 1):
+            yield from _find_groups(f"{inner}({i})", element)
+        if isinstance(value, Mapping) and not len(elements):
+            yield from _find_groups(inner, value)
+
+
+def _elements(value: Any) -> Sequence[Mapping[str, Any]]:
+    """The structs of a struct array, of a cell array of structs, or of a struct of cell arrays; else none."""
+    if isinstance(value, Mapping):
+        cells = {name: each for name, each in value.items() if _is_cell(each)}
+        if any(map(_is_array, value.values())) or len({len(each) for each in cells.values()}) != 1:
+            return ()
+        return [{**value, **dict(zip(cells, run, strict=True))} for run in zip(*cells.values(), strict=True)]
+    return value if _is_cell(value) and all(isinstance(each, Mapping) for each in value) else ()
+
+
+def _is_cell(value: Any) -> bool:
+    """Whether a value is a cell array or a struct array of one dimension."""
+    return isinstance(value, list) or (isinstance(value, np.ndarray) and value.dtype.kind == "O" and value.ndim == 1)
+
+
+def _is_array(value: Any) -> bool:
+    return _is_vector(value) or _is_matrix(value)
 
 
 def _is_vector(value: Any) -> bool:
@@ -136,7 +160,7 @@ def _make_table(
 
 def _no_numbers(value: Any, rows: int) -> str:
     """What a column of `rows` values contains in place of real numbers; empty for any other value."""
-    if not isinstance(value, np.ndarray | list) or len(value) != rows or _is_vector(value) or _is_matrix(value):
+    if not isinstance(value, np.ndarray | list) or len(value) != rows or _is_array(value):
         return ""
     if isinstance(value, np.ndarray) and value.dtype.kind == "c":
         return "complex numbers"

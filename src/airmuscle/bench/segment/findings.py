@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from ...core import ColumnError, Hint, HintedText
+from ...core import Array, ColumnError, Hint, HintedText
 from ...recording.columns import ZERO_NOT_STATED, quantity_of
 from ...recording.recording import Recording
 from ..readers.time_base import UNIFORM, WITHOUT_TIME
@@ -18,6 +18,8 @@ MAX_SATURATED_FRACTION = 0.5
 """Fraction of saturated rows above which too few rows remain for a fit (chosen)."""
 MAX_FINAL_CHANGE = 0.02
 """A record is too short if its last tenth changes by more than this fraction of the range (chosen)."""
+RAMP_TOLERANCE = 0.1
+"""Relative difference of the rate at the end from the usual one up to which the pressure is swept (chosen)."""
 NOISE_FACTOR = 10.0
 """A pressure with a range below this multiple of the sensor's standard deviation is constant (chosen)."""
 MIN_ROWS_PER_STEP = 5
@@ -166,7 +168,7 @@ def _duration_findings(
         yield Finding(
             f"the record ends before the pressure has settled (it changes by {change} in the last tenth) and may be "
             "shorter than the dynamics. Record until the pressure has settled.",
-            serious=True,
+            serious=not _is_ramp(pressure, len(last)),
         )
     max_step = float(np.max(np.abs(np.diff(pressure)))) if len(pressure) > 1 else 0.0
     if max_step > 0.5 * span > 0:
@@ -174,6 +176,12 @@ def _duration_findings(
             f"the pressure changes by {max_step / 1e3:.4g} kPa between two rows, more than half of its range: the step "
             f"is undersampled at {sampling.rate:.4g} rows per second."
         )
+
+
+def _is_ramp(pressure: Array, rows: int) -> bool:
+    """Whether the pressure changes in the last rows as much as it usually does in as many, as in a sweep."""
+    changes = np.abs(np.diff(pressure[::-rows]))
+    return bool(abs(changes[0] - np.median(changes)) <= RAMP_TOLERANCE * np.median(changes))
 
 
 def _count(number: int, noun: str) -> str:
