@@ -22,8 +22,7 @@ import airmuscle as am
 from airmuscle.core import tree
 from airmuscle.engine import Double, Precision, Single
 from airmuscle.engine.processes import available_cores
-from airmuscle.engine.run.batch.initial_states import default_states
-from airmuscle.engine.run.batch.variations import variations_of
+from airmuscle.engine.run.batch.variations import default_states, variations_of
 
 STEP, PLANTS, DURATION = 1e-3, 10_000, 5.0
 SHORT = 0.1

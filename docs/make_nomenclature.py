@@ -6,7 +6,7 @@ import tomllib
 from pathlib import Path
 
 from airmuscle.core.declaration import parameters
-from airmuscle.files.library.models import model_class, model_names
+from airmuscle.files.library.fields import model_class, model_names
 from airmuscle.recording import QUANTITIES
 
 PAGE = Path(__file__).with_name("nomenclature.md")

@@ -27,8 +27,9 @@ from hypothesis import settings
 
 from airmuscle.core import plotting
 from airmuscle.engine import processes
-from airmuscle.engine.compile.cache import kernel, object_code
+from airmuscle.engine.compile.cache import kernel
 from airmuscle.engine.compile.cache.store import load, save
+from airmuscle.engine.compile.llvm import jit
 
 try:
     import fcntl
@@ -84,13 +85,13 @@ plotting.rendered = ONE_OF_A_KIND
 
 
 def built_once(numba_kernel: Any, kinds: Sequence[str]) -> bytes:
-    """`object_code.build`, which one worker at a time enters for a kernel; the others then find what it has stored."""
+    """`jit.build`, which one worker at a time enters for a kernel; the others then find what it has stored."""
     name = numba_kernel.py_func.__name__
     LOCKS.mkdir(parents=True, exist_ok=True)
     with open(LOCKS / name, "w") as file:  # closing it releases the lock
         fcntl.flock(file, fcntl.LOCK_EX)
         stored = load(name, kinds)
-        return save(name, kinds, object_code.build(numba_kernel, kinds)) if stored is None else stored
+        return save(name, kinds, jit.build(numba_kernel, kinds)) if stored is None else stored
 
 
 if fcntl and "PYTEST_XDIST_WORKER" in os.environ:

@@ -7,7 +7,7 @@ from dataclasses import replace
 from joints import chosen_muscle
 
 from airmuscle import friction, geometry, physics
-from airmuscle.files.library import catalogue
+from airmuscle.files import library
 from airmuscle.physics import (
     AntagonisticJoint,
     ArmLink,
@@ -109,7 +109,7 @@ def pulled(mechanism, count=1):
 
 
 def listed(name):
-    return of(catalogue.load(name).characteristic)
+    return of(library.load(name).characteristic)
 
 
 EXAMPLES = {

@@ -9,7 +9,7 @@ import textwrap
 from collections.abc import Iterator
 from typing import Any
 
-from airmuscle.files.library.models import model_names
+from airmuscle.files.library.fields import model_names
 
 from .docstrings import docstring, to_markdown
 

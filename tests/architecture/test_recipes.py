@@ -24,7 +24,7 @@ CONTRACTS = (
 CHECK = """
 import airmuscle as am
 from airmuscle.files.library.build import build
-from airmuscle.files.library.location import Location
+from airmuscle.files.library.files import Location
 from pathlib import Path
 from plants import OTHER, of, fed
 

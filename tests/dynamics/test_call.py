@@ -32,7 +32,7 @@ from airmuscle.engine.compile.cache.kernel import record
 from airmuscle.engine.loop import PwmState, merge_columns
 from airmuscle.engine.run import output_times as rows_of_a_run
 from airmuscle.engine.run.output_times import merge_output_times
-from airmuscle.engine.run.rows import RowRecorder
+from airmuscle.engine.run.solution import RowRecorder
 from airmuscle.errors import AirmuscleWarning, GeometryLimitError, ParameterError
 from airmuscle.physics import FillDischarge, HangingMass, Plant, Polytropic, Supply, Valve
 

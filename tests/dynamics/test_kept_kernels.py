@@ -24,8 +24,7 @@ from airmuscle.engine.compile import Function, compile_system
 from airmuscle.engine.compile.cache import kernel as kernels
 from airmuscle.engine.compile.cache import store as kept
 from airmuscle.engine.compile.cache.kernel import BoundKernel, Kernel
-from airmuscle.engine.compile.cache.object_code import build, shallow_scope_copies
-from airmuscle.engine.compile.llvm.jit import object_code
+from airmuscle.engine.compile.llvm.jit import build, object_code, shallow_scope_copies
 from airmuscle.errors import AirmuscleWarning
 
 CASE = lifting_run(1)

@@ -14,7 +14,7 @@ from widths import widened
 from airmuscle.engine import PiecewiseLinear
 from airmuscle.engine.compile import compile_system
 from airmuscle.engine.compile.functions_simd import ROWS
-from airmuscle.engine.run.rows import RowRecorder
+from airmuscle.engine.run.solution import RowRecorder
 from airmuscle.physics import HangingMass
 
 BY_DEFAULT = {

@@ -15,7 +15,7 @@ from control_plants import JOINT, LIFT
 
 from airmuscle.engine import Rodas4, RungeKutta4, Schedule, Stepper, simulate
 from airmuscle.errors import ParameterError, SimulationError
-from airmuscle.files.library import catalogue
+from airmuscle.files import library
 from airmuscle.physics import WithEnergyMeters
 
 START = JOINT.state_at(pressure=2e5)
@@ -142,7 +142,7 @@ def test_a_step_that_fails_changes_nothing():
 
 
 def test_leaving_the_validity_range_is_an_error_where_it_is_wanted():
-    plant = catalogue.load("joint-dmsp-20-matrix").plant
+    plant = library.load("joint-dmsp-20-matrix").plant
     start = plant.state_at(pressure=2e5)
     strict = Stepper(plant, start, check_validity=True)
     message, before, failed = repeat(strict, {"left.fill": 1.0, "right.discharge": 1.0}, 0.05)
@@ -156,7 +156,7 @@ def test_leaving_the_validity_range_is_an_error_where_it_is_wanted():
 
 
 def test_energy_meters_leave_the_check_of_the_validity_range_as_it_is():
-    plant = catalogue.load("joint-dmsp-20-matrix").plant
+    plant = library.load("joint-dmsp-20-matrix").plant
     metered = WithEnergyMeters(plant)
     assert list(metered.column_limits) == list(plant.column_limits)
     strict = Stepper(metered, metered.extend_state(plant.state_at(pressure=2e5)), check_validity=True)

@@ -16,7 +16,8 @@ from airmuscle.bench import UNCENSORED, confidence_band, fit, weakly_determined
 from airmuscle.bench.identify import fitted_quantity_of
 from airmuscle.core import tree
 from airmuscle.errors import AirmuscleWarning, IdentificationError
-from airmuscle.files.library import catalogue, files
+from airmuscle.files import library
+from airmuscle.files.library import files
 from airmuscle.physics import Clamped, ContractionLaw, ForceLaw, Tabulated, ValidityRange
 from airmuscle.recording import Recording
 
@@ -32,7 +33,7 @@ LEAST_CONTRACTION = {"saga2007-exact": 0.04}
 def law_of(name: str):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", AirmuscleWarning)
-        entry = catalogue.load(name)
+        entry = library.load(name)
     return entry.characteristic, entry.validity_range or ValidityRange(1e5, 6e5, 0.0, 0.2)
 
 

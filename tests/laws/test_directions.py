@@ -15,8 +15,8 @@ import pytest
 
 from airmuscle.core import autodiff
 from airmuscle.errors import AirmuscleWarning, ParameterError, SolveError
-from airmuscle.files import Entry
-from airmuscle.files.library import catalogue, files
+from airmuscle.files import Entry, library
+from airmuscle.files.library import files
 from airmuscle.physics import Characteristic, ContractionLaw, ForceLaw, PressureLaw, ValidityRange
 from airmuscle.physics.muscle.characteristic.solve import find_first_root
 
@@ -45,7 +45,7 @@ class Points(NamedTuple):
 def entry(name: str) -> Entry:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", AirmuscleWarning)
-        return catalogue.load(name)
+        return library.load(name)
 
 
 def own_direction(law: Characteristic) -> str:

@@ -16,8 +16,7 @@ import pytest
 
 from airmuscle.core import autodiff
 from airmuscle.errors import AirmuscleWarning, GeometryLimitError, ParameterError, PhysicsError
-from airmuscle.files import list_laws
-from airmuscle.files.library import catalogue
+from airmuscle.files import library, list_laws
 from airmuscle.physics import (
     Braid,
     Catenary,
@@ -61,7 +60,7 @@ EXACT = ExactMeridian(PleatedTube(0.2, 0.02), RUBBER, 2e-3)
 def law_of(name: str) -> Characteristic:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", AirmuscleWarning)
-        return catalogue.load(name).characteristic
+        return library.load(name).characteristic
 
 
 @pytest.mark.parametrize("name", TUBES)

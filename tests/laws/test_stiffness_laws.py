@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from airmuscle.errors import ParameterError
-from airmuscle.files.library import catalogue
+from airmuscle.files import library
 from airmuscle.physics import Hunt2017, Reynolds2003, Serres2009
 
 
@@ -52,6 +52,6 @@ def test_the_pressure_of_hunt_is_monotone_up_to_its_pole_and_beyond():
 
 def test_the_library_marks_secondary_sources_and_chosen_numbers():
     for name in ("hunt2017-festo-10", "reynolds2003", "serres2009"):
-        entry = catalogue.load(name)
+        entry = library.load(name)
         assert entry.provenance == "secondary source"
         assert "chosen" in entry.note

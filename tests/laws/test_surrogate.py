@@ -9,7 +9,7 @@ import pytest
 from widths import widened
 
 from airmuscle.errors import AirmuscleWarning, SolveError
-from airmuscle.files.library import catalogue
+from airmuscle.files import library
 from airmuscle.physics import Braid, ChouHannaford1996, Tabulated, ValidityRange, as_force_law
 from airmuscle.physics.muscle.characteristic.polynomial_surrogate import estimate_maximum, forces_or_nan
 
@@ -25,7 +25,7 @@ CASES = [*(("borzikova-monotone", limits) for limits in PARTLY_SOLVED), *((name,
 
 @pytest.mark.parametrize(("name", "limits"), widened(CASES, lambda *case: case in (CASES[0], *CASES[2:5])))
 def test_no_point_errs_by_more_than_the_estimated_maximum_error(name, limits):
-    entry = catalogue.load(name)
+    entry = library.load(name)
     validity_range = ValidityRange(*limits) if limits else entry.validity_range
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", AirmuscleWarning)
@@ -38,7 +38,7 @@ def test_no_point_errs_by_more_than_the_estimated_maximum_error(name, limits):
 
 
 def test_the_rms_error_is_that_of_other_points():
-    entry = catalogue.load("festo-tool-dmsp-20")
+    entry = library.load("festo-tool-dmsp-20")
     surrogate = as_force_law(entry.characteristic, entry.validity_range)
     p, c = _points(entry.validity_range)
     error = surrogate.force(p, c) - entry.characteristic.force(p, c)
@@ -55,7 +55,7 @@ def _points(validity_range: ValidityRange) -> tuple[np.ndarray, ...]:
 
 
 def test_a_law_has_a_solution_at_the_same_points_one_by_one_and_all_at_once():
-    law = catalogue.load("borzikova-monotone").characteristic
+    law = library.load("borzikova-monotone").characteristic
     p, c = np.meshgrid(np.linspace(5e4, 4e5, 5), np.linspace(0.01, 0.3, 5))
     single = [
         forces_or_nan(law, *(np.array([float(v)]) for v in point))[0]
@@ -83,7 +83,7 @@ def test_a_surrogate_warns_where_the_model_has_no_solution():
 
 
 def test_a_surrogate_of_an_unbounded_force_is_refused():
-    law = catalogue.load("saga2007").characteristic
+    law = library.load("saga2007").characteristic
     with pytest.raises(SolveError, match=r"force of Saga2007 is unbounded at a contraction of 0 % and 50 kPa"):
         as_force_law(law, ValidityRange(5e4, 2e5, 0.0, 0.3))
     assert as_force_law(law, ValidityRange(5e4, 2e5, 0.02, 0.3)).max_error < 5.0

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from airmuscle.errors import GeometryLimitError, ParameterError, SolveError
-from airmuscle.files.library import catalogue
+from airmuscle.files import library
 from airmuscle.physics import Tabulated, TabulatedGeometry
 
 TOOL = ("festo-tool-dmsp-10", "festo-tool-dmsp-20", "festo-tool-dmsp-40")
@@ -15,7 +15,7 @@ SMALL = Tabulated((1e5, 1e5, 1e5, 2e5, 2e5), (0.0, 0.05, 0.1, 0.0, 0.2), (100.0,
 
 @pytest.mark.parametrize("name", TOOL)
 def test_the_rows_of_a_table_lie_on_its_surface(name: str):
-    law, rows = catalogue.load(name).characteristic, catalogue.load_data(name)
+    law, rows = library.load(name).characteristic, library.load_data(name)
     force = law.force(rows["pressure"], rows["contraction"])
     np.testing.assert_allclose(force, rows["force"], rtol=1e-12, atol=1e-9)
     np.testing.assert_allclose(law.contraction(rows["pressure"], rows["force"]), rows["contraction"], atol=1e-12)
@@ -23,7 +23,7 @@ def test_the_rows_of_a_table_lie_on_its_surface(name: str):
 
 @pytest.mark.parametrize("name", TOOL)
 def test_a_table_increases_with_pressure_and_decreases_with_contraction(name: str):
-    entry = catalogue.load(name)
+    entry = library.load(name)
     p, c = np.meshgrid(
         np.linspace(*entry.validity_range.pressure, 101), np.linspace(*entry.validity_range.contraction, 101)
     )

@@ -15,7 +15,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from airmuscle.errors import SolveError, TraceError
-from airmuscle.files.library import catalogue
+from airmuscle.files import library
 from airmuscle.physics import Braid, ChouHannaford1996, TabulatedGeometry, TonduLopez2000, ValidityRange, VirtualWork
 from airmuscle.physics.muscle.characteristic import maxwell_defect, virtual_work_defect
 from airmuscle.physics.muscle.geometry import as_polynomial
@@ -51,7 +51,7 @@ def test_an_end_correction_differs_from_virtual_work_by_a_sixth_at_the_end_of_th
 
 @pytest.mark.parametrize(("name", "newtons"), [("dmsp-20-300", 418.4), ("dmsp-10-250", 199.5)])
 def test_a_rubber_wall_takes_hundreds_of_newtons_and_conserves_energy(name: str, newtons: float):
-    muscle = catalogue.load(name)
+    muscle = library.load(name)
     assert virtual_work_defect(muscle.characteristic, muscle.geometry, muscle.validity_range).worst == pytest.approx(
         newtons, abs=0.05
     )

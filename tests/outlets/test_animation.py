@@ -12,7 +12,7 @@ from control_plants import JOINT, LIFT
 
 import airmuscle as am
 from airmuscle.errors import ColumnError, FileError, ParameterError
-from airmuscle.files.library import catalogue
+from airmuscle.files import library
 from airmuscle.physics import Braid, MuscleRoute, SerialArm, SpatialLink
 from airmuscle.physics.plant.drawing import muscle_outline
 
@@ -39,7 +39,7 @@ def test_the_outline_of_a_muscle_is_that_of_its_geometry_and_bulges_with_contrac
         assert np.ptp(outline[:, 1]) == pytest.approx(0.3 * (1 - contraction))
         assert outline[:, 0].max() == pytest.approx(braid.radius_at(contraction))
         np.testing.assert_allclose(outline[: len(outline) // 2], outline[: len(outline) // 2 - 1 : -1] * (-1.0, 1.0))
-    straight = catalogue.load("saga2007-circle").muscle.geometry
+    straight = library.load("saga2007-circle").muscle.geometry
     outline = muscle_outline(straight, 0.1)
     np.testing.assert_allclose(outline[:121, 0], straight.outline(0.1, 121)[1])
 
@@ -60,7 +60,7 @@ def test_the_pointer_has_the_angle_and_the_muscles_their_lengths(joint):
 
 
 def test_the_end_of_a_planar_arm_is_drawn_where_its_tip_is():
-    arm = catalogue.load("arm-lilly-quesada").plant
+    arm = library.load("arm-lilly-quesada").plant
     run = am.simulate(arm, am.Schedule({}), duration=0.05,
                       initial_state=arm.state_at(pressure=3e5))  # fmt: skip
     drawing = run.animate(arm)._scene.draw({name: float(run[name][-1]) for name in run})

@@ -15,8 +15,8 @@ import pytest
 from airmuscle.bench import fit
 from airmuscle.core import cite
 from airmuscle.errors import AirmuscleError, AirmuscleWarning, FileError, ParameterError, UnitError, UnknownNameError
-from airmuscle.files import Entry
-from airmuscle.files.library import Location, build_muscle, catalogue, files, model_class, model_names, write
+from airmuscle.files import Entry, library
+from airmuscle.files.library import Location, build_muscle, files, model_class, model_names, write
 from airmuscle.physics import (
     BoucWen,
     Braid,
@@ -91,7 +91,7 @@ def written(folder: Path, text: str) -> Path:
 
 
 def test_a_file_becomes_a_muscle_in_si(tmp_path: Path):
-    entry = catalogue.load(written(tmp_path, GOOD))
+    entry = library.load(written(tmp_path, GOOD))
     assert entry.name == "muscle"
     assert isinstance(entry.characteristic, Clamped)
     assert (entry.characteristic.max_force, entry.characteristic.inner.geometry.radius) == (1200.0, 0.01)
@@ -108,11 +108,11 @@ def test_a_file_becomes_a_muscle_in_si(tmp_path: Path):
 def test_the_page_on_muscle_files_holds_the_muscle_that_it_names(tmp_path: Path):
     page = (Path(__file__).parents[2] / "docs" / "muscle-file.md").read_text(encoding="utf-8")
     (text,) = re.findall(r"```toml\n(.*?)```", page, flags=re.DOTALL)
-    entry = catalogue.load(written(tmp_path, text))
+    entry = library.load(written(tmp_path, text))
     assert entry.muscle.damper == LinearDamper(200.0)
     assert entry.muscle.friction == Dahl(3e4, 12.0)
     assert entry.characteristic.force(375e3, 0.11) == pytest.approx(
-        catalogue.load("dmsp-20-300").characteristic.force(375e3, 0.11), rel=1e-4
+        library.load("dmsp-20-300").characteristic.force(375e3, 0.11), rel=1e-4
     )
     assert entry.checks[0].tolerance == 38.9
 
@@ -120,7 +120,7 @@ def test_the_page_on_muscle_files_holds_the_muscle_that_it_names(tmp_path: Path)
 @pytest.mark.parametrize("name", files.list_data())
 def test_a_published_data_set_is_cited_also_by_a_fit_to_it(name: str, tmp_path: Path):
     """The licence of most of them requires it."""
-    data = catalogue.load_data(name)
+    data = library.load_data(name)
     (source,) = cite(data)
     words = re.findall(r"[A-Z][a-z]+", source.authors)
     assert words
@@ -130,7 +130,7 @@ def test_a_published_data_set_is_cited_also_by_a_fit_to_it(name: str, tmp_path: 
         ContractileSurface.blank(2, max_force=1e5), [data.rows(slice(0, None, 2)), data.rows(slice(1, None, 2))]
     )
     assert {r.key for r in cite(result)} == {source.key, *(r.key for r in cite(result.model))}
-    entry = catalogue.load(write.save(result, tmp_path / "muscle.toml"))
+    entry = library.load(write.save(result, tmp_path / "muscle.toml"))
     assert source in cite(entry)
 
 
@@ -145,8 +145,8 @@ FRICTION = [
 
 @pytest.mark.parametrize("law", FRICTION, ids=lambda law: type(law).__name__)
 def test_a_muscle_file_carries_its_friction(law, tmp_path: Path):
-    entry = dataclasses.replace(catalogue.load("chou-hannaford"), friction=law)
-    again = catalogue.load(write.save(entry, tmp_path / "muscle.toml"))
+    entry = dataclasses.replace(library.load("chou-hannaford"), friction=law)
+    again = library.load(write.save(entry, tmp_path / "muscle.toml"))
     assert again == dataclasses.replace(entry, name="muscle")
     assert again.muscle.friction == law
     assert {r.key for r in cite(again)} >= {r.key for r in law.references}
@@ -158,7 +158,7 @@ def test_a_muscle_file_carries_its_friction(law, tmp_path: Path):
 
 
 def test_a_plant_takes_over_the_friction_of_its_muscle_file_unless_it_states_another(tmp_path: Path):
-    entry = dataclasses.replace(catalogue.load("dmsp-20-300"), friction=FRICTION[0])
+    entry = dataclasses.replace(library.load("dmsp-20-300"), friction=FRICTION[0])
     write.save(entry, tmp_path / "muscle.toml")
     table = {"library": "muscle.toml", "damper": {"model": "LinearDamper", "damping": 100.0}}
     place = Location("scenario.toml", "plant.muscle", tmp_path)
@@ -172,8 +172,8 @@ def test_a_muscle_file_carries_wall_stop_and_creep(tmp_path: Path):
         "stop": EndStop(0.25, HuntCrossley(1e7)),
         "creep": CreepElements((500.0,), (8.0,)),
     }
-    entry = dataclasses.replace(catalogue.load("dmsp-20-300"), **parts)
-    again = catalogue.load(write.save(entry, tmp_path / "muscle.toml"))
+    entry = dataclasses.replace(library.load("dmsp-20-300"), **parts)
+    again = library.load(write.save(entry, tmp_path / "muscle.toml"))
     assert again == dataclasses.replace(entry, name="muscle")
     assert {name: getattr(again.muscle, name) for name in parts} == parts
 
@@ -181,13 +181,13 @@ def test_a_muscle_file_carries_wall_stop_and_creep(tmp_path: Path):
 def test_a_friction_of_another_kind_is_refused(tmp_path: Path):
     spring = '[friction]\nmodel = "LinearSpring"\nstiffness = 1.0\n'
     with pytest.raises(ParameterError, match=r"\[friction\]: LinearSpring is not allowed here; a Friction is required"):
-        catalogue.load(written(tmp_path, GOOD.replace("[validity_range]", spring + "[validity_range]")))
+        library.load(written(tmp_path, GOOD.replace("[validity_range]", spring + "[validity_range]")))
 
 
 def test_a_saved_muscle_loads_to_the_same_numbers(tmp_path: Path):
-    entry = catalogue.load(written(tmp_path, GOOD))
+    entry = library.load(written(tmp_path, GOOD))
     saved = write.save(entry, tmp_path / "muscle.toml")
-    assert catalogue.load(saved) == entry
+    assert library.load(saved) == entry
     assert [path.name for path in tmp_path.iterdir()] == ["muscle.toml"]
 
 
@@ -195,18 +195,18 @@ def test_a_saved_muscle_loads_to_the_same_numbers(tmp_path: Path):
 def test_every_library_entry_survives_saving(name: str, tmp_path: Path):
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", AirmuscleWarning)
-        entry = catalogue.load(name)
-        assert catalogue.load(write.save(entry, tmp_path / f"{name}.toml")) == entry
+        entry = library.load(name)
+        assert library.load(write.save(entry, tmp_path / f"{name}.toml")) == entry
 
 
 def test_texts_with_quotes_and_new_lines_survive_saving(tmp_path: Path):
     law = ChouHannaford1996(Braid(0.01, 0.4, 0.3))
     entry = Entry("odd", 'called "odd" \\ here', "chosen", law, law.geometry, note="two\nlines\tä\x7f")
-    assert catalogue.load(write.save(entry, tmp_path / "odd.toml")) == entry
+    assert library.load(write.save(entry, tmp_path / "odd.toml")) == entry
 
 
 def test_a_file_that_cannot_be_written_leaves_nothing(tmp_path: Path):
-    entry = catalogue.load("chou-hannaford")
+    entry = library.load("chou-hannaford")
     with pytest.raises(FileError, match=r"nowhere.*cannot be written"):
         write.save(entry, tmp_path / "nowhere" / "muscle.toml")
     (tmp_path / "taken.toml").mkdir()
@@ -314,7 +314,7 @@ def test_a_bad_file_is_told_what_is_wrong(
 ):
     assert was in GOOD
     with pytest.raises(kind, match=message) as raised:
-        catalogue.load(written(tmp_path, GOOD.replace(was, becomes, 1)))
+        library.load(written(tmp_path, GOOD.replace(was, becomes, 1)))
     assert "muscle.toml" in str(raised.value)
 
 
@@ -324,76 +324,76 @@ def test_a_model_of_another_kind_is_refused(tmp_path: Path):
     with pytest.raises(
         ParameterError, match=r"\[characteristic\]: Braid is not allowed here; a Characteristic is required"
     ):
-        catalogue.load(written(tmp_path, text))
+        library.load(written(tmp_path, text))
     text = f'title = "t"\nprovenance = "chosen"\n[characteristic]\nmodel = "Clamped"\n[characteristic.inner]\n{braid}'
     with pytest.raises(
         ParameterError, match=r"\[characteristic.inner\]: Braid is not allowed here; a ForceLaw is required"
     ):
-        catalogue.load(written(tmp_path, text))
+        library.load(written(tmp_path, text))
 
 
 def test_a_value_where_a_table_belongs_is_refused(tmp_path: Path):
     with pytest.raises(ParameterError, match=r"\[characteristic\] is 3; it must be a table. Write model = "):
-        catalogue.load(written(tmp_path, 'title = "t"\nprovenance = "chosen"\ncharacteristic = 3\n'))
+        library.load(written(tmp_path, 'title = "t"\nprovenance = "chosen"\ncharacteristic = 3\n'))
     text = 'title = "t"\nprovenance = "chosen"\n[characteristic]\nmodel = "ChouHannaford1996"\ngeometry = 3\n'
     with pytest.raises(
         ParameterError,
         match=r"\[characteristic.geometry\] is 3; it must be a table. Write its values in it: radius, braid_angle",
     ):
-        catalogue.load(written(tmp_path, text))
+        library.load(written(tmp_path, text))
 
 
 def test_a_file_that_is_no_toml_or_is_not_there(tmp_path: Path):
     with pytest.raises(FileError, match=r"muscle\.toml: is not valid TOML: .* \(at line 2, column"):
-        catalogue.load(written(tmp_path, "title = 'x'\n[characteristic\n"))
+        library.load(written(tmp_path, "title = 'x'\n[characteristic\n"))
     with pytest.raises(FileError, match=r"nothing\.toml: there is no such file"):
-        catalogue.load(tmp_path / "nothing.toml")
+        library.load(tmp_path / "nothing.toml")
     (tmp_path / "muscle.toml").write_bytes(GOOD.replace("own", "own\xe9").encode("latin-1"))
     with pytest.raises(FileError, match=r"is not UTF-8 text \(byte 29\)"):
-        catalogue.load(tmp_path / "muscle.toml")
+        library.load(tmp_path / "muscle.toml")
 
 
 def test_a_byte_order_mark_does_no_harm(tmp_path: Path):
     (tmp_path / "muscle.toml").write_text(GOOD, encoding="utf-8-sig")
-    assert catalogue.load(tmp_path / "muscle.toml").title == "A muscle of our own"
+    assert library.load(tmp_path / "muscle.toml").title == "A muscle of our own"
 
 
 def test_a_unique_beginning_of_a_name_is_enough():
-    assert catalogue.load("chou").name == "chou-hannaford"
+    assert library.load("chou").name == "chou-hannaford"
     with pytest.raises(UnknownNameError, match=r"'dmsp' is ambiguous: dmsp-10-250, dmsp-20-300\. Write more"):
-        catalogue.load("dmsp")
+        library.load("dmsp")
     with pytest.raises(
         UnknownNameError, match=r"no library entry 'dsmp-20-300'; there are .* Did you mean 'dmsp-20-300'\?"
     ):
-        catalogue.load("dsmp-20-300")
+        library.load("dsmp-20-300")
     with pytest.raises(UnknownNameError, match="no library entry ''"):
-        catalogue.load("")
+        library.load("")
 
 
 def test_an_entry_with_a_warning_gives_it(tmp_path: Path):
     with pytest.warns(AirmuscleWarning, match="muscle: made up"):
-        catalogue.load(written(tmp_path, 'warning = "made up"\n' + GOOD))
+        library.load(written(tmp_path, 'warning = "made up"\n' + GOOD))
 
 
 def test_an_entry_that_is_no_muscle_says_what_it_lacks():
     with pytest.raises(UnknownNameError, match=r"sarosi-dmsp-10 .* lacks a \[geometry\]"):
-        _ = catalogue.load("sarosi-dmsp-10").muscle
-    table = dataclasses.replace(catalogue.load("festo-tool-dmsp-20"), geometry=Braid(0.01, 0.4, 0.2))
+        _ = library.load("sarosi-dmsp-10").muscle
+    table = dataclasses.replace(library.load("festo-tool-dmsp-20"), geometry=Braid(0.01, 0.4, 0.2))
     with pytest.raises(UnknownNameError, match="lacks a law solved for the force: see as_force_law"):
         _ = table.muscle
 
 
 @pytest.mark.parametrize("name", files.list_data())
 def test_a_data_set_says_where_it_is_from(name: str):
-    recording = catalogue.load_data(name)
+    recording = library.load_data(name)
     assert len(recording) >= 60
     assert "source: " in recording.notes[-1]
     assert "licence: " in recording.notes[-1]
 
 
 def test_the_measured_maps_know_their_resting_length():
-    assert catalogue.load_data("dmsp-20")["contraction"].max() == pytest.approx(0.26)
-    assert catalogue.load_data("dmsp-10")["contraction"].max() == pytest.approx(0.208)
+    assert library.load_data("dmsp-20")["contraction"].max() == pytest.approx(0.26)
+    assert library.load_data("dmsp-10")["contraction"].max() == pytest.approx(0.208)
 
 
 def test_a_column_of_a_file_that_is_not_there(tmp_path: Path):
@@ -401,9 +401,9 @@ def test_a_column_of_a_file_that_is_not_there(tmp_path: Path):
     text = f'title = "t"\nprovenance = "chosen"\n[characteristic]\nmodel = "Tabulated"\npressures = {table}\n'
     text += f"contractions = {table}\nforces = {table}\n"
     with pytest.raises(FileError, match=r"map\.csv"):
-        catalogue.load(written(tmp_path, text))
+        library.load(written(tmp_path, text))
     with pytest.raises(ParameterError, match=r"pressures is .*; write a column of a file as \{ file = "):
-        catalogue.load(written(tmp_path, text.replace("column", "colum")))
+        library.load(written(tmp_path, text.replace("column", "colum")))
 
 
 @pytest.mark.parametrize("name", model_names())

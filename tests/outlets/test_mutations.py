@@ -16,11 +16,10 @@ import pytest
 
 from airmuscle.bench import ColumnMapping, read
 from airmuscle.errors import AirmuscleError
-from airmuscle.files import load, load_scenario, load_valve
-from airmuscle.files.library import catalogue
+from airmuscle.files import library, load, load_scenario, load_valve
 
 tomlkit = pytest.importorskip("tomlkit", reason="tomlkit is not installed")
-LIBRARY = Path(catalogue.__file__).parent
+LIBRARY = Path(library.__file__).parent
 EXAMPLES = Path(__file__).parents[2] / "examples"
 LONGEST = 2000
 VALUES: tuple[Any, ...] = (

@@ -12,9 +12,8 @@ from airmuscle.bench import fit
 from airmuscle.engine import ZERO_INPUT, DormandPrince8, RungeKutta4, SampledSignal, simulate
 from airmuscle.papers import hosovsky, hosovsky_claims
 from airmuscle.papers import hosovsky_effects as causing
-from airmuscle.papers import hosovsky_fill as filling
+from airmuscle.papers import hosovsky_fill_and_release as stages
 from airmuscle.papers import hosovsky_joint as joining
-from airmuscle.papers import hosovsky_release as releasing
 from airmuscle.papers.hosovsky_plant import (
     FILLING,
     MATRIX,
@@ -55,7 +54,7 @@ NUMBERS = UnpublishedParameters()
 
 @pytest.fixture(scope="module")
 def fill():
-    return filling.run_fill(NUMBERS)
+    return stages.run_fill(NUMBERS)
 
 
 def verdicts(claims):
@@ -78,13 +77,13 @@ def test_the_muscle_fills_to_the_supply_and_empties_to_the_surroundings(fill):
 def test_a_higher_critical_ratio_changes_the_verdict_on_choking(fill):
     claim = r"the flow is choked until \(p_2/p_1 = b\): muscle pressure at which the mass flow begins to decrease"
     assert verdicts(hosovsky_claims.fill_claims(fill))[claim] == HOLDS
-    other = filling.run_fill(NUMBERS, dataclasses.replace(MATRIX, critical_ratio=0.5))
+    other = stages.run_fill(NUMBERS, dataclasses.replace(MATRIX, critical_ratio=0.5))
     assert verdicts(hosovsky_claims.fill_claims(other))[claim] == DIFFERS
 
 
 def test_another_conductance_changes_the_verdict_on_its_usual_unit(fill):
     claim = "sonic conductance of the MATRIX valve in customary units"
-    other = filling.run_fill(NUMBERS, dataclasses.replace(MATRIX, conductance=2.6167e-8))
+    other = stages.run_fill(NUMBERS, dataclasses.replace(MATRIX, conductance=2.6167e-8))
     assert verdicts(hosovsky_claims.fill_claims(fill))[claim] == HOLDS
     assert verdicts(hosovsky_claims.fill_claims(other))[claim] == DIFFERS
 
@@ -94,18 +93,18 @@ def test_what_has_no_printed_number_is_never_said_to_hold(fill):
 
 
 def test_interchanged_pressures_change_the_verdicts_of_the_release():
-    low, high = releasing.release_pair(NUMBERS)
-    ranges = releasing.range_table(NUMBERS)
-    right = [c.verdict for c in releasing.claims(low, high, ranges)]
-    wrong = [c.verdict for c in releasing.claims(high, low, ranges)]
+    low, high = stages.release_pair(NUMBERS)
+    ranges = stages.range_table(NUMBERS)
+    right = [c.verdict for c in stages.claims(low, high, ranges)]
+    wrong = [c.verdict for c in stages.claims(high, low, ranges)]
     assert right[:2] == [HOLDS, HOLDS]
     assert wrong[:2] == [DIFFERS, DIFFERS]
-    assert all("Each chosen value varied alone over its range: " in c.note for c in releasing.claims(low, high, ranges))
+    assert all("Each chosen value varied alone over its range: " in c.note for c in stages.claims(low, high, ranges))
 
 
 def test_the_release_starts_from_rest_with_the_latch_carrying_the_difference():
-    run = releasing.release(NUMBERS, 300e3).run
-    held = run["time"] < releasing.RELEASED_AT
+    run = stages.release(NUMBERS, 300e3).run
+    held = run["time"] < stages.RELEASED_AT
     assert (run["speed"][held] == 0).all()
     assert (run["contraction"][held] == 0).all()
     free = run["acceleration"][~held][0]
@@ -118,10 +117,10 @@ def test_the_decrement_finds_the_damping_of_a_linear_oscillator():
     decay, w = zeta * omega, omega * np.sqrt(1 - zeta**2)
     y = 1 - np.exp(-decay * t) * (np.cos(w * t) + decay / w * np.sin(w * t))
     v = np.exp(-decay * t) * (decay**2 / w + w) * np.sin(w * t)
-    ratio, rate = releasing.damping(t, y, v)
+    ratio, rate = stages.damping(t, y, v)
     assert ratio == pytest.approx(zeta, rel=1e-3)
     assert rate == pytest.approx(decay, rel=1e-3)
-    assert np.isnan(releasing.damping(t, t, np.ones_like(t))).all()
+    assert np.isnan(stages.damping(t, t, np.ones_like(t))).all()
 
 
 def test_the_surface_follows_its_measured_map():
@@ -214,7 +213,7 @@ def test_the_effects_are_differences_of_two_runs(effects):
     adiabatic = next(e for e in effects if e.substitution.component == "first law, adiabatic")
     runs = [
         simulate(
-            plant(NUMBERS, hanging_load(NUMBERS), gas=gas), filling.SCHEDULE, duration=25.0, output_times=adiabatic.time
+            plant(NUMBERS, hanging_load(NUMBERS), gas=gas), stages.SCHEDULE, duration=25.0, output_times=adiabatic.time
         )
         for gas in (Isothermal(), EnergyBalance(0.0))
     ]
@@ -285,13 +284,13 @@ def joint():
 def test_varied_together_the_chosen_values_break_the_claim_on_relative_damping(joint):
     """Braid 0.5 rad and 500 kPa together give 0.305, although each alone stays below the limit of 0.3."""
     angle, pressure = NUMBERS.with_value("braid_angle", 0.5), NUMBERS.with_value("high_pressure", 500e3)
-    alone = [releasing.compare_releases(*releasing.release_pair(p))["relative damping"] for p in (angle, pressure)]
+    alone = [stages.compare_releases(*stages.release_pair(p))["relative damping"] for p in (angle, pressure)]
     together = angle.with_value("high_pressure", 500e3)
-    both = releasing.compare_releases(*releasing.release_pair(together))["relative damping"]
-    assert max(alone) < releasing.MAX_DAMPING_DIFFERENCE < both
+    both = stages.compare_releases(*stages.release_pair(together))["relative damping"]
+    assert max(alone) < stages.MAX_DAMPING_DIFFERENCE < both
     assert both == pytest.approx(0.305, abs=5e-4)
     found = {claim.claim: claim for claim in joining.claims(joint)}
-    damping = found[releasing.STATEMENTS["relative damping"].text]
+    damping = found[stages.STATEMENTS["relative damping"].text]
     assert damping.verdict == DIFFERS
     assert 50.0 < damping.reproduced < 100.0
     assert f"{100 * joint.share('relative damping', 'Sobol set'):.3g} %" in damping.note
@@ -315,13 +314,13 @@ def test_the_joint_variation_holds_every_corner_for_both_maps_and_the_sobol_set(
 def test_a_joint_case_is_the_release_of_its_values(joint):
     case = joint.worst("relative damping")
     data = case.design.removeprefix("corners, ")
-    assert case.values == releasing.compare_releases(*releasing.release_pair(case.parameters, data))
+    assert case.values == stages.compare_releases(*stages.release_pair(case.parameters, data))
 
 
 def test_a_missing_value_does_not_hold():
-    values = dict.fromkeys(releasing.STATEMENTS, float("nan"))
+    values = dict.fromkeys(stages.STATEMENTS, float("nan"))
     joint = joining.JointVariation((joining.JointCase("Sobol set", NUMBERS, values),))
-    assert [joint.share(key) for key in releasing.STATEMENTS] == [0.0] * 4
+    assert [joint.share(key) for key in stages.STATEMENTS] == [0.0] * 4
 
 
 def test_filling_suffers_more_by_a_fifth_only_inside_the_range_of_heat_transfer():

@@ -8,14 +8,14 @@ import warnings
 import pytest
 
 from airmuscle.errors import AirmuscleWarning
-from airmuscle.files import Entry, verify
-from airmuscle.files.library import catalogue, files
+from airmuscle.files import Entry, library, verify
+from airmuscle.files.library import files
 
 
 def quietly_loaded(name: str) -> Entry:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", AirmuscleWarning)
-        return catalogue.load(name)
+        return library.load(name)
 
 
 @pytest.mark.parametrize("name", files.list_laws())
@@ -33,6 +33,6 @@ def test_an_entry_says_where_it_is_from(name: str):
 
 
 def test_a_check_fails_when_the_model_changes():
-    entry = catalogue.load("dmsp-20-300")
+    entry = library.load("dmsp-20-300")
     stiffer = dataclasses.replace(entry.characteristic, c0=entry.characteristic.c0 * 1.1)
     assert not all(verdict.passes for verdict in verify(dataclasses.replace(entry, characteristic=stiffer)))

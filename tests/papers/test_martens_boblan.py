@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from airmuscle.core import ops
-from airmuscle.files.library import catalogue
+from airmuscle.files import library
 from airmuscle.physics import MartensBoblan2017
 from airmuscle.units import degree
 
@@ -22,16 +22,16 @@ ANGLE_CORRECTION = {"dmsp-20-300": -0.073, "dmsp-10-250": -0.1}
 
 
 def law(name: str) -> MartensBoblan2017:
-    return catalogue.load(name).characteristic
+    return library.load(name).characteristic
 
 
 def errors(name: str, model: MartensBoblan2017) -> np.ndarray:
-    measured = catalogue.load_data(name)
+    measured = library.load_data(name)
     return model.force(measured["pressure"], measured["contraction"]) - measured["force"]
 
 
 def percent_of_maximum(name: str, misses: np.ndarray) -> float:
-    return 100 * np.abs(misses).max() / catalogue.load_data(name)["force"].max()
+    return 100 * np.abs(misses).max() / library.load_data(name)["force"].max()
 
 
 @pytest.mark.parametrize(("name", "percent", "rms"), [("dmsp-20-300", 2.37, 10.4), ("dmsp-10-250", 7.4, 8.7)])
@@ -43,7 +43,7 @@ def test_the_errors_on_the_measured_maps(name: str, percent: float, rms: float):
 
 
 def test_without_the_one_point_in_the_dead_band_the_claim_on_the_dmsp_10_is_confirmed():
-    misses, measured = errors("dmsp-10-250", law("dmsp-10-250")), catalogue.load_data("dmsp-10-250")
+    misses, measured = errors("dmsp-10-250", law("dmsp-10-250")), library.load_data("dmsp-10-250")
     worst = int(np.argmax(np.abs(misses)))
     assert (measured["pressure"][worst], measured["force"][worst]) == (5e4, 0.0)
     rest = percent_of_maximum("dmsp-10-250", np.delete(misses, worst))
@@ -57,7 +57,7 @@ def test_the_error_of_the_dmsp_20_exceeds_the_claim_by_two_hundredths_of_a_perce
 
 @pytest.mark.parametrize(("name", "percent"), [("dmsp-20-300", 15.0), ("dmsp-10-250", 10.0)])
 def test_the_axial_wall_force_is_subtracted_although_mechanics_requires_addition(name: str, percent: float):
-    model, measured = law(name), catalogue.load_data(name)
+    model, measured = law(name), library.load_data(name)
     length, rest = measured["length"], model.geometry.resting_length
     diameter = 2 * model.geometry.radius_at(measured["contraction"])
     along = model.modulus(length) * (length - rest) / rest * model.wall_thickness * ops.pi * diameter

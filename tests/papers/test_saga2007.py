@@ -21,8 +21,8 @@ from airmuscle.files import load
 from airmuscle.papers import chapter_texts
 from airmuscle.papers import saga2007_claims as claims
 from airmuscle.papers import saga2007_joint as joining
+from airmuscle.papers import saga2007_muscle as values
 from airmuscle.papers import saga2007_pairs as pairs
-from airmuscle.papers import saga2007_values as values
 from airmuscle.papers.saga2007 import chapter, virtual_work
 from airmuscle.papers.saga2007_muscle import (
     DEFAULT,

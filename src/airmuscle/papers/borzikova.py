@@ -16,7 +16,6 @@ from ..physics.muscle.characteristic.borzikova import BORZIKOVA, SAM_30X290, Pla
 from ..report.chapter import Chapter
 from ..report.claims import AtLeast, Claim, ClaimRow, Equal, Kind
 from ..report.formatting import format_number, typographic
-from .borzikova_figures import plots
 from .borzikova_surfaces import (
     AS_EXPONENT,
     CORRECTED,
@@ -24,6 +23,7 @@ from .borzikova_surfaces import (
     MISPRINT_CORRECTED,
     PRINTED,
     index_on_curves,
+    plots,
     round_contraction,
     sample,
     surfaces,

@@ -7,13 +7,12 @@ import numpy as np
 import airmuscle as am
 
 from ..core import BLACK, BLUE, LINES, RED, cite, legend_outside, new_figure
-from ..files.library import catalogue, load_law
+from ..files.library import load_data, load_law
 from ..physics.muscle.characteristic import exponents, maxwell_defect
 from ..report.chapter import Chapter, Plot, Table
 from . import hosovsky_effects as causing
-from . import hosovsky_fill as filling
+from . import hosovsky_fill_and_release as runs
 from . import hosovsky_joint as joining
-from . import hosovsky_release as releasing
 from .hosovsky_claims import (
     describe_ranges,
     fill_claims,
@@ -61,10 +60,10 @@ def chapter(
 ) -> Chapter:
     """Return the chapter of the report; both arguments contain values that the paper does not print."""
     parameters, suspected = parameters or UnpublishedParameters(), suspected or causing.SuspectedCauses()
-    fill = filling.run_fill(parameters)
+    fill = runs.run_fill(parameters)
     effects = causing.compute_effects(parameters, suspected)
-    low, high = releasing.release_pair(parameters)
-    ranges, joint = releasing.range_table(parameters), joining.joint_variation(parameters)
+    low, high = runs.release_pair(parameters)
+    ranges, joint = runs.range_table(parameters), joining.joint_variation(parameters)
     ratios = ratio_ranges(parameters, suspected)
     explanation = f"{causing.describe_effects(effects)} {describe_ranges(ratios)}"
     return Chapter(
@@ -73,7 +72,7 @@ def chapter(
             *surface_claims(surface_fit()),
             *fill_claims(fill, explanation),
             *measurement_claims(),
-            *releasing.claims(low, high, ranges),
+            *runs.claims(low, high, ranges),
             *joining.claims(joint),
             *gas_findings(effects),
         ),
@@ -95,17 +94,17 @@ def chapter(
 
 
 def _plots(
-    fill: filling.FillRun, effects: tuple[causing.Effect, ...], low: releasing.Release, high: releasing.Release
+    fill: runs.FillRun, effects: tuple[causing.Effect, ...], low: runs.Release, high: runs.Release
 ) -> tuple[Plot, ...]:
     """Return all figures in the order of the report."""
     return (
         hill_model(),
         surface_in_space(),
         isobars(),
-        filling.valve_figure(MATRIX, fill.plant.ambient.temperature),
-        filling.figure_3(fill),
+        runs.valve_figure(MATRIX, fill.plant.ambient.temperature),
+        runs.figure_3(fill),
         causing.effect_plot(effects),
-        releasing.figure_4(low, high),
+        runs.figure_4(low, high),
     )
 
 
@@ -143,7 +142,7 @@ def maxwell_table(parameters: UnpublishedParameters) -> Table:
     return Table("hosovsky_maxwell", "Maxwell defect of fitted muscles over their validity ranges", columns, note)
 
 
-def _extrapolation_table(fill: filling.FillRun, low: releasing.Release, high: releasing.Release) -> Table:
+def _extrapolation_table(fill: runs.FillRun, low: runs.Release, high: runs.Release) -> Table:
     """Return the times and extents of extrapolation beyond the data of the surface, by run."""
     runs = {"fill and discharge": fill.adaptive, f"release from {low.pressure / 1e3:g} kPa": low.run}
     runs[f"release from {high.pressure / 1e3:g} kPa"] = high.run
@@ -154,7 +153,7 @@ def _extrapolation_table(fill: filling.FillRun, low: releasing.Release, high: re
     return Table("hosovsky_boxes", "Extrapolation beyond the data of the contractile surface", columns)
 
 
-def _time_series(fill: filling.FillRun, low: releasing.Release, high: releasing.Release) -> tuple[Table, ...]:
+def _time_series(fill: runs.FillRun, low: runs.Release, high: runs.Release) -> tuple[Table, ...]:
     """Return the time series of Figs. 3 and 4; only written to files."""
     runs = {"hosovsky_fill": fill.adaptive, "hosovsky_release_low": low.run, "hosovsky_release_high": high.run}
     names = (("time", "s"), ("pressure", "Pa"), ("contraction", "1"), ("position", "m"), ("force", "N"))
@@ -225,7 +224,7 @@ def _damper(axes: Any, begin: float, end: float, height: float) -> None:
 
 def surface_in_space() -> Plot:
     """Return Fig. 2: force over contraction and pressure, with the measured points."""
-    law, data = surface(), catalogue.load_data(FORCE_MAPS[0])
+    law, data = surface(), load_data(FORCE_MAPS[0])
     figure, axes = new_figure(height=4.4, subplot_kw={"projection": "3d", "computed_zorder": False})
     contraction, pressure = np.meshgrid(np.linspace(0.0, MAX_CONTRACTION, 40), np.linspace(0.0, 675e3, 40))
     force = np.asarray(law.force(pressure, contraction))
@@ -251,7 +250,7 @@ def surface_in_space() -> Plot:
 
 def isobars() -> Plot:
     """Return the isobars of the surface and the measured points."""
-    law, data = surface(), catalogue.load_data(FORCE_MAPS[0])
+    law, data = surface(), load_data(FORCE_MAPS[0])
     figure, axes = new_figure()
     contraction = np.linspace(0.0, MAX_CONTRACTION, 200)
     for i, pressure in enumerate((675e3, 525e3, 375e3, 250e3, 135e3)):

@@ -24,7 +24,7 @@ from .hosovsky_effects import (
     run_fill_of,
     substitutions,
 )
-from .hosovsky_fill import FillRun, end_of_choked_flow
+from .hosovsky_fill_and_release import FillRun, end_of_choked_flow
 from .hosovsky_plant import FILLING, PAPER, SUPPLY_PRESSURE, VOLUME_FLOW_RATIO, UnpublishedParameters, surface
 
 STRONGER = 1.2

@@ -13,8 +13,8 @@ from ..design.study.distributions import Uniform
 from ..report.chapter import Table
 from ..report.claims import AtLeast, Claim
 from ..report.formatting import format_quantity, format_unit
+from .hosovsky_fill_and_release import RELEASED_AT, STATEMENTS, Release, agrees, compare_releases, release
 from .hosovsky_plant import FORCE_MAPS, PAPER, UnpublishedParameters
-from .hosovsky_release import RELEASED_AT, STATEMENTS, Release, agrees, compare_releases, release
 
 VARIED = ("stiffness", "damping", "length", "braid_angle", "low_pressure", "high_pressure")
 """The chosen values on which the quick release depends."""

@@ -6,7 +6,7 @@ import functools
 import airmuscle as am
 
 from ..core import CHOSEN, Reference
-from ..files.library import catalogue
+from ..files.library import load_data
 from ..report.formatting import format_number, format_quantity, typographic
 
 PAPER = "hosovsky"
@@ -93,7 +93,7 @@ class UnpublishedParameters:
 @functools.cache
 def surface_fit(data: str = FORCE_MAPS[0]) -> am.Fit:
     """Return the fit of the 21 coefficients to a force map of the library; rows clamped at zero force are censored."""
-    return am.fit(am.characteristic.ContractileSurface.blank(5, max_force=1e5), catalogue.load_data(data))
+    return am.fit(am.characteristic.ContractileSurface.blank(5, max_force=1e5), load_data(data))
 
 
 def surface(data: str = FORCE_MAPS[0]) -> am.characteristic.ContractileSurface:

@@ -19,11 +19,13 @@ from .saga2007_figures import plots
 from .saga2007_joint import LIMIT, feed_forward_table
 from .saga2007_muscle import (
     DEFAULT,
+    FIG_2,
     INTERPRETATIONS,
     LENGTH,
     LINES,
     PAPER,
     PRESSURE,
+    THICK_WALL,
     WALL,
     circular_meridian,
     exact_mechanics,
@@ -33,7 +35,6 @@ from .saga2007_muscle import (
     with_rings,
 )
 from .saga2007_previous import previous_model_table
-from .saga2007_values import FIG_2, THICK_WALL
 
 CONTRACTIONS = np.array([0.001, 0.01, 0.05, 0.10, 0.20, 0.35])
 CHOSEN = (

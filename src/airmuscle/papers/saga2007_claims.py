@@ -10,21 +10,24 @@ import airmuscle as am
 
 from ..physics.muscle.characteristic.saga2007 import RUBBER_TEST_STRAIN
 from ..report.claims import AtLeast, AtMost, Claim, ClaimRow, Equal, Kind
-from . import saga2007_values as values
+from . import saga2007_muscle as values
 from .saga2007_joint import FEED_FORWARD
 from .saga2007_muscle import (
     DEFAULT,
     INTERPRETATIONS,
+    LARGE,
     LINES,
     PAPER,
     PRESSURE,
+    SMALL,
+    THICK_WALL,
+    Law,
     exact_mechanics,
     exact_meridian,
     interpretation,
     interpretation_name,
 )
 from .saga2007_previous import PREVIOUS_MODEL
-from .saga2007_values import LARGE, SMALL, THICK_WALL, Law
 
 LOW_PRESSURE = 0.04e6
 """Limit of a low pressure [Pa]: a quarter of the pressure axis of Fig. 8 (chosen)."""

@@ -13,6 +13,7 @@ from ..report.formula import to_mathtext
 from .saga2007_joint import feed_forward_figure
 from .saga2007_muscle import (
     DEFAULT,
+    FIG_2,
     INTERPRETATIONS,
     circular_meridian,
     exact_meridian,
@@ -23,7 +24,6 @@ from .saga2007_muscle import (
 from .saga2007_muscle import LINES as RUBBER
 from .saga2007_pairs import errors, ideal_errors
 from .saga2007_previous import previous_model_figure
-from .saga2007_values import FIG_2
 
 CONTRACTION = np.concatenate([np.geomspace(2e-4, 0.01, 25), np.linspace(0.012, 0.4, 110)])
 MPA = 1e-6

@@ -1,5 +1,7 @@
-"""Muscle of Table 1 of Saga et al. 2007: interpretations of the paper, exact meridian and circular meridian."""
+"""Muscle of Saga et al. 2007: interpretations of the paper, meridians, and the values that the claims concern."""
 
+import itertools
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -11,6 +13,8 @@ from ..core import SolveError
 from ..physics.muscle.characteristic.saga2007 import LINE_A, LINE_B
 
 PAPER = "saga2007"
+EVEN_SPREAD = 1 / np.pi
+"""M/m of evenly distributed fibres, as required for every outline of revolution."""
 LENGTH, DIAMETER, WALL = 0.072, 0.012, 0.002
 """Fibre length, end diameter and wall thickness [m] of Table 1."""
 PRESSURE = 0.11e6
@@ -96,3 +100,161 @@ def pressure_along(law: am.characteristic.Characteristic, contraction: Any, forc
     if isinstance(law, am.characteristic.ExactMeridian):
         return np.asarray(law.shape_at_force(contraction, force).pressure)
     return np.asarray(law.pressure(contraction, force))
+
+
+Law = am.characteristic.Saga2007 | am.characteristic.ExactMeridian
+
+FIG_2 = (0.05, 0.10, 0.15, 0.20, 0.25)
+"""Contractions of the outlines in Fig. 2 [1]."""
+SMALL, LARGE = 0.10, 0.30
+"""Contractions between which the pressure should change little [1] (chosen)."""
+THICK_WALL = 1.5 * WALL
+"""Thicker wall [m], to endure a higher pressure (chosen)."""
+
+
+def contraction(law: am.characteristic.Characteristic) -> tuple[float, str]:
+    """Return the contraction [%] at 0.11 MPa without load."""
+    reached = contraction_at(law, PRESSURE, 0.0)
+    at_end = reached >= law.contraction_range[1] * (1 - 1e-6)
+    note = "The model needs less than 0.11 MPa over its whole range, so the value is its end." if at_end else ""
+    note += "Even the exact meridian does not reach 35 %." if isinstance(law, am.characteristic.ExactMeridian) else ""
+    return 100 * reached, note
+
+
+def lifting(law: am.characteristic.Characteristic) -> tuple[float, str]:
+    """Return the contraction [%] at 0.11 MPa and 200 N."""
+    reached = contraction_at(law, PRESSURE, 200.0)
+    return 100 * reached, "As a separate maximum, at small contraction, 200 N is reached." * (0 < reached < 0.1)
+
+
+def max_tension() -> float:
+    """Return the tension [N] of inextensible fibres without rubber at 35 % and 0.11 MPa."""
+    return PRESSURE * float(exact_meridian(LINES["A"]).geometry.effective_area(0.35))
+
+
+def initial_pressure(law: am.characteristic.Saga2007) -> float:
+    """Return the pressure [Pa] for 1 % contraction without load."""
+    return max(law.threshold_pressure, float(law.equilibrium_pressure(0.01, 0.0)))
+
+
+def initial_ratio(law: am.characteristic.Saga2007) -> float:
+    """Return the ratio of the pressures for 1 % and for 10 % contraction without load [1]."""
+    return initial_pressure(law) / float(law.equilibrium_pressure(0.10, 0.0))
+
+
+def ring_ratio(law: am.characteristic.Saga2007, force: float) -> tuple[float, str]:
+    """Return the minimum ratio [1], up to 35 %, of the pressures with one ring more and without it."""
+    contraction = np.geomspace(1e-7, 0.35, 200)
+    pressures = [np.asarray(pressure_along(with_rings(law, n), contraction, force)) for n in (0, 1, 2)]
+    falling = any(with_rings(law, n).snap_through_load > force for n in (1, 2))
+    note = "Where the pressure falls with contraction, equal segments contract unequally." if falling else ""
+    return min(float(np.min(more / fewer)) for fewer, more in itertools.pairwise(pressures)), note
+
+
+def strain_ratio(law: am.characteristic.Saga2007, force: float) -> Any:
+    """Return the ratio of the rubber strains with two rings and without at 0.11 MPa [1]."""
+    return _strength_ratio(law, force, lambda muscle, c: muscle.middle_strain(c))
+
+
+def tension_ratio(law: am.characteristic.Saga2007, force: float) -> Any:
+    """Return the ratio of the fibre tensions with two rings and without at 0.11 MPa [1]."""
+    return _strength_ratio(law, force, lambda muscle, c: muscle.end_tension(PRESSURE, c, force))
+
+
+def _strength_ratio(law: am.characteristic.Saga2007, force: float, measure: Callable[[Any, float], Any]) -> Any:
+    muscles = [with_rings(law, n) for n in (0, 2)]
+    try:
+        plain, ringed = (float(measure(muscle, float(muscle.contraction(PRESSURE, force)))) for muscle in muscles)
+    except SolveError:
+        return None, "One of the two muscles has no stable contraction at 0.11 MPa."
+    return ringed / plain
+
+
+def pressure_error(law: am.characteristic.Saga2007, force: float, low: float, high: float, points: int) -> float:
+    """Return the maximum pressure error [%] relative to the exact meridian with the same rubber."""
+    exact, at = exact_meridian(law.rubber, law.geometry.rings), np.linspace(low, high, points)
+    return 100 * float(
+        np.max(np.abs(law.equilibrium_pressure(at, force) / exact.shape_at_force(at, force).pressure - 1))
+    )
+
+
+def largest_radius(law: am.characteristic.Saga2007) -> tuple[float, str]:
+    """Return the largest radius of the outlines of Fig. 2 [mm]."""
+    radii = [1e3 * float(law.geometry.segment(c).max_radius) for c in FIG_2]
+    return max(radii), f"Largest radii at 5, 10, 15, 20, 25 %: {', '.join(f'{r:.2f}' for r in radii)} mm."
+
+
+def share_reached(law: am.characteristic.Saga2007, force: float) -> tuple[float, str]:
+    """Return the fraction [1] of target contractions that the pressure of the formula produces from rest."""
+    targets = np.linspace(0.01, 0.35, 35)
+    pressures = law.equilibrium_pressure(targets, force)
+    met = sum(_reaches_target(law, float(p), force, float(c)) for p, c in zip(pressures, targets, strict=True))
+    note = "Where the pressure falls with contraction, the muscle snaps past the target. " * (met < targets.size)
+    return met / targets.size, note + "Our copy describes no control experiment."
+
+
+def _reaches_target(law: am.characteristic.Saga2007, pressure: float, force: float, target: float) -> bool:
+    try:
+        return abs(float(law.contraction(pressure, force)) - target) < 1e-9
+    except SolveError:
+        return False
+
+
+def max_pressure(law: am.characteristic.Saga2007, force: float) -> float:
+    """Return the maximum pressure [MPa] of the formula from 0 to 40 %."""
+    return float(np.max(law.equilibrium_pressure(np.linspace(0.0, 0.4, 81), force))) / 1e6
+
+
+def tension(law: Law, pressure: float, contraction: np.ndarray | float) -> np.ndarray:
+    """Return the tension [N] at a gauge pressure [Pa] and contractions [1]."""
+    if isinstance(law, am.characteristic.Saga2007):
+        return np.asarray(law.force(pressure, contraction))
+    return np.asarray(law.shape_at_pressure(pressure, contraction).force)
+
+
+def ring_force_ratio(law: Law, factor: float) -> float:
+    """Return the tension with one ring at a multiple of 0.11 MPa relative to that without at 0.11 MPa, at 5 % [1]."""
+    ringed = with_rings(law, 1) if isinstance(law, am.characteristic.Saga2007) else exact_meridian(law.rubber, 1)
+    return float(tension(ringed, factor * PRESSURE, 0.05)) / float(tension(law, PRESSURE, 0.05))
+
+
+def pressure_change(law: Law, force: float) -> float:
+    """Return the relative change of the pressure [%] between two contractions."""
+    low, high = pressure_along(law, np.array([SMALL, LARGE]), force)
+    return 100 * abs(float(high / low) - 1)
+
+
+def wall_ratio(law: Law) -> float:
+    """Return the pressure for 5 % without load with the thick wall, relative to that of the muscle of Table 1 [1]."""
+    other: Law = replace(law, wall_thickness=THICK_WALL)
+    return float(pressure_along(other, np.array([0.05]), 0.0)[0] / pressure_along(law, np.array([0.05]), 0.0)[0])
+
+
+def middle_strain(exact: bool, contraction: float) -> Any:
+    """Return the hoop strain [%] in the middle of the exact outline without rubber, or of that of the paper."""
+    if exact:
+        radius = exact_meridian(LINES["A"]).geometry.segment(contraction).max_radius
+        return 100 * float(radius / (DIAMETER / 2) - 1)
+    note = f"300 % is reached at {100 * DEFAULT.contraction_at_strain(3.0):.3g} %."
+    return 100 * float(DEFAULT.middle_strain(contraction)), note
+
+
+def thinning(contraction: float) -> float:
+    """Return the decrease of the pressure [%] if the hoop stress is a true stress in the thinner wall, at 100 N."""
+    nominal, thinned = (pressure_with_wall(exact_mechanics(LINES["B"]), contraction, 100.0, thinned)
+                        for thinned in (False, True))  # fmt: skip
+    return 100 * (1 - thinned / nominal)
+
+
+def pressure_with_wall(law: am.characteristic.Saga2007, contraction: float, force: float, thinned: bool) -> float:
+    """Return the pressure [Pa] of the interpretation of exact mechanics, with the initial or the thinned wall."""
+    segment = law.geometry.segment(contraction)
+    nodes, weights = np.polynomial.legendre.leggauss(60)
+    x = 0.5 * segment.length * nodes
+    curvature = 2 * segment.end_slope / segment.length
+    radius = segment.max_radius - 0.5 * curvature * x**2
+    arc = 0.5 * segment.length * weights * np.hypot(1.0, curvature * x)
+    wall = law.wall_thickness * (segment.end_radius / radius if thinned else 1.0)
+    hoop = float(np.sum(law.rubber.stress(radius / segment.end_radius - 1) * wall * arc))
+    lever = EVEN_SPREAD * segment.end_slope
+    return float((hoop + lever * force) / (segment.half_section - lever * np.pi * segment.end_radius**2))

@@ -16,7 +16,7 @@ from ..physics.muscle.characteristic.rubber import RubberIntegral
 from ..physics.muscle.geometry.meridian import Segment
 from ..physics.muscle.geometry.straight_fibre import FibreTube
 from ..report.chapter import Table
-from .saga2007_muscle import DIAMETER, LENGTH, LINES, WALL, exact_meridian
+from .saga2007_muscle import DIAMETER, EVEN_SPREAD, LENGTH, LINES, WALL, exact_meridian
 
 OUTLINES: dict[str, FibreTube] = {
     "parabola (3)": am.geometry.StraightFibre(LENGTH, DIAMETER, meridian=am.geometry.Parabola()),
@@ -26,8 +26,6 @@ OUTLINES: dict[str, FibreTube] = {
     "exact without rubber": am.geometry.PleatedTube(LENGTH, DIAMETER),
 }
 CONTRACTIONS = np.array([0.01, 0.05, 0.10, 0.20, 0.30, 0.40])
-EVEN_SPREAD = 1 / np.pi
-"""M/m of evenly distributed fibres, as required for every outline of revolution."""
 
 
 class ForceBalance(NamedTuple):

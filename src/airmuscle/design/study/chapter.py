@@ -1,5 +1,6 @@
 """Report chapter of a parameter study, and its result files."""
 
+import math
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -7,20 +8,164 @@ from typing import Any
 
 import numpy as np
 
-from ...core import atomic_folder, cite
-from ...report.chapter import BY_ROW, Chapter, NamedValue, Table, TableColumn
+from ...core import BLACK, BLUE, ORANGE, RED, SKY, Array, atomic_folder, cite, legend_below, new_figure
+from ...report.chapter import BY_ROW, Chapter, NamedValue, Plot, Table, TableColumn
 from ...report.write import save_table, write_into
 from .distributions import LevelSet, Variation
-from .plots import study_plots
-from .result import SobolIndices, StudyResult
+from .result import SobolIndices, StudyResult, sensitivity_table
 from .study import Study
+
+PANELS_PER_ROW = 3
+MAX_POINTS = 2000
+"""Maximum number of points of a scatter plot; of more runs, an equidistant subset is drawn."""
+FEW_POINTS = 50
+"""Number of points of a scatter plot up to which they are drawn large (chosen)."""
+MAX_LABEL_LENGTH = 28
+"""Number of letters that fit below a panel."""
+_DISPLAY_UNITS = {
+    "Pa": (1e-3, "kPa"), "Pa(a)": (1e-3, "kPa(a)"), "m": (1e3, "mm"), "m3": (1e6, "cm³"), "rad": (180 / math.pi, "deg"),
+    "m3/(s Pa)": (1e8, "dm³/(s bar)"), "kg/s": (1e3, "g/s"), "1": (1.0, ""),
+}  # fmt: skip
+"""Factor and unit in which quantities with these SI units are displayed."""
+
+
+def study_plots(result: StudyResult, indices: dict[str, SobolIndices]) -> tuple[Plot, ...]:
+    """All plots of a study."""
+    plots = [_histograms(result)] if result.study.scalars else []
+    plots += [_scatter(result, name) for name in result.study.scalars]
+    if indices:
+        plots.append(_sensitivity_bars(result, indices))
+    return (*plots, *(_time_series_plot(result, name) for name in result.study.time_series))
+
+
+def _display_scale(unit: str) -> tuple[float, str]:
+    """Factor and unit in which a quantity with an SI unit is displayed."""
+    return _DISPLAY_UNITS.get(unit, (1.0, unit))
+
+
+def _axis_label(name: str, unit: str) -> str:
+    """The label of an axis: name and unit, on two lines if they are long."""
+    shown = _display_scale(unit)[1]
+    if len(name) > MAX_LABEL_LENGTH:
+        name = f"{name.rpartition('.')[0]}\n.{name.rpartition('.')[2]}"
+    between = "\n" if len(name) + len(shown) > MAX_LABEL_LENGTH and "\n" not in name else " "
+    return f"{name}{between}[{shown}]" if shown else name
+
+
+def _panels(count: int, height: float = 2.3, **options: Any) -> tuple[Any, Iterator[Any]]:
+    """A figure with `count` panels, and an iterator over its axes; unused axes are hidden."""
+    columns = min(count, PANELS_PER_ROW)
+    rows = -(-count // columns)
+    width = 3.4 if columns == 1 else 2.5 * columns
+    figure, axes = new_figure(rows, columns, width=width, height=height * rows, squeeze=False, **options)
+    for axis in axes.flat[count:]:
+        axis.set_visible(False)
+    return figure, iter(axes.flat[:count])
+
+
+def _histograms(result: StudyResult) -> Plot:
+    study = result.study
+    figure, panels = _panels(len(study.scalars))
+    for name, axis in zip(study.scalars, panels, strict=True):
+        factor, _ = _display_scale(study.units[name])
+        values = result[name][np.isfinite(result[name])] * factor
+        axis.set(xlabel=_axis_label(name, study.units[name]), ylabel="runs")
+        axis.yaxis.get_major_locator().set_params(integer=True)
+        if values.size:
+            axis.hist(values, bins=_bin_count(values), color=SKY, edgecolor="white", linewidth=0.4)
+        else:
+            axis.text(0.5, 0.5, "no values", ha="center", transform=axis.transAxes)
+        if math.isfinite(result.nominal[name]):
+            axis.axvline(result.nominal[name] * factor, color=RED, linestyle="--", linewidth=1.2)
+    caption = "Histograms of the metrics over all runs; the dashed line is the nominal scenario."
+    return Plot("histograms", caption, figure)
+
+
+def _bin_count(values: Array) -> int:
+    """The number of bins, twice the cube root of the number of values (Rice rule), 4 to 60; one for equal values."""
+    equal = np.ptp(values) <= 1e-12 * np.abs(values).max()
+    return 1 if equal else min(60, max(4, math.ceil(2 * values.size ** (1 / 3))))
+
+
+def _scatter(result: StudyResult, name: str) -> Plot:
+    study = result.study
+    figure, panels = _panels(len(study.parameters), sharey=True)
+    factor, _ = _display_scale(study.units[name])
+    finite = np.flatnonzero(np.isfinite(result[name]))
+    drawn = finite[:: max(1, -(-finite.size // MAX_POINTS))]
+    few = drawn.size <= FEW_POINTS
+    style = {"marker": "o", "linestyle": "none", "markersize": 5.0 if few else 2.4, "alpha": 0.9 if few else 0.5,
+             "markeredgewidth": 0, "color": BLUE}  # fmt: skip
+    for i, (parameter, axis) in enumerate(zip(study.parameters, panels, strict=True)):
+        parameter_factor, _ = _display_scale(parameter.unit)
+        axis.plot(study.values[drawn, i] * parameter_factor, result[name][drawn] * factor, **style)
+        axis.set_xlabel(_axis_label(parameter.path, parameter.unit))
+        axis.locator_params(axis="x", nbins=5)
+        if i % PANELS_PER_ROW == 0:
+            axis.set_ylabel(_axis_label(name, study.units[name]))
+    subset = f" {drawn.size} of {finite.size} runs are drawn." if drawn.size < finite.size else ""
+    return Plot(
+        f"scatter-{_file_stem(name)}", f"{name} against each varied parameter, one point per run.{subset}", figure
+    )
+
+
+def _sensitivity_bars(result: StudyResult, indices: dict[str, SobolIndices]) -> Plot:
+    study = result.study
+    count, paths = len(indices), [parameter.path for parameter in study.parameters]
+    figure, axes = new_figure(
+        count, 1, width=6.3, height=0.8 + count * (0.7 + 0.42 * len(paths)), squeeze=False, sharex=True
+    )
+    rows = np.arange(len(paths))
+    bar = {"height": 0.38, "error_kw": {"elinewidth": 0.9, "ecolor": BLACK, "capsize": 2}}
+    for axis, (name, index) in zip(axes[:, 0], indices.items(), strict=True):
+        for values, interval, shift, colour, label in (
+            (index.first, index.first_interval, -0.2, BLUE, "first order"),
+            (index.total, index.total_interval, 0.2, ORANGE, "total"),
+        ):
+            errors = np.abs(np.nan_to_num(interval - values))
+            axis.barh(rows + shift, np.nan_to_num(values), xerr=errors, color=colour, label=label, **bar)
+        axis.set_yticks(rows, paths)
+        axis.invert_yaxis()
+        axis.set_title(name if np.isfinite(index.total).any() else f"{name}: does not vary")
+        axis.axvline(0.0, color=BLACK, linewidth=0.8)
+        axis.grid(False, axis="y")
+    axes[-1, 0].set_xlabel("fraction of the variance")
+    legend_below(figure, axes[0, 0])
+    caption = (
+        "Variance-based sensitivities with 95 % bootstrap confidence intervals: first order (the parameter alone) and "
+        "total (with its interactions)."
+    )
+    return Plot("sensitivities", caption, figure)
+
+
+def _time_series_plot(result: StudyResult, name: str) -> Plot:
+    study = result.study
+    series, rows = study.time_series[name], result[name]
+    factor, _ = _display_scale(study.units[name])
+    available = np.isfinite(rows).any(axis=0)
+    low, median, high = np.full((3, available.size), np.nan)
+    if available.any():
+        quantiles = np.nanquantile(rows[:, available] * factor, [0.05, 0.5, 0.95], axis=0)
+        low[available], median[available], high[available] = quantiles
+    figure, axis = new_figure()
+    axis.fill_between(series.times, low, high, color=SKY, alpha=0.45, linewidth=0, label="5 % to 95 % of the runs")
+    axis.plot(series.times, median, color=BLUE, label="median")
+    axis.set(xlabel="time [s]", ylabel=_axis_label(series.column, study.units[name]))
+    legend_below(figure, axis)
+    return Plot(f"time-series-{_file_stem(name)}", f"{name}: {series.column} over time, over all runs.", figure)
+
+
+def _file_stem(name: str) -> str:
+    """The name with all characters replaced that are not allowed in a file name."""
+    return "".join(c if c.isalnum() or c in "-_" else "-" for c in name)
+
 
 RESULTS_FILE, TIME_SERIES_FILE = "results.csv", "time_series.npz"
 MAX_LISTED_LEVELS = 6
 """Maximum number of levels that are listed; of more levels, only range and number are printed."""
 MAX_LISTED_REASONS = 20
-MAX_SENSITIVITIES, SHORT_LISTED = 12, 4
-"""Rows of the brief view: sensitivities, and reasons of failed runs (chosen)."""
+SHORT_LISTED = 4
+"""Reasons of failed runs in the brief view (chosen)."""
 
 
 def write_study(result: StudyResult, folder: Path | str, chapter: Chapter | None = None) -> Path:
@@ -109,34 +254,6 @@ def describe_variation(variation: Variation) -> str:
         low, high = variation.support
         return f"{len(variation.values)} values from {low:.4g} to {high:.4g}"
     return ", ".join(f"{value:.4g}" for value in variation.values)
-
-
-def sensitivity_table(study: Study, indices: dict[str, SobolIndices]) -> Table:
-    """The Sobol indices of each metric with respect to each parameter, with their confidence intervals."""
-    rows = [(name, parameter.path, i) for name in indices for i, parameter in enumerate(study.parameters)]
-
-    def column(field: str, bound: int | None = None) -> list[float]:
-        values = [getattr(indices[name], field) for name, _, _ in rows]
-        return [float((v if bound is None else v[bound])[i]) for v, (_, _, i) in zip(values, rows, strict=True)]
-
-    columns = {
-        "metric": [name for name, _, _ in rows],
-        "parameter": [path for _, path, _ in rows],
-        "first order": TableColumn(column("first"), digits=3),
-        "first order, interval": _pairs(column("first_interval", 0), column("first_interval", 1)),
-        "total": TableColumn(column("total"), digits=3),
-        "total, interval": _pairs(column("total_interval", 0), column("total_interval", 1)),
-    }
-    note = (
-        "Intervals: 95 % bootstrap confidence intervals. First order: fraction of the variance removed if the "
-        "parameter were known; total: fraction that remains if all other parameters were known."
-    )
-    title = "Variance-based sensitivities (Sobol indices)"
-    return Table("sensitivities", title, columns, note, brief=MAX_SENSITIVITIES)
-
-
-def _pairs(low: list[float], high: list[float]) -> TableColumn:
-    return TableColumn(list(zip(low, high, strict=True)), digits=3, brief=False)
 
 
 def failure_table(result: StudyResult) -> Table:

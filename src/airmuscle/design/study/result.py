@@ -88,8 +88,8 @@ def _indices(means: Array, parameters: int) -> tuple[Array, Array]:
     return means[:, :parameters] / variance, means[:, parameters : 2 * parameters] / variance
 
 
-BRIEF, MAX_BRIEF = ("mean", "standard deviation", "5 %", "95 %"), 8
-"""Statistics and number of metrics in the brief view (chosen)."""
+BRIEF, MAX_BRIEF, MAX_SENSITIVITIES = ("mean", "standard deviation", "5 %", "95 %"), 8, 12
+"""Statistics, number of metrics and rows of sensitivities in the brief view (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -172,3 +172,31 @@ def _statistics(values: Array) -> dict[str, Any]:
         "standard deviation": float(finite.std(ddof=1)) if finite.size > 1 else np.nan,
         **dict(zip(names, quantiles.tolist(), strict=True)),
     }
+
+
+def sensitivity_table(study: Study, indices: dict[str, SobolIndices]) -> Table:
+    """The Sobol indices of each metric with respect to each parameter, with their confidence intervals."""
+    rows = [(name, parameter.path, i) for name in indices for i, parameter in enumerate(study.parameters)]
+
+    def column(field: str, bound: int | None = None) -> list[float]:
+        values = [getattr(indices[name], field) for name, _, _ in rows]
+        return [float((v if bound is None else v[bound])[i]) for v, (_, _, i) in zip(values, rows, strict=True)]
+
+    columns = {
+        "metric": [name for name, _, _ in rows],
+        "parameter": [path for _, path, _ in rows],
+        "first order": TableColumn(column("first"), digits=3),
+        "first order, interval": _pairs(column("first_interval", 0), column("first_interval", 1)),
+        "total": TableColumn(column("total"), digits=3),
+        "total, interval": _pairs(column("total_interval", 0), column("total_interval", 1)),
+    }
+    note = (
+        "Intervals: 95 % bootstrap confidence intervals. First order: fraction of the variance removed if the "
+        "parameter were known; total: fraction that remains if all other parameters were known."
+    )
+    title = "Variance-based sensitivities (Sobol indices)"
+    return Table("sensitivities", title, columns, note, brief=MAX_SENSITIVITIES)
+
+
+def _pairs(low: list[float], high: list[float]) -> TableColumn:
+    return TableColumn(list(zip(low, high, strict=True)), digits=3, brief=False)

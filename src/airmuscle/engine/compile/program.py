@@ -6,7 +6,7 @@ import functools
 import math
 import threading
 import weakref
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -18,14 +18,64 @@ from .cache.store import load_module
 from .functions import ArraySizes, TracedSystem
 from .functions_simd import lanes_module, row_outputs, rows_at_once
 from .llvm.emit import LlvmType
-from .run_cache import RunCache
+
+
+class Pool:
+    """Objects that one run at a time may use, by a key; with more keys than `max_keys` all of them are dropped."""
+
+    def __init__(self, max_keys: int = 1_000) -> None:
+        self._idle: dict[Hashable, list[Any]] = {}
+        self._max_keys = max_keys
+
+    def __len__(self) -> int:
+        """The number of keys."""
+        return len(self._idle)
+
+    def borrow(self, key: Hashable) -> Any:
+        """An object that no other run uses; None where there is none."""
+        try:
+            return self._idle[key].pop()
+        except (KeyError, IndexError):  # none, or another thread was quicker
+            return None
+
+    def give_back(self, key: Hashable, used: Any) -> None:
+        """Keep an object for the next run."""
+        if key not in self._idle and len(self._idle) >= self._max_keys:
+            self._idle.clear()
+        self._idle.setdefault(key, []).append(used)
+
+
+@dataclasses.dataclass(eq=False)
+class RunCache:
+    """What runs of one system leave for the next one; it belongs to the system's description.
+
+    A run takes over what the last one checked or computed if its arguments are the same, and borrows bound kernels.
+
+    default_state  the default initial state (n,), once it has been found
+    checked_state  the last initial state that was checked and found possible
+    checked_input  the last segments of inputs that were found within their ranges, what output times a run with them
+                   asked for, and these times, if nobody can write to the arrays
+    sources        sources of the models and of an integrator, by the integrator
+    integrators    integrators bound to the system, by their integrator
+    holders        the same for steps with held inputs
+    recorders      kernels of the rows bound to the system, under None
+    loops          runs of control loops, by the form of the loop
+    """
+
+    default_state: Array | None = None
+    checked_state: list[float] | None = None
+    checked_input: tuple[Any, Any, Any] = None, None, None
+    sources: dict[Any, tuple[Any, ...]] = dataclasses.field(default_factory=dict)
+    integrators: Pool = dataclasses.field(default_factory=Pool)
+    holders: Pool = dataclasses.field(default_factory=Pool)
+    recorders: Pool = dataclasses.field(default_factory=Pool)
+    loops: Pool = dataclasses.field(default_factory=lambda: Pool(max_keys=4))
+
 
 Tableau = tuple[tuple[tuple[float, ...], ...], tuple[float, ...]]
 """Rows of an explicit Runge-Kutta tableau below its first, and its weights."""
 INPUT_TOLERANCE = 1e-9
 """Part of an input's range by which it may be exceeded through rounding."""
-SMALLEST_POSITIVE = math.ulp(0.0)
-"""The smallest number above zero."""
 _FUNCTIONS = ("rhs", "jac", "factor", "solve", "stage", "df_dt", "outputs")
 
 
@@ -100,12 +150,9 @@ class Program:
         return (prepare, step, outputs), size
 
 
-_PREPARE = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)
-
-
 def prepare_function(engine: Any) -> Callable[[Array, int], Array]:
     """The function `prepare` of an engine: from parameters to so many values for its other functions."""
-    function = _PREPARE(engine.get_function_address("prepare"))
+    function = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(engine.get_function_address("prepare"))
 
     def prepare(parameters: Array, size: int) -> Array:
         values = np.zeros(max(size, 1))
@@ -164,7 +211,7 @@ class Description:
         """The place of each of them among the ranges of a run."""
         self.ranged_columns = np.array([names.index(name) for name in self.ranged_names], dtype=np.int64)
         """Their places among the states and, after these, the outputs."""
-        self.range_floors = [*bounded.values(), *(SMALLEST_POSITIVE for _ in positive)]
+        self.range_floors = [*bounded.values(), *(math.ulp(0.0) for _ in positive)]
         """The smallest possible values of the first of them: those of states, then of outputs that must be positive."""
 
 

@@ -17,9 +17,8 @@ from .bound_integrator import RawSolution
 from .compiled_law import parameters_of
 from .compiled_loop import CompiledLoop, CompiledRun
 from .problem import Problem
-from .rows import make_recording, recorded_rows, truncate_at_invalid_row
 from .sampled_loop import SampledLoop, prepare_loop
-from .solution import Solution, Statistics
+from .solution import Solution, Statistics, make_recording, recorded_rows, truncate_at_invalid_row
 
 
 def solve_closed_loop(problem: Problem) -> Solution:

@@ -16,8 +16,15 @@ from .bound_integrator import INTERRUPT_CHECK_STEPS, BoundIntegrator, RawSolutio
 from .closed_loop import solve_closed_loop
 from .integrators import Integrator, default_integrator
 from .problem import Problem, check_input_range, plain_numbers
-from .rows import early_end, make_recording, recorded_rows, status_of_state, truncate_at_invalid_row
-from .solution import Solution, Statistics
+from .solution import (
+    Solution,
+    Statistics,
+    early_end,
+    make_recording,
+    recorded_rows,
+    status_of_state,
+    truncate_at_invalid_row,
+)
 
 _AT_POSSIBLE_STATE = {Status.DONE, Status.INTERRUPTED, Status.TOO_MANY_STEPS}
 """How a run ends at a possible state."""

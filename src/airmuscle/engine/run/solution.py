@@ -1,20 +1,191 @@
 """Solution: the recording of a run with its status, statistics, diagnostics, final state and references."""
 
 import dataclasses
+import functools
+import operator
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from ...core import Diagnostic, Reference, SimulationError, Status
+import numpy as np
+
+from ...core import Array, Columns, Diagnostic, DiagnosticCode, Reference, SimulationError, Status
 from ...recording import Recording
 from ...recording.columns import column_units
 from ...recording.notebook import Card, NotebookDisplay
 from ...recording.plot import plot_columns
 from ...recording.recording import recording_card
+from ..compile.cache.kernel import record
+from ..compile.program import CompiledSystem
 from ..loop.control_loop import ControlLoopState
+from ..loop.piecewise_linear import PiecewiseLinear
+from .bound_integrator import RawSolution
+from .integrators import Integrator
 from .problem import Problem
 
 if TYPE_CHECKING:
     import pandas as pd
+
+
+_HINTS = {
+    Status.TOO_MANY_STEPS: "Raise the tolerance, lengthen a fixed step, or look for a valve that chatters.",
+    Status.INTERRUPTED: "Nothing is lost; the rows until then are in the recording.",
+    Status.NON_FINITE_COMMAND: "Check the last measurement of the controller, and its parameters.",
+}
+_GENERAL_HINT = "Check the last state: a parameter may be far from physical, or a fixed step too long."
+
+
+class RowTable(NamedTuple):
+    """Inputs (N, m) and outputs (N, k) of a run, the ranges of its columns with limits, the first row not finite.
+
+    lower, upper   smallest and largest values of the `ranged_names` of the system's description
+    """
+
+    inputs: Array
+    outputs: Array
+    lower: list[float]
+    upper: list[float]
+    first_invalid: int
+
+
+class RowRecorder:
+    """The kernel of the rows, bound to a compiled system. For one thread at a time."""
+
+    def __init__(self, compiled: CompiledSystem) -> None:
+        self.sizes, columns = compiled.sizes, compiled.description.ranged_columns
+        sizes, self._ranges = self.sizes, np.empty((2, columns.size))
+        states, inputs, outputs = (np.empty((0, width)) for width in (sizes.states, sizes.inputs, sizes.outputs))
+        none, nothing = np.empty(0), np.empty((0, sizes.inputs))
+        function, width = compiled.program.outputs_at_rows
+        work = (np.zeros((width, count)) for count in (sizes.states, sizes.inputs, sizes.outputs))
+        self._kernel = record.bind(
+            function, compiled.precomputed, states, none, 0.0, none, nothing, nothing, inputs,
+            outputs, columns, *self._ranges, *work,
+        )  # fmt: skip
+
+    def adopt(self, compiled: CompiledSystem) -> None:
+        """Take another compiled system of the same structure."""
+        self._kernel.replace(1, compiled.precomputed)
+
+    def evaluate(self, states: Array, times: Array, segments: PiecewiseLinear, start: float) -> RowTable:
+        """Inputs and outputs at states (N, n) and rising times (N,) of a run whose segments begin at `start` [s]."""
+        count = times.size
+        inputs, outputs = np.empty((count, self.sizes.inputs)), np.empty((count, self.sizes.outputs))
+        kernel = self._kernel
+        kernel.replace(2, states)
+        kernel.replace_input(3, times)
+        kernel.replace(4, start)
+        for i, argument in enumerate((segments.ends, segments.values, segments.slopes), 5):
+            kernel.replace_input(i, argument)
+        kernel.replace(8, inputs)
+        kernel.replace(9, outputs)
+        first = self._kernel()
+        lower, upper = self._ranges.tolist()
+        return RowTable(inputs, outputs, lower, upper, first)
+
+
+def recorded_rows(
+    compiled: CompiledSystem, states: Array, times: Array, segments: PiecewiseLinear, start: float
+) -> RowTable:
+    """Inputs and outputs at states (N, n) and rising times (N,) of a run whose segments begin at `start` [s].
+
+    For a system with its own parameters, whose recorder is kept with its description.
+    """
+    idle = compiled.description.cache.recorders
+    recorder: RowRecorder = idle.borrow(None) or RowRecorder(compiled)
+    table = recorder.evaluate(states, times, segments, start)
+    idle.give_back(None, recorder)
+    return table
+
+
+def truncate_at_invalid_row(
+    compiled: CompiledSystem, raw: RawSolution, table: RowTable, times: Array
+) -> tuple[RawSolution, RowTable]:
+    """The solution up to the first row that is impossible, where numbers go on although the model does not hold.
+
+    A fixed step can end in numbers that are far off; isothermal air has a pressure, below vacuum, in a negative volume.
+    """
+    known = compiled.description
+    positive = known.positive_outputs
+    if table.first_invalid == raw.reached and all(map(operator.ge, table.lower, known.range_floors)):
+        return raw, table
+    reasons: dict[Status, Any] = {
+        Status.NOT_FINITE: ~np.isfinite(table.outputs).all(axis=1),
+        Status.NEGATIVE_AIR_MASS: (raw.rows[: raw.reached] < known.lower_bounds).any(axis=1),
+        Status.NON_POSITIVE_VOLUME: (table.outputs[:, positive] <= 0.0).any(axis=1),
+    }
+    invalid = np.flatnonzero(np.any(list(reasons.values()), axis=0))
+    if not invalid.size:
+        return raw, table
+    row = int(invalid[0])
+    status = next(status for status, rows in reasons.items() if rows[row])
+    raw = raw._replace(reached=row, time=float(times[row]), state=raw.rows[row], status=status)
+    inputs, outputs = table.inputs[:row], table.outputs[:row]
+    shown = np.hstack([raw.rows[:row], outputs]) if row else np.full((1, outputs.shape[1] + raw.state.size), np.nan)
+    columns = shown[:, known.ranged_columns]
+    return raw, RowTable(inputs, outputs, columns.min(axis=0).tolist(), columns.max(axis=0).tolist(), row)
+
+
+def status_of_state(
+    compiled: CompiledSystem, segments: PiecewiseLinear, start: float, state: Array, time: float
+) -> Status:
+    """DONE, or why a state (n,) at a time [s] of a run is impossible; arguments as of `recorded_rows`."""
+    raw = RawSolution(state[np.newaxis].copy(), 1, time, state, Status.DONE, 0, 0)
+    times = np.array([time])
+    table = recorded_rows(compiled, raw.rows, times, segments, start)
+    return truncate_at_invalid_row(compiled, raw, table, times)[0].status
+
+
+def make_recording(
+    compiled: CompiledSystem, raw: RawSolution, table: RowTable, times: Array, integrator: Integrator | None,
+    end: float, references: tuple[Reference, ...], more: dict[str, Array], before: tuple[Diagnostic, ...] = (),
+) -> tuple[Recording, tuple[Diagnostic, ...]]:  # fmt: skip
+    """The recording of the rows that were reached, with its diagnostics as notes.
+
+    references  sources of the models, of the integrator and of the controller
+    more        further columns
+    before      diagnostics that come first
+    """
+    known, reached = compiled.description, raw.reached
+    states = raw.rows
+    if reached < times.size:
+        states, times = states[:reached], times[:reached]
+    for array in (times, states, table.outputs, table.inputs, *more.values()):
+        array.setflags(write=False)
+    values = times, *states.T, *table.outputs.T, *table.inputs.T
+    columns: dict[str, Array] = dict(zip(known.recorded_names, values, strict=True))
+    columns.update(more)
+    text = f"simulated by {_name(integrator)}: {raw.steps} steps, {raw.rejected} rejected"
+    diagnostics = [*before, Diagnostic(DiagnosticCode.INTEGRATOR, "integrator", text)]
+    notes = [*(diagnostic.message for diagnostic in diagnostics), *known.remark_texts]
+    diagnostics += known.remarks
+    later: list[Diagnostic] = []
+    if reached:
+        later += compiled.system.diagnose(Columns(columns, known.range_places, table.lower, table.upper))
+    if raw.status != Status.DONE:
+        later.append(early_end(compiled, raw, end))
+    notes += [diagnostic.message for diagnostic in later]
+    recording = Recording.from_arrays(columns, "simulation", known.constants, tuple(notes), references)
+    return recording, (*diagnostics, *later)
+
+
+@functools.lru_cache(maxsize=32)
+def _name(integrator: Integrator | None) -> str:
+    """The representation of an integrator."""
+    return str(integrator)
+
+
+def early_end(compiled: CompiledSystem, raw: RawSolution, end: float) -> Diagnostic:
+    """Time, reason and state of an early end of a run, and the remedy."""
+    state = dict(zip(compiled.description.state_names, raw.state.tolist(), strict=True))
+    units = [s.unit for s in compiled.system.states]
+    at = ", ".join(f"{name} {v:.4g} {unit}" for (name, v), unit in zip(state.items(), units, strict=True))
+    hint = _HINTS.get(raw.status, _GENERAL_HINT)
+    if raw.status != Status.INTERRUPTED:
+        hint = compiled.system.failure_hint(state) or hint
+    text = (
+        f"the run ended at {raw.time:.6g} of {end:.6g} s because {raw.status.message}, after {raw.steps} steps, at {at}"
+    )
+    return Diagnostic(DiagnosticCode.INCOMPLETE, "run", text, hint=hint)
 
 
 class Statistics(NamedTuple):

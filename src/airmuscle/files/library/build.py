@@ -14,8 +14,8 @@ from typing import Any, Protocol
 
 from ...core import Parameter, ParameterError, abridged, check_field, parameters
 from . import fields
-from .location import Location, check_keys, located_errors
-from .models import allows, model_class, model_names
+from .fields import allows, model_class, model_names
+from .files import Location, check_keys, located_errors
 
 Named = Callable[[Any, Location, "TableReader"], Any]
 """The part that a text or a table with `library` names; None if it describes the part itself."""

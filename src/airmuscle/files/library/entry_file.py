@@ -9,8 +9,18 @@ from ...core import ParameterError, Reference, UnknownNameError
 from ...physics.muscle.geometry.base import Geometry
 from .build import build
 from .entry import Entry, PlantEntry, ProductEntry, ValveEntry, issue_warning
-from .files import FOLDERS, complete_name, entries_of_product, is_path, list_laws, list_names, read_toml
-from .location import Location, located_errors, read_text
+from .files import (
+    FOLDERS,
+    Location,
+    complete_name,
+    entries_of_product,
+    is_path,
+    list_laws,
+    list_names,
+    located_errors,
+    read_text,
+    read_toml,
+)
 
 NOUNS: Mapping[type[Any], str] = {
     ValveEntry: "valve", PlantEntry: "plant", ProductEntry: "product", Entry: "muscle or law",

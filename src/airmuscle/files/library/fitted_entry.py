@@ -22,8 +22,8 @@ from ...recording import Recording
 from ...report.shown import value_text
 from .entry import MISSING_GEOMETRY, Entry
 from .entry_file import load_law
+from .fields import model_class, model_names
 from .files import is_path
-from .models import model_class, model_names
 from .scaling import scale_to_length
 from .uncertainty import ParameterUncertainty, StatedBand
 

@@ -54,7 +54,7 @@ from ...engine.run.problem import check_signal
 from ...physics.plant.plant import Plant
 from ...recording import Recording
 from ..library import build_plant, custom_field, read_toml, scenario_toml
-from ..library.location import Location, check_keys, located_errors, read_text
+from ..library.files import Location, check_keys, located_errors, read_text
 from . import values
 from .initial_state import build_initial_conditions, pressure_names
 from .inputs import build_input_signal

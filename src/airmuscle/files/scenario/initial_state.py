@@ -15,7 +15,7 @@ from ...core import EquilibriumError, HintedText, ParameterError, abridged
 from ...physics.equilibrium import find_equilibrium
 from ...physics.plant.plant import Plant
 from ...recording import Recording
-from ..library.location import Location, check_keys, located_errors, read_finite_number
+from ..library.files import Location, check_keys, located_errors, read_finite_number
 
 PRESSURE = "pressure"
 """Key of the gauge pressure of all muscles whose own pressure is not stated."""

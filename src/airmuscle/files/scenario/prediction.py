@@ -36,7 +36,7 @@ from ...physics.muscle.muscle import LENGTH_TOLERANCE
 from ...recording import Recording
 from ...recording.columns import split_unit
 from ..library import Entry, is_path, list_plants, plant_tables, read_toml, scale_to_length
-from ..library.location import Location, check_keys, located_errors
+from ..library.files import Location, check_keys, located_errors
 from .identification import Record, build_records, with_observed
 from .initial_state import first_value, pressure_names, recorded_pressures
 from .scenario import TABLES, Scenario, build_scenario

@@ -35,7 +35,7 @@ from ...engine.run import Integrator, Problem, solve
 from ...physics.plant.plant import Plant
 from ...recording import Recording
 from ..library import SCENARIO_TABLES, build_plant, custom_field, is_path, list_plants, plant_tables, read_toml
-from ..library.location import Location, check_keys, located_errors, read_finite_number
+from ..library.files import Location, check_keys, located_errors, read_finite_number
 from .controller import build_control_loop, signal_units
 from .initial_state import build_initial_state, read_initial_table
 from .inputs import build_input_signal

@@ -2,12 +2,12 @@ from .plant_env import MeasuredObservations as MeasuredObservations
 from .plant_env import PlantEnv as PlantEnv
 from .plant_env import with_on_off_valves as with_on_off_valves
 from .plant_vector_env import PlantVectorEnv as PlantVectorEnv
+from .plant_vector_env import Rollouts as Rollouts
+from .plant_vector_env import roll_out as roll_out
 from .randomisation import FactorRange as FactorRange
 from .randomisation import FitUncertainty as FitUncertainty
 from .randomisation import Randomisation as Randomisation
 from .randomisation import ValueRange as ValueRange
-from .rollouts import Rollouts as Rollouts
-from .rollouts import roll_out as roll_out
 from .standard import ArmReaching as ArmReaching
 from .standard import JointTracking as JointTracking
 from .standard import LoadLifting as LoadLifting

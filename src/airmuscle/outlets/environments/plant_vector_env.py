@@ -1,6 +1,7 @@
-"""PlantVectorEnv: thousands of plants with a task in lanes, as a Gymnasium vector environment. Gymnasium imports this
-module."""
+"""PlantVectorEnv: plants with a task in lanes, as a vector environment that Gymnasium imports; episodes of a policy."""
 
+import dataclasses
+from collections.abc import Callable
 from typing import Any, ClassVar, NamedTuple
 
 import gymnasium
@@ -8,7 +9,9 @@ import numpy as np
 import numpy.typing as npt
 from gymnasium.utils import seeding
 
-from ...core import Array, ParameterError
+from ...core import Array, ParameterError, ShortRepr, check_whole
+from ...engine.distribution import DistributedCalls
+from ...engine.processes import Workers, process_pool
 from ...engine.run import RungeKutta4
 from ...engine.run.batch import Double, Precision
 from ...engine.run.batch.stepper import BatchStepper
@@ -237,3 +240,61 @@ def make_vector(kind: str, num_envs: int = 1, task: EnvironmentTask | None = Non
     task, options = task_and_options(kind, task, options)
     env = PlantVectorEnv(num_envs, task, **options)
     return with_on_off_valves(env) if kind == ON_OFF else env
+
+
+EPISODES_OF_A_TASK = 256
+"""Episodes that are computed together (chosen)."""
+Policy = Callable[[Array], Any]
+"""Actions (N, m) from -1 to 1 of observations (N, k)."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class Rollouts(ShortRepr):
+    """The sum of the rewards of each episode (E,), its number of periods (E,), and whether the task ended it (E,)."""
+
+    returns: Array
+    periods: npt.NDArray[np.int64]
+    terminated: npt.NDArray[np.bool_]
+
+
+def roll_out(
+    task: EnvironmentTask, policy: Policy, episodes: int, randomisation: tuple[Randomisation, ...] = (), *,
+    seed: int = 0, max_episode_steps: int = EPISODE_PERIODS, workers: Workers = 1, **options: Any,
+) -> Rollouts:  # fmt: skip
+    """Run episodes of a policy: episode i is the first of `PlantVectorEnv` with the seed `seed + i`.
+
+    policy   function of a module, or an object that can be pickled, called with the observations of many episodes; that
+             of an episode must not depend on the others
+    workers  processes (for several, a script needs `if __name__ == "__main__":`) or an executor; the result is the same
+    options  integrator and precision of `PlantVectorEnv`
+
+    Raises ParameterError for impossible options or actions.
+    """
+    check_whole("roll_out", "episodes", episodes, 1)
+    check_whole("roll_out", "seed", seed, 0)
+    common = task, policy, randomisation, max_episode_steps, options
+    seeds = range(seed, seed + episodes)
+    blocks = [seeds[i : i + EPISODES_OF_A_TASK] for i in range(0, episodes, EPISODES_OF_A_TASK)]
+    with process_pool(workers) as executor:
+        found = DistributedCalls(executor, _run_episodes, common).results(blocks)
+    return Rollouts(*(np.concatenate(columns) for columns in zip(*found, strict=True)))
+
+
+def _run_episodes(common: tuple[Any, ...], seeds: range) -> tuple[npt.NDArray[Any], ...]:
+    """Returns, periods and terminations of the episodes with these seeds; plants whose episode is over go on unused."""
+    task, policy, randomisation, limit, options = common
+    count = len(seeds)
+    environment = PlantVectorEnv(count, task, randomisation, max_episode_steps=limit, **options)
+    returns, periods, ended = np.zeros(count), np.zeros(count, np.int64), np.zeros(count, bool)
+    try:
+        observations, _ = environment.reset(seed=list(seeds))
+        running = np.ones(count, bool)
+        while running.any():
+            observations, rewards, terminated, truncated, _ = environment.step(policy(observations))
+            returns += np.where(running, rewards, 0.0)
+            periods += running
+            ended |= running & terminated
+            running &= ~(terminated | truncated)
+    finally:
+        environment.close()
+    return returns, periods, ended

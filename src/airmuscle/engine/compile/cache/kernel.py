@@ -16,9 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from ..llvm.jit import engine_of
+from ..llvm.jit import build, engine_of, slot_count
 from . import store
-from .object_code import build, slot_count
 
 _ITEMS = {np.dtype(np.int64): "q", np.dtype(np.float64): "d", np.dtype(np.float32): "f"}
 _KINDS = {(dtype, dimensions): f"{item}{dimensions}" for dtype, item in _ITEMS.items() for dimensions in range(5)}
@@ -185,8 +184,8 @@ class BoundKernel:
 
 
 rodas4, fixed_step, lanes = Kernel("rodas4"), Kernel("fixed_step"), Kernel("lanes")
-evaluate, evaluate_rates, record = Kernel("evaluate"), Kernel("evaluate_rates", "evaluate"), Kernel("record")
-newton, sampled_loop = Kernel("newton"), Kernel("sampled_loop")
+evaluate, evaluate_rates = Kernel("evaluate"), Kernel("evaluate_rates", "evaluate")
+record, newton, sampled_loop = Kernel("record", "evaluate"), Kernel("newton"), Kernel("sampled_loop")
 begin_step, end_step = Kernel("begin_step", "evaluate"), Kernel("end_step", "evaluate")
 lane_blocks, loop_lanes = Kernel("lane_blocks", "lanes"), Kernel("loop_lanes")
 

@@ -1,10 +1,10 @@
-"""Kernels that evaluate compiled functions: at rows, at many plants, and around a step that is taken by hand."""
+"""Kernels that evaluate compiled functions: at rows, at many plants, around a step taken by hand, for a recording."""
 
 from typing import Any
 
 import numba
 
-from .calls import invoke, pointer
+from .calls import CONTRACTED_PART, PART, as_vector, invoke, pointer
 
 
 @numba.njit(error_model="numpy", nogil=True)
@@ -65,3 +65,130 @@ def end_step(
         for i in range(values.shape[0]):
             outputs[i] = values[i]
     return defect
+
+
+@PART
+def _find_range(table: Any, column: Any, lower: Any, upper: Any, place: Any) -> None:
+    """Smallest and largest value of a column of a table (N, k), into `place`; one that is not a number is passed over.
+
+    Four rows at a time, because a comparison waits for the one before it.
+    """
+    count = table.shape[0]
+    whole = count // 4
+    low = low1 = low2 = low3 = 1e308 * 10.0
+    high = high1 = high2 = high3 = -1e308 * 10.0
+    for four in range(whole):
+        row = 4 * four
+        a, b, c, d = table[row, column], table[row + 1, column], table[row + 2, column], table[row + 3, column]
+        low, low1, low2, low3 = min(low, a), min(low1, b), min(low2, c), min(low3, d)
+        high, high1, high2, high3 = max(high, a), max(high1, b), max(high2, c), max(high3, d)
+    for row in range(4 * whole, count):
+        a = table[row, column]
+        low, high = min(low, a), max(high, a)
+    lower[place] = min(low, low1, low2, low3)
+    upper[place] = max(high, high1, high2, high3)
+
+
+@PART
+def _is_finite(table: Any) -> Any:
+    """Whether all values of a table are finite; read as one vector, because rows are short."""
+    values, defects = as_vector(table), 0
+    for i in range(values.size):
+        defects += not abs(values[i]) <= 1.7976931348623157e308
+    return defects == 0
+
+
+@PART
+def _rows_before(times: Any, row: Any, end: Any) -> Any:
+    """The first row from `row` on that is not before `end`, found in growing and then in shrinking strides."""
+    count, stride = times.shape[0], 1
+    if row >= count or times[row] >= end:
+        return row
+    while row + stride < count and times[row + stride] < end:
+        row += stride
+        stride *= 2
+    while stride > 1:
+        stride //= 2
+        if row + stride < count and times[row + stride] < end:
+            row += stride
+    return row + 1
+
+
+@PART
+def _evaluate(function: Any, c: Any, states: Any, inputs: Any, outputs: Any, x: Any, u: Any, o: Any) -> None:
+    """Outputs (N, k) at states (N, n) and inputs (N, m), W rows at once; x, u, o (W, ...) hold the last block."""
+    width, count, rest = x.shape[0], states.shape[0], 0
+    while rest + width <= count:
+        invoke(function, (pointer(states[rest]), pointer(inputs[rest]), pointer(c), pointer(outputs[rest])))
+        rest += width
+    if rest < count:
+        for each in range(width):
+            row = min(rest + each, count - 1)
+            for i in range(states.shape[1]):
+                x[each, i] = states[row, i]
+            for i in range(inputs.shape[1]):
+                u[each, i] = inputs[row, i]
+        invoke(function, (pointer(x), pointer(u), pointer(c), pointer(o)))
+        for row in range(rest, count):
+            for i in range(outputs.shape[1]):
+                outputs[row, i] = o[row - rest, i]
+
+
+@numba.njit(error_model="numpy", nogil=True)
+def record(
+    function: Any, c: Any, states: Any, times: Any, begin: Any, ends: Any, values: Any, slopes: Any,
+    inputs: Any, outputs: Any, columns: Any, lower: Any, upper: Any, x: Any, u: Any, o: Any,
+) -> Any:  # fmt: skip
+    """Fill inputs (N, m) and outputs (N, k) at states (N, n) and rising times (N,); the first row that is not finite.
+
+    function(x, u, c, o)  address of the outputs at W rows: `outputs` of a program, or its `row_outputs`
+    begin, ends, values, slopes  beginning of the first segment, and as in `rodas4`; of a row where two segments meet
+                 the inputs are those that begin there
+    columns      (r,) numbers of the columns whose range is wanted: of a state i, of an output n + i
+    lower, upper (r,): smallest and largest value of each of these columns
+    x, u, o      (W, n), (W, m), (W, k): workspace
+    Returns N where all outputs are finite.
+    """
+    count, n, m, k = times.shape[0], states.shape[1], values.shape[1], outputs.shape[1]
+    segment, last, start, row = 0, ends.shape[0] - 1, begin, 0
+    while row < count:
+        while segment < last and ends[segment] <= times[row]:
+            start = ends[segment]
+            segment += 1
+        first, row = row, _rows_before(times, row + 1, ends[segment]) if segment < last else count
+        for i in range(m):
+            value, slope = values[segment, i], slopes[segment, i]
+            for each in range(first, row):
+                inputs[each, i] = value + (times[each] - start) * slope
+    if k > 0:
+        _evaluate(function, c, states, inputs, outputs, x, u, o)
+    for place in range(columns.shape[0]):
+        column = columns[place]
+        if column < n:
+            _find_range(states, column, lower, upper, place)
+        else:
+            _find_range(outputs, column - n, lower, upper, place)
+    if _is_finite(outputs):
+        return count
+    for row in range(count):
+        for i in range(k):
+            if not abs(outputs[row, i]) <= 1.7976931348623157e308:
+                return row
+    return count
+
+
+@CONTRACTED_PART
+def set_inputs(base: Any, elapsed: Any, w: Any, u: Any) -> None:
+    """The inputs `u` so long after the start of a segment, where they were `base`; they move at `w`."""
+    for i in range(u.shape[0]):
+        u[i] = base[i] + elapsed * w[i]
+
+
+@CONTRACTED_PART
+def write_present(times: Any, row: Any, t: Any, y: Any, rows: Any) -> Any:
+    """Write the present states at the output times up to `t`; the next row."""
+    while row < times.shape[0] and times[row] <= t:
+        for i in range(y.shape[0]):
+            rows[row, i] = y[i]
+        row += 1
+    return row

@@ -12,7 +12,7 @@ import numpy as np
 
 from ....core import Status
 from .calls import CONTRACTED_PART, invoke, pointer
-from .record import set_inputs, write_present
+from .evaluate import set_inputs, write_present
 
 DONE, PAUSED, NOT_FINITE = Status.DONE.value, Status.PAUSED.value, Status.NOT_FINITE.value
 

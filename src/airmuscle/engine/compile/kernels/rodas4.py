@@ -12,7 +12,7 @@ import numba
 
 from ....core import Status
 from .calls import CONTRACTED_PART, invoke, pointer
-from .record import set_inputs, write_present
+from .evaluate import set_inputs, write_present
 
 DONE, PAUSED = Status.DONE.value, Status.PAUSED.value
 STEP_TOO_SMALL, NOT_FINITE = Status.STEP_TOO_SMALL.value, Status.NOT_FINITE.value

@@ -1,6 +1,9 @@
-"""Compilation of LLVM text to machine code by llvmlite."""
+"""Machine code: compilation of LLVM text by llvmlite, and of kernels by numba into object code that is stored."""
 
+import contextlib
 import functools
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from .emit import DECLARED
@@ -80,3 +83,146 @@ def native(level: int) -> Any:
 
     features = llvm.get_host_cpu_features().flatten()
     return _target().create_target_machine(cpu=llvm.get_host_cpu_name(), features=features, opt=level)
+
+
+_C_LIBRARY = frozenset({"sqrt", "ceil", "floor", "memset", "memcpy", "memmove"})
+_STANDALONE = {"_nrt": False, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+
+
+def build(kernel: Any, kinds: Sequence[str]) -> bytes:
+    """Machine code of a numba kernel for arguments of these kinds; empty where the kernel cannot do without numba.
+
+    That is where it allocates or raises, returns something else than a status, or calls what neither LLVM nor the
+    C library provides; or with a version of numba that passes arrays in another way than `entry_point` knows.
+    """
+    import llvmlite.binding as llvm
+    import numba
+    from numba.core.errors import NumbaError
+
+    options = {name: value for name, value in kernel.targetoptions.items() if name != "nopython"}
+    standalone = numba.njit(**options, **_STANDALONE)(kernel.py_func)
+    signature = tuple(_numba_type(kind) for kind in kinds)
+    try:
+        with shallow_scope_copies():
+            standalone.compile(signature)
+    except NumbaError:
+        return b""
+    text, returned = standalone.inspect_llvm(signature), {s.return_type for s in standalone.nopython_signatures}
+    functions = [f for f in llvm.parse_assembly(text).functions if not f.is_declaration]
+    expected = ["retptr", "excinfo", *numba_arguments(kernel.py_func.__code__.co_varnames[: len(kinds)], kinds)]
+    if [[a.name for a in f.arguments] for f in functions] != [expected] or text.count("%excinfo") > 1:
+        return b""  # arrays are passed in another way, or it raises
+    if not returned <= {numba.int64, numba.none}:
+        return b""
+    return _emit(f"{text}\n{entry_point(functions[0].name, kinds)}", functions[0].name)
+
+
+def _numba_type(kind: str) -> Any:
+    import numba
+
+    item = {"q": numba.int64, "d": numba.float64, "f": numba.float32}[kind[0]]
+    return numba.types.Array(item, int(kind[1:]), "C") if len(kind) > 1 else item
+
+
+def _emit(text: str, inner: str) -> bytes:
+    """Machine code of `entry` and of the functions that it calls; empty if the module does not contain all of them."""
+    import llvmlite.binding as llvm
+
+    module, machine = llvm.parse_assembly(text), native(3)
+    module.get_function(inner).linkage = "internal"
+    passes = llvm.create_new_module_pass_manager()
+    passes.add_global_dead_code_eliminate_pass()
+    passes.run(module, llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options()))
+    declared = [v.name for v in (*module.functions, *module.global_variables) if v.is_declaration]
+    if any(not name.startswith("llvm.") and name not in _C_LIBRARY for name in declared):
+        return b""
+    code: bytes = machine.emit_object(module)
+    return code
+
+
+@contextlib.contextmanager
+def shallow_scope_copies() -> Iterator[None]:
+    """Within the context a copied scope of numba shares its variables, unless this numba has scopes of another form."""
+    from numba.core import ir
+
+    scope = ir.Scope
+    if hasattr(scope, "__deepcopy__") or set(vars(scope(None, ir.unknown_loc))) != _FIELDS:
+        yield
+        return
+    scope.__deepcopy__ = _shallow_copy
+    try:
+        yield
+    finally:
+        del scope.__deepcopy__
+
+
+_FIELDS = {"parent", "localvars", "loc", "redefined", "var_redefinitions"}
+
+
+def _shallow_copy(self: Any, memo: dict[int, Any]) -> Any:
+    """A scope with dictionaries of its own and the same variables."""
+    copied = type(self)(self.parent, self.loc)
+    copied.localvars._con = dict(self.localvars._con)
+    copied.redefined = self.redefined.copy()
+    copied.var_redefinitions = defaultdict(set, {name: set(names) for name, names in self.var_redefinitions.items()})
+    memo[id(self)] = copied
+    return copied
+
+
+_NUMBERS = {"q": "i64", "d": "double"}
+_ITEM_SIZES = {"q": 8, "d": 8, "f": 4}
+
+
+@functools.cache
+def slot_count(kind: str) -> int:
+    """Slots of an argument of this kind: "q" whole number, "d" float, "d2" array of doubles, "f1" of singles."""
+    return 1 + int(kind[1:] or 0)
+
+
+def numba_arguments(names: Sequence[str], kinds: Sequence[str]) -> Iterator[str]:
+    """The argument names of a function compiled by numba."""
+    for name, kind in zip(names, kinds, strict=True):
+        if kind in _NUMBERS:
+            yield f"arg.{name}"
+            continue
+        yield from (f"arg.{name}.{part}" for part in range(5))
+        yield from (f"arg.{name}.{part}.{i}" for part in (5, 6) for i in range(int(kind[1:])))
+
+
+def entry_point(function: str, kinds: Sequence[str]) -> str:
+    """LLVM text of the entry point, which returns the status that `function` returns."""
+    lines = ["%status = alloca i64", "store i64 0, ptr %status"]
+    passed = ["ptr %status", "ptr null"]
+    slot = 0
+    for i, kind in enumerate(kinds):
+        x = f"%x{i}"
+        if kind in _NUMBERS:
+            lines += _load(x, _NUMBERS[kind], slot)
+            passed.append(f"{_NUMBERS[kind]} {x}")
+        else:
+            dimensions = int(kind[1:])
+            item = _ITEM_SIZES[kind[0]]
+            lines += _load_array(x, dimensions, item, slot)
+            passed.append(f"ptr null, ptr null, i64 {x}.items, i64 {item}, ptr {x}.data")
+            passed += [f"i64 {x}.shape{k}" for k in range(dimensions)]
+            passed += [f"i64 {x}.stride{k}" for k in range(dimensions)]
+        slot += slot_count(kind)
+    lines += [f'call i32 @"{function}"({", ".join(passed)})', "%result = load i64, ptr %status", "ret i64 %result"]
+    return "\n".join(["define i64 @entry(ptr %slots) {", *lines, "}\n"])
+
+
+def _load(name: str, kind: str, slot: int) -> list[str]:
+    return [f"{name}.at = getelementptr i8, ptr %slots, i64 {8 * slot}", f"{name} = load {kind}, ptr {name}.at"]
+
+
+def _load_array(x: str, dimensions: int, item: int, slot: int) -> list[str]:
+    """Data, shape, and from these the strides and the number of items."""
+    lines = _load(f"{x}.data", "ptr", slot)
+    for k in range(dimensions):
+        lines += _load(f"{x}.shape{k}", "i64", slot + 1 + k)
+    stride = str(item)
+    for k in reversed(range(dimensions)):
+        lines.append(f"{x}.stride{k} = add i64 {stride}, 0")
+        lines.append(f"{x}.size{k} = mul i64 {stride}, {x}.shape{k}")
+        stride = f"{x}.size{k}"
+    return [*lines, f"{x}.items = sdiv i64 {stride}, {item}"]

@@ -14,7 +14,7 @@ from ...loop.piecewise_linear import PiecewiseLinear
 from ..bound_integrator import RawSolution
 from ..compiled_loop import CompiledRun
 from ..integrators import Integrator
-from ..rows import RowRecorder
+from ..solution import RowRecorder
 from .loops import LoopBatch
 from .variations import Variations
 

@@ -1,4 +1,4 @@
-"""Quick release, Fig. 4 of Hošovský et al.: 30 kg, two initial pressures, closed valves."""
+"""Fill and discharge, Fig. 3 of Hošovský et al., and the quick release of their load."""
 
 import dataclasses
 from collections.abc import Mapping
@@ -9,14 +9,103 @@ import numpy.typing as npt
 
 import airmuscle as am
 
-from ..core import DASHES, LINES, legend_below, new_figure
+from ..core import BLACK, DASHES, LINES, legend_below, new_figure
 from ..report.chapter import Plot, Table
 from ..report.claims import AtLeast, AtMost, Claim, ClaimRow
 from ..report.formatting import format_unit
-from .hosovsky_plant import FORCE_MAPS, PAPER, UnpublishedParameters, latched_load, plant
+from .hosovsky_plant import (
+    DISCHARGING,
+    DURATION,
+    FILLING,
+    FORCE_MAPS,
+    MATRIX,
+    PAPER,
+    SCHEDULE,
+    UnpublishedParameters,
+    hanging_load,
+    latched_load,
+    plant,
+)
 
-RELEASED_AT, DURATION = 0.5, 6.0
-SCHEDULE = am.Schedule({"latched": ((0.0, 1.0), (RELEASED_AT, 0.0))})
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class FillRun:
+    """The simulation of Fig. 3 with the printed and with an adaptive integrator."""
+
+    plant: am.Plant
+    printed_method: am.Solution
+    adaptive: am.Recording
+
+    @property
+    def filled(self) -> float:
+        """Absolute pressure [Pa] when the fill valve closes."""
+        row = np.searchsorted(self.adaptive["time"], FILLING[1])
+        return float(self.adaptive["pressure"][row]) + self.plant.ambient.pressure
+
+    def difference(self, name: str) -> float:
+        """Return the largest difference of both integrators in a quantity."""
+        return float(np.abs(self.printed_method.recording[name] - self.adaptive[name]).max())
+
+
+def run_fill(parameters: UnpublishedParameters, valve: am.Valve = MATRIX) -> FillRun:
+    """Simulate 25 s with ode8 at 1e-4 s, as printed, and with Rodas4 at rtol = 1e-8."""
+    system = plant(parameters, hanging_load(parameters), valve=valve)
+    printed, adaptive = (
+        am.solve(am.Problem(system, SCHEDULE, DURATION, integrator=method))
+        for method in (am.DormandPrince8(1e-4), am.Rodas4(1e-8))
+    )
+    return FillRun(system, printed, adaptive.recording)
+
+
+def figure_3(fill: FillRun) -> Plot:
+    """Return Fig. 3: muscle pressure and displacement over time; the paper gives no values of its curve."""
+    run = fill.adaptive
+    figure, axes = new_figure(2, 1, height=4.6, sharex=True)
+    axes[0].plot(run["time"], (run["pressure"] + fill.plant.ambient.pressure) / 1e3, color=LINES[0])
+    axes[0].axhline(650.0, color=BLACK, linewidth=0.8, linestyle=":")
+    axes[0].annotate("supply", (0.1, 650.0), xytext=(0, -10), textcoords="offset points")
+    axes[0].set_ylabel("absolute pressure [kPa]")
+    axes[1].plot(run["time"], run["position"] * 1e3, color=LINES[1])
+    axes[1].set(ylabel="displacement [mm]", xlabel="time [s]")
+    for axis in axes:
+        for begin, end in (FILLING, DISCHARGING):
+            axis.axvspan(begin, end, color="0.93", zorder=0)
+    return Plot(
+        "hosovsky_fig3", "Fill (5 to 15 s) and discharge (19 to 25 s), as in Fig. 3; shaded: one valve is open.", figure
+    )
+
+
+def valve_figure(valve: am.Valve, temperature: float) -> Plot:
+    """Return the mass flow of the valve over the pressure ratio: choked, subsonic, laminar."""
+    upstream = 650e3
+    ratio = np.linspace(0.0, 1.0, 2001)
+    flow = valve.mass_flow(upstream, ratio * upstream, 1.0, temperature)
+    figure, axes = new_figure()
+    axes.plot(ratio, np.asarray(flow) * 1e3, color=LINES[0])
+    axes.axvline(valve.critical_ratio, color=BLACK, linewidth=0.8, linestyle=":")
+    axes.annotate("choked", (valve.critical_ratio / 2, 0.35), ha="center")
+    axes.annotate("subsonic", ((1 + valve.critical_ratio) / 2, 0.35), ha="center")
+    axes.set(xlabel="pressure ratio $p_2/p_1$", ylabel="mass flow [g/s]", ylim=(0, None), xlim=(0, 1))
+    return Plot(
+        "hosovsky_valve",
+        r"Mass flow of the MATRIX valve by ISO 6358 for an absolute upstream pressure of 650 kPa, \(b = 0.433\); "
+        "laminar above 0.999.",
+        figure,
+    )
+
+
+def end_of_choked_flow(plant: am.Plant) -> tuple[float, float]:
+    """Return the absolute muscle pressure [Pa] at which the choked flow ends, and the pressure step of a row [Pa]."""
+    instants = np.append(np.arange(FILLING[0], FILLING[0] + 1.0, 1e-4), DURATION)
+    run = am.simulate(plant, SCHEDULE, duration=DURATION, integrator=am.Rodas4(1e-8), output_times=instants)
+    filling = (run["time"] >= FILLING[0]) & (run["time"] < FILLING[0] + 1.0)
+    flow, pressure = run["mass_flow"][filling], run["pressure"][filling] + plant.ambient.pressure
+    subsonic = int(np.argmax(flow < flow.max() * (1 - 1e-9)))
+    return float(pressure[subsonic]), float(np.diff(pressure).max())
+
+
+RELEASED_AT, RELEASE_DURATION = 0.5, 6.0
+RELEASE_SCHEDULE = am.Schedule({"latched": ((0.0, 1.0), (RELEASED_AT, 0.0))})
 MAX_DAMPING_DIFFERENCE = 0.30
 """Maximum relative difference of comparable damping, as a fraction of the larger value (chosen)."""
 COMPARABLE = AtMost(MAX_DAMPING_DIFFERENCE, chosen=True)
@@ -52,7 +141,7 @@ class Release:
 
 
 def release(
-    parameters: UnpublishedParameters, pressure: float, data: str = FORCE_MAPS[0], duration: float = DURATION
+    parameters: UnpublishedParameters, pressure: float, data: str = FORCE_MAPS[0], duration: float = RELEASE_DURATION
 ) -> Release:
     """Simulate the release of a muscle clamped at zero contraction, at a gauge pressure [Pa], with closed valves.
 
@@ -61,7 +150,7 @@ def release(
     system = plant(parameters, latched_load(), data=data)
     run = am.simulate(
         system,
-        SCHEDULE,
+        RELEASE_SCHEDULE,
         duration=duration,
         initial_state=system.state_at(pressure=pressure),
         integrator=am.Rodas4(1e-9),
