@@ -20,6 +20,7 @@ from airmuscle.bench import (
     InitialValue,
     StartTime,
     fit_dynamic,
+    fit_tube,
     locate_pressure_sensor,
 )
 
@@ -29,8 +30,6 @@ END = 5.0
 """Rows after this time [s] are at rest and are omitted; chosen."""
 REST_VOLUME = 1e-4
 """Assumed volume at rest [m3], which is not known; conductances and volumes are relative to it."""
-SEGMENTS = range(1, 6)
-"""Numbers of segments of the tube of the last plant, of which the one with the lowest AICc is used; chosen."""
 OPEN = am.Schedule({"fill": ((0.0, 1.0),)})
 BOUNDS = {
     "supply.pressure": (590e3, 660e3), "fill.critical_ratio": (0.1, 0.6), "growth_volume": (0.0, 2 * REST_VOLUME),
@@ -170,27 +169,16 @@ def fit_record(variant: Model, recording: am.Recording, starts: int) -> DynamicF
     )  # fmt: skip
 
 
-def divided(variant: Model, segments: int) -> Model:
-    """The variant with a tube of some segments, and the sensor in the first of them; one is the variant itself.
-
-    Several have the flow law of friction, a critical ratio of 0, for which the division of a `Tube` is exact.
-    """
-    if segments == 1:
-        return variant
-    circuit = variant.plant.circuit
-    orifice = dataclasses.replace(circuit.tube.orifice, critical_ratio=0.0)
-    tube = dataclasses.replace(circuit.tube, segment_count=segments, orifice=orifice)
-    plant = dataclasses.replace(variant.plant, circuit=dataclasses.replace(circuit, tube=tube))
-    return dataclasses.replace(variant, plant=plant, sensor=f"{tube.prefixes[0]}pressure")
-
-
 def fit_divided(recording: am.Recording, starts: int) -> tuple[Model, DynamicFit]:
-    """The last plant with the number of segments of the lowest AICc, and its fit.
+    """The last plant with the number of segments of its tube by AICc, and its fit."""
+    last = MODELS[-1]
 
-    The number is no further unknown of one of the fits, so that the lowest AICc is the least residual.
-    """
-    fits = {model: fit_record(model, recording, starts) for model in (divided(MODELS[-1], n) for n in SEGMENTS)}
-    return min(fits.items(), key=lambda item: item[1].rms(item[0].sensor))
+    def fitted(plant: am.Plant, sensor: str) -> DynamicFit:
+        return fit_record(dataclasses.replace(last, plant=plant, sensor=sensor), recording, starts)
+
+    fit = fit_tube(last.plant, fitted)
+    model = fit.problem.record_models[0]
+    return dataclasses.replace(last, plant=model.plant, sensor=model.names[0]), fit
 
 
 def prediction_rms(fit: DynamicFit, variant: Model, recording: am.Recording, wall: bool) -> float:

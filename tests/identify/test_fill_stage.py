@@ -20,6 +20,7 @@ from airmuscle.bench import (
     RecordKind,
     classify_records,
     fit_dynamic,
+    fit_tube,
     stated_ambient,
 )
 from airmuscle.bench.identify.campaign import fit_fill_stage, fit_release_stage, stage_result, volume_change
@@ -39,9 +40,11 @@ from airmuscle.physics import (
     Polytropic,
     Supply,
     Tank,
+    Tube,
     Valve,
     VirtualWork,
     WithLatch,
+    WithTubes,
 )
 from airmuscle.recording import Recording
 
@@ -76,6 +79,35 @@ def record(contraction, command, seed, *, ratio=0.35, ambient=STANDARD, begin=0.
     return Recording(columns, f"fill {contraction:g} {min(command)}", {"resting_length": 0.3, **constants})
 
 
+def tube_record(contraction, segments, seed):
+    """A fill through a tube, sensed behind the valve."""
+    plant = true_plant(contraction, 0.35, STANDARD)
+    tube = Tube(Valve(4e-9, 0.0 if segments > 1 else 0.3), 8e-5, segments)
+    plant = dataclasses.replace(plant, circuit=WithTubes(plant.circuit, tube))
+    times, sensed = np.arange(0.0, 3.0, 0.004), f"{tube.prefixes[0]}pressure"
+    run = simulate(
+        plant, Schedule({"fill": ((0.2, 1.0),)}), duration=3.0, initial_state=plant.state_at(pressure=0.0),
+        output_times=times, integrator=Rodas4(1e-8),
+    )  # fmt: skip
+    pressure = np.interp(times, run["time"], run[sensed]) + np.random.default_rng(seed).normal(0.0, NOISE, times.size)
+    columns = {"time": times, "pressure": pressure, "contraction": np.full(times.size, contraction)}
+    constants = {"resting_length": 0.3, "ambient": STANDARD.pressure, "ambient_temperature": STANDARD.temperature}
+    return Recording(columns, f"fill {contraction:g}", constants)
+
+
+@pytest.mark.parametrize("segments", widened([1, 3], lambda count: count == 3))
+def test_a_tube_between_valves_and_muscle_is_found_with_the_number_of_its_segments(segments):
+    stage = stage_of([tube_record(c, segments, i) for i, c in enumerate(CONTRACTIONS)])
+    assert stage.fit.plant().circuit.tube.segment_count == segments
+    true = {"tube.volume": 8e-5, "tube.orifice.conductance": 4e-9, "circuit.fill.conductance": 3e-9}
+    for name, value in true.items():
+        estimate = stage.fit[f"circuit.{name}"]
+        assert abs(estimate.value - value) < 3.5 * estimate.stderr, estimate
+    assert max(stage.cross_rms) == pytest.approx(NOISE, rel=0.15)
+    said = "one segment" if segments == 1 else "3 segments"
+    assert f"({said} by AICc): its volume of " in stage.verdict
+
+
 def stage_of(recordings, geometry=BRAID, change=None):
     stage = fit_fill_stage(classify_records(recordings), geometry, change, lambda _: None)
     assert isinstance(stage, FillStage), stage.reason
@@ -101,6 +133,7 @@ def assert_true(stage, ratio=0.35):
 def test_a_fill_and_its_discharge_in_one_file(seed):
     stage = stage_of([record(c, BOTH, 10 * seed + i) for i, c in enumerate(CONTRACTIONS)])
     assert_true(stage)
+    assert not isinstance(stage.fit.plant().circuit, WithTubes)  # the muscle alone explains the records
     switch = stage.commands(stage.records[2])["discharge"][0][0] + stage.fit["start time of record 3"].value
     assert switch == pytest.approx(3.2, abs=1e-3)
     assert stage.records[2].steps[1].start < 3.196  # what is detected is early
@@ -113,6 +146,11 @@ def test_the_plants_have_the_ambient_air_of_their_records(ambient):
     stage = stage_of([record(c, BOTH, i, ambient=ambient) for i, c in enumerate(CONTRACTIONS)])
     assert_true(stage)
     assert stage.fit.plant().ambient == ambient
+
+
+def test_a_fit_of_segments_needs_a_tube():
+    with pytest.raises(ParameterError, match="fit_tube: the plant has no Tube between valves and muscle"):
+        fit_tube(true_plant(0.0, 0.35, STANDARD), lambda plant, sensor: None)
 
 
 def test_records_in_different_ambient_air():
@@ -249,8 +287,9 @@ def test_the_air_of_a_tank_at_rest_follows_its_supply_in_every_iterate():
     assert predicted.rms("pressure") == pytest.approx(NOISE, rel=0.1)
 
 
-def test_records_that_the_model_does_not_follow_are_reported_as_a_misfit():
+def test_records_that_the_model_does_not_follow_are_reported_as_a_misfit(monkeypatch):
     """The valve closes to a third while the muscle fills; the model has one conductance."""
+    monkeypatch.setattr("airmuscle.bench.identify.campaign.fill_records.TUBE_STARTS", 1)  # for the time of the test
     throttled = {"fill": ((0.5, 1.0), (0.7, 0.3), (3.2, 0.0)), "discharge": ((3.2, 1.0),)}
     stage = stage_of([record(c, throttled, i) for i, c in enumerate(CONTRACTIONS[:2])])
     assert "times the noise of the pressure sensor" in stage.misfit

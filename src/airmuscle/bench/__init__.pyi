@@ -68,6 +68,7 @@ from .identify.dynamic import cross_predict as cross_predict
 from .identify.dynamic import describe_cross_predictions as describe_cross_predictions
 from .identify.dynamic import fit_dynamic as fit_dynamic
 from .identify.dynamic import fit_regulator as fit_regulator
+from .identify.dynamic import fit_tube as fit_tube
 from .identify.dynamic import locate_pressure_sensor as locate_pressure_sensor
 from .identify.dynamic import rank_records as rank_records
 from .identify.dynamic import stated_ambient as stated_ambient

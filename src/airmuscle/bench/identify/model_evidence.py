@@ -7,6 +7,10 @@ import numpy.typing as npt
 
 from ...core import Array
 
+EQUIVALENT = 2.0
+"""Difference of AICc up to which laws are equivalent; the one with the fewest coefficients is then taken (Burnham and
+Anderson, Model Selection and Multimodel Inference, Springer, 2002)."""
+
 
 def effective_sample_size(residuals: Array) -> float:
     """Number of independent observations equivalent to N residuals in order of time: N (1 - r)/(1 + r).

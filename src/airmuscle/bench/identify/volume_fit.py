@@ -15,6 +15,7 @@ from ...core import Array, ColumnError, IdentificationError, ParameterError
 from ...physics.muscle.geometry import Braid, ChebyshevGeometry, Geometry
 from ...physics.pneumatics.gas import GAS_CONSTANT
 from ...recording import Recording
+from .model_evidence import EQUIVALENT
 
 HELD = 0.005
 """Range of the contraction within which it is held during a fill (chosen)."""
@@ -24,9 +25,6 @@ SETTLED = 0.05
 """Fraction of the rows at either end of a fill over which mass and pressure are averaged (chosen)."""
 MAX_DEGREE = 4
 """Maximum degree of a polynomial (chosen)."""
-EQUIVALENT = 2.0
-"""Difference of AICc up to which laws are equivalent; the one with the fewest coefficients is then taken (Burnham and
-Anderson, Model Selection and Multimodel Inference, Springer, 2002)."""
 RESOLUTION = 1e-6
 """Residual relative to the volume below which laws are not distinguished (chosen)."""
 

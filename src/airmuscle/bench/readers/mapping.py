@@ -193,8 +193,12 @@ def _parse_entry(where: str, column: str, value: Any) -> str:
     """`pressure [bara]`, from this text or from `{quantity = "pressure", unit = "bara"}`."""
     if isinstance(value, str):
         return value
-    if isinstance(value, dict) and isinstance(value.get("quantity"), str) and set(value) <= {"quantity", "unit"}:
-        return f"{value['quantity']} [{value['unit']}]" if value.get("unit") else value["quantity"]
+    if (
+        isinstance(value, dict)
+        and set(value) <= {"quantity", "unit"}
+        and all(isinstance(v, str) for v in value.values())
+    ):
+        return f"{value.get('quantity', '')} [{value['unit']}]" if value.get("unit") else value["quantity"]
     raise ParameterError(
         f"{where}: column '{column}' is mapped to {abridged(value)}; write 'pressure [bara]' or "
         '{ quantity = "pressure", unit = "bara" }.'

@@ -1,5 +1,4 @@
-"""Fills and discharges of a campaign as experiments: plant of a held muscle, valve commands, initial pressure, and the
-unknowns of both valves."""
+"""Fills and discharges of a campaign as experiments: valve commands, initial pressure, and the unknowns."""
 
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -7,11 +6,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ....engine.loop.inputs import Schedule
-from ....physics.mechanism import Isometric
-from ....physics.muscle import Muscle
-from ....physics.muscle.geometry import Vessel
 from ....physics.plant.plant import Plant
-from ....physics.pneumatics import EnergyBalance, FillDischarge, Supply, Tank, Valve
+from ....physics.pneumatics import Circuit, Tank, Valve, WithTubes
 from ...baselines import ARX, PERSISTENCE, TimedRecord, baseline_errors, skill
 from ..dynamic import (
     CommandInstants,
@@ -21,15 +17,14 @@ from ..dynamic import (
     StartTime,
     commands_at,
     fit_dynamic,
-    stated_ambient,
 )
 from ..result import Estimate
+from .fill_plants import HEAT_TRANSFER_BOUNDS, sensor_of, valves_of
 from .record import CampaignRecord
 from .transient import thin
 
-FILL, DISCHARGE = "circuit.fill", "circuit.discharge"
-SUPPLY = "circuit.supply"
 CONDUCTANCE, RATIO = "conductance", "critical_ratio"
+TUBE_VOLUME, TUBE_CONDUCTANCE = "circuit.tube.volume", "circuit.tube.orifice.conductance"
 MAX_RATIO_ERROR = 0.1
 """Standard error of a critical ratio from which it counts as not determined (chosen)."""
 
@@ -38,19 +33,28 @@ MAX_RATIO_ERROR = 0.1
 class ValveUnknowns:
     """The valves that the steps of the records show, and the reason for a common critical ratio, empty without one.
 
-    `sinks`: the supply has a volume (`Tank`), so that its pressure sinks.
+    `sinks`: the supply has a volume (`Tank`), so that its pressure sinks. `tube`: one lies between valves and muscle.
     """
 
     fill: bool
     discharge: bool
     common_ratio: str = ""
     sinks: bool = False
+    tube: bool = False
 
     @classmethod
-    def of(cls, records: Sequence[CampaignRecord], common_ratio: str = "", sinks: bool = False) -> "ValveUnknowns":
-        """The valves through which the air of these records flows."""
+    def of(cls, records: Sequence[CampaignRecord], plant: object = None, common_ratio: str = "") -> "ValveUnknowns":
+        """The valves through which the air of these records flows, with the supply and the tube of a plant."""
         changes = [step.change for record in records for step in record.steps]
-        return cls(any(change > 0 for change in changes), any(change < 0 for change in changes), common_ratio, sinks)
+        circuits = plant.circuits if isinstance(plant, Plant) else ()
+        sinks = any(isinstance(valves_of(circuit).supply, Tank) for circuit in circuits)
+        tube = any(isinstance(circuit, WithTubes) for circuit in circuits)
+        return cls(any(c > 0 for c in changes), any(c < 0 for c in changes), common_ratio, sinks, tube)
+
+    @property
+    def circuit(self) -> str:
+        """The path of the circuit with the valves."""
+        return "circuit.circuit" if self.tube else "circuit"
 
     @property
     def both(self) -> bool:
@@ -59,17 +63,18 @@ class ValveUnknowns:
 
     def paths(self, name: str) -> list[str | tuple[str, ...]]:
         """The paths of a parameter of the valves: one for each valve, or a pair with one common value."""
-        paths = [f"{valve}.{name}" for valve in (FILL, DISCHARGE)]
+        paths = [f"{self.circuit}.{valve}.{name}" for valve in ("fill", "discharge")]
         if self.both and not (name == RATIO and self.common_ratio):
             return [*paths]
         return [tuple(paths if self.fill else paths[::-1])]
 
     @property
     def shared(self) -> list[str | tuple[str, ...]]:
-        """The paths of critical ratios and, with a fill, of the supply."""
+        """The paths of critical ratios, the tube and, with a fill, of the supply."""
         constant, sinking = ["pressure"], ["supply.pressure", "feed.conductance", "volume"]
-        names = [f"{SUPPLY}.{name}" for name in (sinking if self.sinks else constant)]
-        return [*self.paths(RATIO), *(names if self.fill else [])]
+        names = [f"{self.circuit}.supply.{name}" for name in (sinking if self.sinks else constant)]
+        tube = [TUBE_VOLUME, TUBE_CONDUCTANCE] if self.tube else []
+        return [*self.paths(RATIO), *tube, *(names if self.fill else [])]
 
     @property
     def supposed(self) -> list[str]:
@@ -84,10 +89,14 @@ class ValveUnknowns:
 
 def poor_ratios(fit: DynamicFit) -> str:
     """The critical ratios that a fit does not determine, as a sentence; empty if there are none."""
-    poor = [e for e in fit.estimates if e.name.endswith(RATIO) and (e.on_bound or not e.stderr <= MAX_RATIO_ERROR)]
+    poor = [
+        e
+        for e in fit.estimates
+        if e.name.endswith(RATIO) and "orifice" not in e.name and (e.on_bound or not e.stderr <= MAX_RATIO_ERROR)
+    ]
     if not poor:
         return ""
-    parts = [f"{estimate.name.split('.')[1]} valve ({_reason(estimate)})" for estimate in poor]
+    parts = [f"{estimate.name.split('.')[-2]} valve ({_reason(estimate)})" for estimate in poor]
     return f"The records do not determine the critical ratio of the {' and the '.join(parts)}."
 
 
@@ -97,20 +106,13 @@ def _reason(estimate: Estimate) -> str:
     return f"standard error {estimate.stderr:.2g}" if np.isfinite(estimate.stderr) else "it has no effect on them"
 
 
+TUBE_STARTS = 16
+"""Number of initial guesses of a fit with a tube, which has several optima (chosen)."""
 FIT_ROWS = 250
 """Maximum number of rows of a fill (chosen)."""
-ASSUMED_CONDUCTANCE = 1e-8
-"""Conductance [m3/(s Pa)] for which the relative volumes are fitted (chosen)."""
 MIN_DEVIATION = 100.0
 """Least standard deviation of the pressure sensor [Pa] (chosen)."""
 HEAT_TRANSFER = "gas.heat_transfer"
-HEAT_TRANSFER_BOUNDS = (1e-3, 1e3)
-"""Bounds of the heat transfer [W/K] (chosen)."""
-
-
-def held_contraction(record: CampaignRecord) -> float:
-    """The contraction at which the muscle is held."""
-    return float(np.median(record.recording["contraction"]))
 
 
 def pressure_deviation(records: Sequence[CampaignRecord]) -> float:
@@ -124,73 +126,45 @@ def instant_margin(records: Sequence[CampaignRecord]) -> float:
     return max(0.25 * min(step.duration for r in records for step in r.steps), 2.0 * sample)
 
 
-def vessel_plant(record: CampaignRecord) -> Plant:
-    """The plant of a held muscle, with initial values from the steps of the record and the ambient air it states."""
-    rising = [step for step in record.steps if step.change > 0]
-    top = max(step.final_pressure for step in record.steps) if rising else float(record.recording["pressure"][0])
-    duration = float(np.mean([step.duration for step in record.steps]))
-    volume = ASSUMED_CONDUCTANCE * 1e5 * duration / 1.2
-    muscle = Muscle.ideal(Vessel(min(max(volume, 2e-7), 5e-2), record.resting_length or 0.2))
-    valve = Valve(ASSUMED_CONDUCTANCE, 0.35)
-    circuit = FillDischarge(Supply(top + 5e3), valve, valve)
-    return Plant(
-        muscle, circuit, Isometric(held_contraction(record)), EnergyBalance(1.0), stated_ambient(record.recording)
-    )
-
-
-def rescaled(plant: object, scale: float) -> Plant:
-    """The plant with its conductances, heat transfer and volume of the supply multiplied by the scale."""
-    assert isinstance(plant, Plant)
-    circuit, gas = plant.circuit, plant.gas
-    assert isinstance(circuit, FillDischarge)
-    assert isinstance(gas, EnergyBalance)
-    supply = circuit.supply
-    if isinstance(supply, Tank) and isinstance(supply.feed, Valve):
-        feed = dataclasses.replace(supply.feed, conductance=supply.feed.conductance * scale)
-        supply = dataclasses.replace(supply, feed=feed, volume=supply.volume * scale)
-    fill, discharge = (
-        dataclasses.replace(valve, conductance=valve.conductance * scale)
-        for valve in (circuit.fill, circuit.discharge)
-        if isinstance(valve, Valve)
-    )
-    return dataclasses.replace(
-        plant,
-        circuit=dataclasses.replace(circuit, supply=supply, fill=fill, discharge=discharge),
-        gas=dataclasses.replace(gas, heat_transfer=float(np.clip(gas.heat_transfer * scale, *HEAT_TRANSFER_BOUNDS))),
-    )
-
-
-def at_record(plant: Plant, record: CampaignRecord, volume: float) -> Plant:
-    """The plant with this volume [m3], at the held length and in the ambient air of a record."""
-    vessel = Vessel(volume, plant.muscles[0].geometry.resting_length)
-    return dataclasses.replace(
-        plant, muscle=Muscle.ideal(vessel), mechanism=Isometric(held_contraction(record)),
-        ambient=stated_ambient(record.recording),
-    )  # fmt: skip
-
-
 def with_supply_volume(experiment: Experiment) -> Experiment:
     """The experiment with a volume before its valve that is fed from the supply; initial guess (chosen)."""
     plant = experiment.plant
     assert isinstance(plant, Plant)
-    circuit = plant.circuit
-    assert isinstance(circuit, FillDischarge)
+    circuit = valves_of(plant.circuit)
     assert isinstance(circuit.fill, Valve)
     feed = Valve(3.0 * circuit.fill.conductance, 0.3)
     tank = Tank(circuit.supply, feed, 3.0 * float(plant.muscles[0].geometry.volume(0.0)))
-    plant = dataclasses.replace(plant, circuit=dataclasses.replace(circuit, supply=tank))
-    initial = experiment.initial_conditions.known["pressure"]
-    return dataclasses.replace(experiment, plant=plant, initial_conditions=InitialConditions.at_rest(plant, initial))
+    return with_circuit(experiment, dataclasses.replace(circuit, supply=tank))
 
 
-def has_supply_volume(plant: object) -> bool:
-    """Whether the supply of a plant has a volume, so that its pressure sinks."""
-    return isinstance(plant, Plant) and any(isinstance(circuit.supply, Tank) for circuit in plant.circuits)
+def with_circuit(experiment: Experiment, circuit: Circuit) -> Experiment:
+    """The experiment with another circuit; the recorded pressure is that behind the valves."""
+    assert isinstance(experiment.plant, Plant)
+    plant = dataclasses.replace(experiment.plant, circuit=circuit)
+    initial = InitialConditions.at_rest(plant, experiment.initial_conditions.known["pressure"])
+    recording = experiment.recording.with_columns(**{sensor_of(plant): experiment.recording["pressure"]})
+    return dataclasses.replace(experiment, recording=recording, plant=plant, initial_conditions=initial)
+
+
+def describe_tube(fit: DynamicFit) -> str:
+    """The tube between valves and muscle, as a sentence."""
+    volume, conductance = fit[TUBE_VOLUME], fit[TUBE_CONDUCTANCE]
+    plant = fit.plant()
+    assert isinstance(plant, Plant)
+    assert isinstance(plant.circuit, WithTubes)
+    count = plant.circuit.tube.segment_count
+    along = f"fills along its length ({count} segments by AICc)" if count > 1 else "fills evenly (one segment by AICc)"
+    return (
+        f"A tube between valves and muscle, with the pressure sensor at the valves, {along}: its volume of "
+        f"{1e6 * volume.value:.3g} cm3 (standard error {1e6 * volume.stderr:.2g} cm3) and conductance of "
+        f"{conductance.value:.3g} m3/(s Pa) explain the records, which a muscle without a tube does not."
+    )
 
 
 def describe_supply(fit: DynamicFit) -> str:
     """The volume before the valve, as a sentence."""
-    volume, feed = fit[f"{SUPPLY}.volume"], fit[f"{SUPPLY}.feed.conductance"]
+    names = ("supply.volume", "supply.feed.conductance")
+    volume, feed = (next(e for e in fit.estimates if e.name.endswith(name)) for name in names)
     return (
         f"The supply pressure sinks during a fill: a volume of {1e6 * volume.value:.3g} cm3 (standard error "
         f"{1e6 * volume.stderr:.2g} cm3) before the valve, fed through a conductance of {feed.value:.3g} m3/(s Pa), "
@@ -219,6 +193,7 @@ def detected_experiment(record: CampaignRecord, plant: Plant) -> Experiment:
     pressure = record.recording["pressure"]
     initial = float(np.median(pressure[before])) if before.sum() >= 3 else float(pressure[0])
     conditions = InitialConditions.at_rest(plant, initial)
+    recording = recording.with_columns(**{sensor_of(plant): recording["pressure"]})
     return Experiment(recording, Schedule(valve_commands(record)), conditions, began, plant)
 
 
@@ -236,9 +211,15 @@ def fit_pressure(
     first, margin = experiments[0].plant, instant_margin(records)
     assert first is not None
     return fit_dynamic(
-        first, experiments, free=(HEAT_TRANSFER, *free), observed={"pressure": pressure_deviation(records)},
+        first, experiments, free=(HEAT_TRANSFER, *free), observed={sensor_of(first): pressure_deviation(records)},
         per_record=(*own, StartTime(margin), CommandInstants(margin)), bounds={HEAT_TRANSFER: HEAT_TRANSFER_BOUNDS},
+        starts=TUBE_STARTS if TUBE_VOLUME in free else 1,
     )  # fmt: skip
+
+
+def record_rms(fit: DynamicFit) -> tuple[float, ...]:
+    """Rms residual of the pressure of each record [Pa]."""
+    return tuple(fit.rms(model.names[0], i) for i, model in enumerate(fit.problem.record_models))
 
 
 def fill_baselines(fit: DynamicFit) -> tuple[dict[str, float], ...]:

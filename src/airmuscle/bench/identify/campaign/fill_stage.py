@@ -9,15 +9,17 @@ from ....core import AirmuscleError, Array, ShortRepr
 from ....engine.loop.inputs import Schedule
 from ....physics.muscle.geometry import Geometry
 from ....physics.plant.plant import Plant
-from ....physics.pneumatics import FillDischarge
-from ..dynamic import DynamicFit, Experiment
+from ....physics.pneumatics import FillDischarge, WithTubes
+from ..dynamic import DynamicFit, Experiment, fit_tube
 from ..dynamic.experiment import describe_ambient
+from . import fill_plants as plants
 from . import fill_records as fills
 from .record import CampaignRecord
 from .transient import LeftOutStage
 from .volume import VolumeChange, VolumeEstimate, relate_volumes
 
 Fitted = Callable[[Sequence[Experiment], fills.ValveUnknowns], DynamicFit]
+Supplied = tuple[DynamicFit, Sequence[Experiment], fills.ValveUnknowns]
 NAME = "fills and volume"
 VOLUME = "muscle.geometry.enclosed_volume"
 REMEDY = (
@@ -27,7 +29,7 @@ REMEDY = (
 MAX_NOISE_RATIO = 4.0
 """Ratio of the residual to the noise of the pressure sensor above which the model does not follow a record (chosen)."""
 MAX_FOLLOWED = 2.0
-"""That ratio up to which it follows them; above it, a supply whose pressure sinks is tried (chosen)."""
+"""That ratio up to which it follows them; above it, a supply whose pressure sinks and a tube are tried (chosen)."""
 MAX_VOLUME_ERROR = 0.3
 """Maximum relative standard error of a volume before the valve (chosen)."""
 MIN_MISFIT = 0.01
@@ -56,11 +58,10 @@ class FillStage(ShortRepr):
 
     @property
     def circuit(self) -> FillDischarge:
-        """The circuit with the fitted valves and supply."""
+        """The circuit with the fitted valves and supply, without a tube."""
         plant = self.fit.plant()
         assert isinstance(plant, Plant)
-        assert isinstance(plant.circuit, FillDischarge)
-        return plant.circuit
+        return plants.valves_of(plant.circuit)
 
     def commands(self, record: CampaignRecord) -> Mapping[str, Sequence[tuple[float, float]]]:
         """The instants [s] and values of the commands of both valves in a record, with the estimated instants."""
@@ -73,9 +74,7 @@ class FillStage(ShortRepr):
         """The remark that the model does not follow the pressure of the records, with its cause; empty if it does."""
         noise = fills.pressure_deviation(self.records)
         change = max(abs(step.change) for record in self.records for step in record.steps)
-        worst, rms = max(
-            ((record, self.fit.rms("pressure", i)) for i, record in enumerate(self.records)), key=lambda each: each[1]
-        )
+        worst, rms = max(zip(self.records, fills.record_rms(self.fit), strict=True), key=lambda each: each[1])
         if rms <= max(MAX_NOISE_RATIO * noise, MIN_MISFIT * change):
             return ""
         return (
@@ -88,7 +87,7 @@ class FillStage(ShortRepr):
     @property
     def verdict(self) -> str:
         """Cross-prediction, volume and residuals, as sentences."""
-        rms = [self.fit.rms("pressure", i) / 1e3 for i in range(len(self.records))]
+        rms = [each / 1e3 for each in fills.record_rms(self.fit)]
         text = ""
         if self.cross_rms:
             text = (
@@ -162,15 +161,15 @@ class _RelativeFit:
     @classmethod
     def of(cls, records: Sequence[CampaignRecord]) -> "_RelativeFit":
         def fitted(experiments: Sequence[Experiment], valves: fills.ValveUnknowns) -> DynamicFit:
-            free = [*valves.shared, *([f"{fills.DISCHARGE}.{fills.CONDUCTANCE}"] if valves.both else [])]
+            free = [*valves.shared, *([f"{valves.circuit}.discharge.{fills.CONDUCTANCE}"] if valves.both else [])]
             return fills.fit_pressure(records, experiments, free, (VOLUME,))
 
-        experiments = [fills.detected_experiment(record, fills.vessel_plant(record)) for record in records]
+        experiments = [fills.detected_experiment(record, plants.vessel_plant(record)) for record in records]
         return cls(_with_supply(records, experiments, fills.ValveUnknowns.of(records), fitted)[0], tuple(records))
 
     @property
     def contractions(self) -> Array:
-        return np.array([fills.held_contraction(record) for record in self.records])
+        return np.array([plants.held_contraction(record) for record in self.records])
 
     def _volumes(self) -> tuple[Array, Array]:
         """The relative volumes and their standard errors, shape (K,) each."""
@@ -188,10 +187,10 @@ class _RelativeFit:
 
     def experiments(self, records: Sequence[CampaignRecord], geometry: Geometry, scale: float) -> list[Experiment]:
         """All records with the volumes of a geometry, from the valves and instants of this fit."""
-        found = fills.rescaled(self.fit.plant(), scale)
+        found = plants.rescaled(self.fit.plant(), scale)
         experiments = []
         for record in records:
-            plant = fills.at_record(found, record, float(geometry.volume(fills.held_contraction(record))))
+            plant = plants.at_record(found, record, float(geometry.volume(plants.held_contraction(record))))
             experiment = fills.detected_experiment(record, plant)
             known = record in self.records
             experiments.append(
@@ -209,7 +208,7 @@ def _fit_jointly(
 ) -> FillStage:
     """The fit with the volumes of one curve, and the prediction of each record from the others."""
     everything = range(len(records))
-    valves = fills.ValveUnknowns.of(records, sinks=any(fills.has_supply_volume(each.plant) for each in experiments))
+    valves = fills.ValveUnknowns.of(records, experiments[0].plant)
     fit, experiments, valves = _with_supply(
         records, experiments, valves, lambda changed, free: _fit_common(records, changed, everything, free)
     )
@@ -221,9 +220,10 @@ def _fit_jointly(
         part = _fit_common(records, experiments, [k for k in everything if k != i], valves)
         cross.append(_prediction_rms(fit, part, i))
         progress(0.5 + 0.5 * (i + 1) / len(records))
-    contractions = np.array([fills.held_contraction(record) for record in records])
+    contractions = np.array([plants.held_contraction(record) for record in records])
     supposed = (
         *([fills.describe_supply(fit)] if valves.sinks else []),
+        *([fills.describe_tube(fit)] if valves.tube else []),
         *valves.supposed,
         *describe_ambient([record.recording for record in records]),
     )
@@ -234,42 +234,57 @@ def _fit_jointly(
 
 
 def _fit_common(
-    records: Sequence[CampaignRecord],
-    experiments: Sequence[Experiment],
-    chosen: Sequence[int],
+    records: Sequence[CampaignRecord], experiments: Sequence[Experiment], chosen: Sequence[int],
     every: fills.ValveUnknowns,
-) -> DynamicFit:
+) -> DynamicFit:  # fmt: skip
     """The fit of the chosen records, with what is supposed of the valves of every record."""
-    valves = fills.ValveUnknowns.of([records[i] for i in chosen], every.common_ratio, every.sinks)
+    valves = fills.ValveUnknowns.of([records[i] for i in chosen], experiments[0].plant, every.common_ratio)
     return fills.fit_pressure(
         records, [experiments[i] for i in chosen], [*valves.shared, *valves.paths(fills.CONDUCTANCE)]
     )
 
 
 def _with_supply(
-    records: Sequence[CampaignRecord],
-    experiments: Sequence[Experiment],
-    valves: fills.ValveUnknowns,
-    fitted: Fitted,
-) -> tuple[DynamicFit, Sequence[Experiment], fills.ValveUnknowns]:
-    """The fit with a constant supply; where it does not follow the records, with a volume before the valve.
+    records: Sequence[CampaignRecord], experiments: Sequence[Experiment], valves: fills.ValveUnknowns, fitted: Fitted,
+) -> Supplied:  # fmt: skip
+    """The fit with a constant supply; where it does not follow the records, with a volume before the valve or a tube.
 
-    The volume is used where the records determine it and the fit then follows them.
+    A volume is used where the records determine it and the fit then follows them.
     """
     constant = fitted(experiments, valves)
-    limit, everything = MAX_FOLLOWED * fills.pressure_deviation(records), range(len(records))
-    if not valves.fill or valves.sinks or all(constant.rms("pressure", i) <= limit for i in everything):
+    limit = MAX_FOLLOWED * fills.pressure_deviation(records)
+    if not valves.fill or valves.sinks or valves.tube or max(fills.record_rms(constant)) <= limit:
         return constant, experiments, valves
-    sinking = dataclasses.replace(valves, sinks=True)
-    changed = [fills.with_instants(fills.with_supply_volume(each), constant, i) for i, each in enumerate(experiments)]
-    try:
-        fit = fitted(changed, sinking)
-    except AirmuscleError:  # the simulation fails on the way
-        return constant, experiments, valves
-    volume = fit[f"{fills.SUPPLY}.volume"]
-    determined = not volume.on_bound and volume.stderr <= MAX_VOLUME_ERROR * volume.value
-    follows = all(fit.rms("pressure", i) <= limit for i in everything)
-    return (fit, changed, sinking) if determined and follows else (constant, experiments, valves)
+    found = [fills.with_instants(each, constant, i) for i, each in enumerate(experiments)]
+    for change, volume in ((_with_volume, "supply.volume"), (_with_tube, "tube.volume")):
+        try:
+            fit, changed, unknowns = change(found if change is _with_volume else experiments, valves, fitted)
+        except AirmuscleError:  # the simulation fails on the way
+            continue
+        estimate = next(each for each in fit.estimates if each.name.endswith(volume))
+        determined = not estimate.on_bound and estimate.stderr <= MAX_VOLUME_ERROR * estimate.value
+        if determined and max(fills.record_rms(fit)) <= limit:
+            return fit, changed, unknowns
+    return constant, experiments, valves
+
+
+def _with_volume(experiments: Sequence[Experiment], valves: fills.ValveUnknowns, fitted: Fitted) -> Supplied:
+    """The fit with a volume before the valve."""
+    sinking, changed = dataclasses.replace(valves, sinks=True), list(map(fills.with_supply_volume, experiments))
+    return fitted(changed, sinking), changed, sinking
+
+
+def _with_tube(experiments: Sequence[Experiment], valves: fills.ValveUnknowns, fitted: Fitted) -> Supplied:
+    """The fit with a tube between valves and muscle, whose number of segments AICc chooses."""
+    unknowns, plant = dataclasses.replace(valves, tube=True), experiments[0].plant
+    assert isinstance(plant, Plant)
+
+    def divided(plant: object) -> list[Experiment]:
+        return [fills.with_circuit(each, plants.circuit_of(plant)) for each in experiments]
+
+    guess = dataclasses.replace(plant, circuit=WithTubes(plants.valves_of(plant.circuit), plants.tube_guess(plant)))
+    fit = fit_tube(guess, lambda changed, _: fitted(divided(changed), unknowns))
+    return fit, divided(fit.problem.record_models[0].plant), unknowns
 
 
 def _prediction_rms(fit: DynamicFit, part: DynamicFit, record: int) -> float:

@@ -9,6 +9,7 @@ from .fit import CrossPrediction as CrossPrediction
 from .fit import cross_predict as cross_predict
 from .fit import describe_cross_predictions as describe_cross_predictions
 from .fit import fit_dynamic as fit_dynamic
+from .fit import fit_tube as fit_tube
 from .initial_conditions import InitialConditions as InitialConditions
 from .levenberg_marquardt import bounded_step as bounded_step
 from .levenberg_marquardt import minimise as minimise

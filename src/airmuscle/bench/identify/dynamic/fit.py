@@ -10,9 +10,11 @@ import numpy as np
 from ....core import AirmuscleError, Array, IdentificationError, ParameterError, check_whole
 from ....engine.compile import System
 from ....engine.run.integrators import Integrator, Rodas4
+from ....physics.plant.plant import Plant
+from ....physics.pneumatics import Tube, Valve, WithTubes
 from ....recording.columns import displayed
 from ..identifiability import analyse_identifiability
-from ..model_evidence import lag_one_autocorrelation
+from ..model_evidence import EQUIVALENT, aicc, lag_one_autocorrelation
 from ..result import Estimate
 from .experiment import Experiment, ParameterPaths, RecordUnknown, check_ambient, make_unknowns
 from .levenberg_marquardt import LevenbergMarquardt
@@ -23,6 +25,9 @@ from .result import DynamicFit
 
 MAX_AUTOCORRELATION = 0.3
 """Lag-1 autocorrelation of the residuals above which they are attributed to model error, not noise; chosen."""
+
+SEGMENTS = (1, 2, 3, 4, 5)
+"""Numbers of segments of a tube that are compared (chosen)."""
 
 SCREENING_RUNS, SCREENING_RATIO = 20, 1000.0
 """After this many simulations a search whose sum of squares exceeds the lowest one by this factor is abandoned; chosen.
@@ -80,6 +85,43 @@ def fit_dynamic(
             "the plant cannot be simulated from any initial guess. Check the bounds and the initial conditions."
         )
     return _build_result(problem, np.array([x for x, _ in outcomes]), np.array([c for _, c in outcomes]))
+
+
+def fit_tube(
+    plant: Plant, fitted: Callable[[Plant, str], DynamicFit], segments: Sequence[int] = SEGMENTS
+) -> DynamicFit:
+    """The fit with the number of segments of the tube of a plant by AICc, the fewest of equivalent ones.
+
+    plant   a plant with a `Tube`, initial values
+    fitted  the fit of a plant whose pressure sensor is in the first segment, `tube.pressure` or `tube1.pressure`
+
+    Several segments have the flow law of friction, a critical ratio of 0, for which the division of a `Tube` is exact;
+    the number is no further unknown. One with which no fit is found is left out. Raises ParameterError for a plant
+    without such a tube, and the error of the last fit if there is none.
+    """
+    circuit = plant.circuit
+    if not isinstance(circuit, WithTubes) or not isinstance(circuit.tube, Tube):
+        raise ParameterError(
+            "fit_tube: the plant has no Tube between valves and muscle; write WithTubes(circuit, Tube(...))."
+        )
+    found: list[tuple[float, DynamicFit]] = []
+    failure: AirmuscleError | None = None
+    for count in segments:
+        tube = dataclasses.replace(circuit.tube, segment_count=count)
+        if count > 1 and isinstance(tube.orifice, Valve):
+            tube = dataclasses.replace(tube, orifice=dataclasses.replace(tube.orifice, critical_ratio=0.0))
+        sensor = f"{tube.prefixes[0]}pressure"
+        try:
+            fit = fitted(dataclasses.replace(plant, circuit=dataclasses.replace(circuit, tube=tube)), sensor)
+        except AirmuscleError as error:
+            failure = error
+            continue
+        size = count_readings(fit.problem.record_models)
+        found.append((aicc(fit.residual_std**2, size, len(fit.estimates)), fit))
+    if not found:
+        raise failure or ParameterError("fit_tube: segments is empty; give at least one number.")
+    lowest = min(value for value, _ in found)
+    return next(fit for value, fit in found if value <= lowest + EQUIVALENT)
 
 
 def _solve_all(problem: DynamicFitProblem, guesses: Sequence[Array]) -> list[tuple[Array, float]]:

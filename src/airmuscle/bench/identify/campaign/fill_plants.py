@@ -1,0 +1,106 @@
+"""Plants of the fills and discharges of a campaign: a held muscle behind valves, with a supply and perhaps a tube."""
+
+import dataclasses
+
+import numpy as np
+
+from ....physics.mechanism import Isometric
+from ....physics.muscle import Muscle
+from ....physics.muscle.geometry import Vessel
+from ....physics.plant.plant import Plant
+from ....physics.pneumatics import Circuit, EnergyBalance, FillDischarge, Supply, Tank, Tube, Valve, WithTubes
+from ..dynamic import stated_ambient
+from .record import CampaignRecord
+
+ASSUMED_CONDUCTANCE = 1e-8
+"""Conductance [m3/(s Pa)] for which the relative volumes are fitted (chosen)."""
+HEAT_TRANSFER_BOUNDS = (1e-3, 1e3)
+"""Bounds of the heat transfer [W/K] (chosen)."""
+
+
+def held_contraction(record: CampaignRecord) -> float:
+    """The contraction at which the muscle is held."""
+    return float(np.median(record.recording["contraction"]))
+
+
+def vessel_plant(record: CampaignRecord) -> Plant:
+    """The plant of a held muscle, with initial values from the steps of the record and the ambient air it states."""
+    rising = [step for step in record.steps if step.change > 0]
+    top = max(step.final_pressure for step in record.steps) if rising else float(record.recording["pressure"][0])
+    duration = float(np.mean([step.duration for step in record.steps]))
+    volume = ASSUMED_CONDUCTANCE * 1e5 * duration / 1.2
+    muscle = Muscle.ideal(Vessel(min(max(volume, 2e-7), 5e-2), record.resting_length or 0.2))
+    valve = Valve(ASSUMED_CONDUCTANCE, 0.35)
+    circuit = FillDischarge(Supply(top + 5e3), valve, valve)
+    return Plant(
+        muscle, circuit, Isometric(held_contraction(record)), EnergyBalance(1.0), stated_ambient(record.recording)
+    )
+
+
+def circuit_of(plant: object) -> Circuit:
+    """The one circuit of a plant."""
+    assert isinstance(plant, Plant)
+    return plant.circuits[0]
+
+
+def valves_of(circuit: object) -> FillDischarge:
+    """The circuit of the valves, without a tube."""
+    valves = circuit.circuit if isinstance(circuit, WithTubes) else circuit
+    assert isinstance(valves, FillDischarge)
+    return valves
+
+
+def with_valves(circuit: object, valves: FillDischarge) -> Circuit:
+    """The circuit with other valves."""
+    return dataclasses.replace(circuit, circuit=valves) if isinstance(circuit, WithTubes) else valves
+
+
+def rescaled(plant: object, scale: float) -> Plant:
+    """The plant with its conductances, heat transfer and volumes of supply and tube multiplied by the scale."""
+    assert isinstance(plant, Plant)
+    whole, circuit, gas = plant.circuit, valves_of(plant.circuit), plant.gas
+    assert isinstance(gas, EnergyBalance)
+    if isinstance(whole, WithTubes):
+        tube = whole.tube
+        assert isinstance(tube, Tube)
+        assert isinstance(tube.orifice, Valve)
+        orifice = dataclasses.replace(tube.orifice, conductance=tube.orifice.conductance * scale)
+        whole = dataclasses.replace(whole, tube=dataclasses.replace(tube, volume=tube.volume * scale, orifice=orifice))
+    supply = circuit.supply
+    if isinstance(supply, Tank) and isinstance(supply.feed, Valve):
+        feed = dataclasses.replace(supply.feed, conductance=supply.feed.conductance * scale)
+        supply = dataclasses.replace(supply, feed=feed, volume=supply.volume * scale)
+    fill, discharge = (
+        dataclasses.replace(valve, conductance=valve.conductance * scale)
+        for valve in (circuit.fill, circuit.discharge)
+        if isinstance(valve, Valve)
+    )
+    return dataclasses.replace(
+        plant,
+        circuit=with_valves(whole, dataclasses.replace(circuit, supply=supply, fill=fill, discharge=discharge)),
+        gas=dataclasses.replace(gas, heat_transfer=float(np.clip(gas.heat_transfer * scale, *HEAT_TRANSFER_BOUNDS))),
+    )
+
+
+def at_record(plant: Plant, record: CampaignRecord, volume: float) -> Plant:
+    """The plant with this volume [m3], at the held length and in the ambient air of a record."""
+    vessel = Vessel(volume, plant.muscles[0].geometry.resting_length)
+    return dataclasses.replace(
+        plant, muscle=Muscle.ideal(vessel), mechanism=Isometric(held_contraction(record)),
+        ambient=stated_ambient(record.recording),
+    )  # fmt: skip
+
+
+def tube_guess(plant: object) -> Tube:
+    """Initial guess of a tube for a plant without one (chosen): a tenth of its volume, twice the conductance."""
+    assert isinstance(plant, Plant)
+    valve = valves_of(plant.circuit).fill
+    assert isinstance(valve, Valve)
+    volume = min(max(0.1 * float(plant.muscles[0].geometry.volume(0.0)), 1e-9), 1e-2)
+    return Tube(Valve(2.0 * valve.conductance, 0.3), volume)
+
+
+def sensor_of(plant: object) -> str:
+    """The output at the pressure sensor of a plant, which is behind the valves: in the first segment of a tube."""
+    circuit = plant.circuit if isinstance(plant, Plant) else None
+    return f"{circuit.tube.prefixes[0]}pressure" if isinstance(circuit, WithTubes) else "pressure"
