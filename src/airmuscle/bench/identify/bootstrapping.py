@@ -72,15 +72,9 @@ class Bootstrap(ShortRepr):
 
 
 def bootstrap(
-    fit: Fit,
-    recordings: Recording | Sequence[Recording],
-    *,
-    refits: int = 1000,
-    by: GroupSplit | None = None,
-    seed: int = 0,
-    progress: Callable[[float], None] | None = None,
-    workers: Workers = 1,
-) -> Bootstrap:
+    fit: Fit, recordings: Recording | Sequence[Recording], *, refits: int = 1000, by: GroupSplit | None = None,
+    seed: int = 0, progress: Callable[[float], None] | None = None, workers: Workers = 1,
+) -> Bootstrap:  # fmt: skip
     """Refit a law to groups of its data drawn with replacement (Efron and Tibshirani (1993), An Introduction to the
     Bootstrap, chapter 9).
 

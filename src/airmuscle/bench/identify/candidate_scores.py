@@ -199,14 +199,9 @@ Scores = list[tuple[Score, ...]]
 
 
 def score_candidates(
-    candidates: Sequence[Candidate],
-    splits: Sequence[ComparedPoints],
-    loss: Loss,
-    workers: Workers,
-    progress: Progress | None,
-    *,
-    can_exclude: bool,
-) -> Scores:
+    candidates: Sequence[Candidate], splits: Sequence[ComparedPoints], loss: Loss, workers: Workers,
+    progress: Progress | None, *, can_exclude: bool,
+) -> Scores:  # fmt: skip
     """The scores of each candidate for each split, in the order of the candidates.
 
     With `can_exclude` the laws that are not linear in all parameters, whose fits take longest, are scored last, and not

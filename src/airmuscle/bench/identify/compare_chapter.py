@@ -52,13 +52,9 @@ class JointSelection(ShortRepr):
 
 
 def select_for_both(
-    recordings: Sequence[Recording],
-    candidates: Sequence[Candidate] | None = None,
-    *,
-    loss: Loss = LeastSquares(),
-    workers: Workers = 1,
-    progress: Callable[[str, float], None] | None = None,
-) -> JointSelection:
+    recordings: Sequence[Recording], candidates: Sequence[Candidate] | None = None, *, loss: Loss = LeastSquares(),
+    workers: Workers = 1, progress: Callable[[str, float], None] | None = None,
+) -> JointSelection:  # fmt: skip
     """One law for further runs (leave-one-run-out) and for other muscles (leave-one-specimen-out cross-validation).
 
     candidates  by default `standard_candidates`, of which slow laws may be excluded as in `compare`
@@ -108,15 +104,10 @@ class LawSelection:
 
 
 def select_law(
-    recordings: Sequence[Recording],
-    candidates: Sequence[Candidate] | None = None,
-    *,
-    leave_out: GroupSplit | None = None,
-    both: bool | None = None,
-    loss: Loss = LeastSquares(),
-    workers: Workers = 1,
+    recordings: Sequence[Recording], candidates: Sequence[Candidate] | None = None, *,
+    leave_out: GroupSplit | None = None, both: bool | None = None, loss: Loss = LeastSquares(), workers: Workers = 1,
     progress: Callable[[str, float], None] | None = None,
-) -> LawSelection:
+) -> LawSelection:  # fmt: skip
     """The law for the purpose of a split, or one law for further runs and for other muscles.
 
     candidates  as in `compare`

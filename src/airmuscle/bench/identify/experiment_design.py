@@ -146,14 +146,9 @@ def run_table(runs: Sequence[PlannedRun], name: str, title: str) -> Table:
 
 
 def optimal_design(
-    characteristic: Characteristic,
-    bench: BenchLimits,
-    *,
-    runs: int = 6,
-    points: int = 15,
-    sigma: float = 1.0,
+    characteristic: Characteristic, bench: BenchLimits, *, runs: int = 6, points: int = 15, sigma: float = 1.0,
     fixed: Collection[str] = (),
-) -> ExperimentPlan:
+) -> ExperimentPlan:  # fmt: skip
     """The D-optimal isobaric and isometric runs for fitting a characteristic, linearised at its present parameters.
 
     runs    number of runs

@@ -111,13 +111,9 @@ class FitPoints:
         return force_limits(self.recordings)
 
     def problem(
-        self,
-        characteristic: Characteristic,
-        *,
-        censoring: Censoring | None = None,
-        sigma: npt.ArrayLike | None = None,
+        self, characteristic: Characteristic, *, censoring: Censoring | None = None, sigma: npt.ArrayLike | None = None,
         fixed: Collection[str] = (),
-    ) -> FitProblem:
+    ) -> FitProblem:  # fmt: skip
         """The problem of fitting a law to these points; arguments as for `fit`. Raises IdentificationError."""
         law = _with_validity_range(_with_length(characteristic, self.data), self.data)
         if sigma is None:

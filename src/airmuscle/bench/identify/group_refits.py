@@ -23,15 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core import Array
-from .gauss_newton import (
-    MIN_EIGENVALUE,
-    FirstStep,
-    gauss_newton,
-    held_on_bounds,
-    normal_equations,
-    normal_step,
-    orthonormal_basis,
-)
+from . import gauss_newton as steps
 from .model_evidence import student_quantile
 from .problem import FitProblem
 from .solver import LeastSquaresSolution, is_linear
@@ -144,8 +136,8 @@ class GroupRefits:
         self._active = problem.active_rows(solution.modelled)
         weighted = problem.weights[:, None] * solution.jacobian
         residuals = problem.residuals(solution.modelled)
-        free = ~held_on_bounds(problem, solution.values, weighted.T @ residuals)
-        basis = orthonormal_basis(weighted[self._active], free)
+        free = ~steps.held_on_bounds(problem, solution.values, weighted.T @ residuals)
+        basis = steps.orthonormal_basis(weighted[self._active], free)
         self._basis = basis
         if basis is not None:
             self._rows = weighted @ basis.directions
@@ -162,7 +154,7 @@ class GroupRefits:
         if self._basis is None or not self._is_determined(counts):
             return None
         normal, gradient = (np.tensordot(counts, part, 1) for part in (self._sums.normal, self._sums.gradient))
-        step = normal_step(normal, gradient)
+        step = steps.normal_step(normal, gradient)
         if step is None:
             return None
         if not self._linear:
@@ -176,7 +168,7 @@ class GroupRefits:
         sums = _Sums(*(np.zeros(shape) for shape in ((count, size, size),) * 2 + ((count, size), (count,))))
         for i in range(count):
             rows = self._group == i
-            sums.normal[i], sums.gradient[i] = normal_equations(masked[rows], residuals[rows])
+            sums.normal[i], sums.gradient[i] = steps.normal_equations(masked[rows], residuals[rows])
             sums.squares[i] = float(residuals[rows] @ residuals[rows])
             measured = self._rows[rows & uncensored]
             sums.uncensored[i] = measured.T @ measured
@@ -185,7 +177,7 @@ class GroupRefits:
     def _is_determined(self, counts: Array) -> bool:
         """Whether the uncensored rows determine all parameters, by a lower bound of the scaled singular values."""
         lowest = float(np.linalg.eigvalsh(np.tensordot(counts, self._sums.uncensored, 1))[0])
-        return lowest > MIN_EIGENVALUE and np.sqrt(lowest) * self._smallest > _RANK_MARGIN * RANK_TOLERANCE
+        return lowest > steps.MIN_EIGENVALUE and np.sqrt(lowest) * self._smallest > _RANK_MARGIN * RANK_TOLERANCE
 
     def _solve_linear(self, counts: Array, step: Array, normal: Array, gradient: Array) -> Array | None:
         """Newton steps of the one-sided squares: the rows whose bound is violated are those of the previous step.
@@ -206,7 +198,7 @@ class GroupRefits:
             changed = np.flatnonzero(active != self._active)
             rows = self._rows[changed]
             added = rows * np.where(active[changed], repeats[changed], -repeats[changed])[:, None]
-            next_step = normal_step(normal + rows.T @ added, gradient + added.T @ difference[changed])
+            next_step = steps.normal_step(normal + rows.T @ added, gradient + added.T @ difference[changed])
             if next_step is None:
                 return None
             step, previous = next_step, active
@@ -219,6 +211,6 @@ class GroupRefits:
         drawn = repeats > 0
         problem = self._problem.rows(drawn)
         problem = dataclasses.replace(problem, weights=problem.weights * np.sqrt(repeats[drawn]))
-        first = FirstStep(self._basis, step, float(counts @ self._sums.squares)) if start is None else None
-        solution = gauss_newton(problem, self._solution.values if start is None else start, first, RELATIVE_STEP)
+        first = steps.FirstStep(self._basis, step, float(counts @ self._sums.squares)) if start is None else None
+        solution = steps.gauss_newton(problem, self._solution.values if start is None else start, first, RELATIVE_STEP)
         return None if solution is None else solution[0]

@@ -113,12 +113,9 @@ def singular_vectors(matrix: Array) -> tuple[Array, Array]:
 
 
 def analyse_identifiability(
-    sensitivities: Array,
-    names: Sequence[str],
-    scales: Array,
-    residual_std: float = 1.0,
+    sensitivities: Array, names: Sequence[str], scales: Array, residual_std: float = 1.0,
     tolerance: float = RANK_TOLERANCE,
-) -> Identifiability:
+) -> Identifiability:  # fmt: skip
     """The identifiability of parameters from a sensitivity matrix (R, P) of residuals in standard deviations.
 
     scales        magnitudes of the parameters, shape (P,)

@@ -217,14 +217,10 @@ def _unranked(name: str, title: str, models: Sequence[ExcludedModel], brief: int
 
 
 def compare(
-    recordings: Recording | Sequence[Recording],
-    candidates: Sequence[Candidate] | None = None,
-    *,
-    leave_out: GroupSplit | None = None,
-    loss: Loss = LeastSquares(),
-    workers: Workers = 1,
+    recordings: Recording | Sequence[Recording], candidates: Sequence[Candidate] | None = None, *,
+    leave_out: GroupSplit | None = None, loss: Loss = LeastSquares(), workers: Workers = 1,
     progress: Callable[[str, float], None] | None = None,
-) -> Comparison:
+) -> Comparison:  # fmt: skip
     """Fit all candidates, rank them by their cross-validated error in force, and recommend one.
 
     candidates  by default `standard_candidates`, the laws whose initial values follow from the data; of these, a law
@@ -252,14 +248,9 @@ def compare(
 
 
 def compare_splits(
-    runs: Sequence[Recording],
-    candidates: Sequence[Candidate] | None,
-    splits: Sequence[GroupSplit],
-    *,
-    loss: Loss = LeastSquares(),
-    workers: Workers = 1,
-    progress: Callable[[str, float], None] | None = None,
-) -> tuple[Comparison, ...]:
+    runs: Sequence[Recording], candidates: Sequence[Candidate] | None, splits: Sequence[GroupSplit], *,
+    loss: Loss = LeastSquares(), workers: Workers = 1, progress: Callable[[str, float], None] | None = None,
+) -> tuple[Comparison, ...]:  # fmt: skip
     """A comparison for each split, as `compare`; every candidate is fitted once to all rows."""
     points = points_of_splits(runs, splits)
     compared = standard_candidates(runs) if candidates is None else candidates

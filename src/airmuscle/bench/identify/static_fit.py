@@ -11,6 +11,7 @@ from ...physics.muscle.characteristic import Characteristic, PooledLengthLaw
 from ...recording import Recording
 from ..checks import find_suspicious
 from ..checks.contractions import MAX_CONTRACTION
+from . import statistics as stats
 from .fit_notes import Examination, collect_notes, loss_scale_notes, weighting_notes
 from .fit_points import FitPoints
 from .gauss_newton import gauss_newton
@@ -19,16 +20,6 @@ from .problem import FitProblem, evaluate
 from .result import Estimate, Fit
 from .slack import solve_bounded
 from .solver import LeastSquaresSolution, is_linear
-from .statistics import (
-    FitStatistics,
-    WorstPoint,
-    check_determined,
-    check_determined_by_levels,
-    compute_statistics,
-    correlation_index,
-    rms_of_rows,
-    row_errors,
-)
 from .variable_projection import find_initial_values
 from .weighting import Censoring, LeastSquares, Loss
 
@@ -61,14 +52,9 @@ def _initial_law(argument: object) -> str:
 
 
 def fit(
-    law: Characteristic,
-    recordings: Recording | Sequence[Recording],
-    *,
-    loss: Loss = LeastSquares(),
-    censoring: Censoring | None = None,
-    sigma: npt.ArrayLike | None = None,
-    fixed: Collection[str] = (),
-) -> Fit:
+    law: Characteristic, recordings: Recording | Sequence[Recording], *, loss: Loss = LeastSquares(),
+    censoring: Censoring | None = None, sigma: npt.ArrayLike | None = None, fixed: Collection[str] = (),
+) -> Fit:  # fmt: skip
     """Estimate the parameters of a law from measured points.
 
     law         structure and initial values; parameters declared as not fitted keep their value
@@ -101,14 +87,9 @@ def _with_remarks(error: IdentificationError, points: FitPoints) -> Identificati
 
 
 def fit_to_points(
-    law: Characteristic,
-    points: FitPoints,
-    *,
-    loss: Loss = LeastSquares(),
-    censoring: Censoring | None = None,
-    sigma: npt.ArrayLike | None = None,
-    fixed: Collection[str] = (),
-) -> Fit:
+    law: Characteristic, points: FitPoints, *, loss: Loss = LeastSquares(), censoring: Censoring | None = None,
+    sigma: npt.ArrayLike | None = None, fixed: Collection[str] = (),
+) -> Fit:  # fmt: skip
     """As `fit`, for points whose sensors and runs are estimated once for several laws."""
     if np.nanmax(points.joined["contraction"], initial=0.0) > MAX_CONTRACTION:
         _ = points.checks  # raises ColumnError where no muscle is so short
@@ -124,8 +105,8 @@ def _fit_law(
 ) -> Fit:  # fmt: skip
     problem = points.problem(law, censoring=censoring, sigma=sigma, fixed=fixed)
     solution = solve_bounded(problem, points, loss)
-    statistics = compute_statistics(problem, solution, loss, points.runs)
-    check_determined_by_levels(problem, solution, points.at_levels)
+    statistics = stats.compute_statistics(problem, solution, loss, points.runs)
+    stats.check_determined_by_levels(problem, solution, points.at_levels)
     by_recording = None if sigma is not None else points.deviations(problem.fitted_quantity.name)
     notes = (*collect_notes(problem, statistics, loss, points.dropped), *weighting_notes(by_recording, problem))
     notes += loss_scale_notes(problem, solution, loss)
@@ -153,24 +134,20 @@ def refit(
         )
     except IdentificationError:
         solution = solve_bounded(problem, points, loss)
-    check_determined(problem, solution)
+    stats.check_determined(problem, solution)
     model: Characteristic = tree.with_parameters(problem.law, problem.leaf_values(solution.values))
     return model
 
 
 def _build_result(
-    problem: FitProblem,
-    solution: LeastSquaresSolution,
-    statistics: FitStatistics,
-    loss: Loss,
-    dropped: int,
+    problem: FitProblem, solution: LeastSquaresSolution, statistics: stats.FitStatistics, loss: Loss, dropped: int,
     examination: Examination,
-) -> Fit:
+) -> Fit:  # fmt: skip
     data, quantity = problem.data, problem.fitted_quantity.name
     model = tree.with_parameters(problem.law, problem.leaf_values(solution.values))
     clamped = evaluate(model, quantity, problem.fitted_quantity.arguments, data)
     measured = problem.censoring == 0
-    errors = row_errors(problem, clamped)
+    errors = stats.row_errors(problem, clamped)
     varies = bool(np.ptp(data[quantity][measured]) > 0)
     return Fit(
         model=model,
@@ -180,9 +157,9 @@ def _build_result(
         rank=statistics.rank,
         condition=statistics.condition,
         sigma=statistics.sigma,
-        rmse=rms_of_rows(errors, measured),
-        max_error=WorstPoint.of(errors, data),
-        correlation_index=correlation_index(data[quantity][measured], clamped[measured]) if varies else None,
+        rmse=stats.rms_of_rows(errors, measured),
+        max_error=stats.WorstPoint.of(errors, data),
+        correlation_index=stats.correlation_index(data[quantity][measured], clamped[measured]) if varies else None,
         rows_censored=int(np.count_nonzero(~measured)),
         rows_dropped=dropped,
         recording=data,
@@ -195,7 +172,7 @@ def _build_result(
 
 
 def _build_estimates(
-    problem: FitProblem, solution: LeastSquaresSolution, statistics: FitStatistics
+    problem: FitProblem, solution: LeastSquaresSolution, statistics: stats.FitStatistics
 ) -> tuple[Estimate, ...]:
     leaves = (problem.leaves[i] for i in problem.free)
     columns = zip(

@@ -143,14 +143,10 @@ def _main_length(records: Sequence[CampaignRecord]) -> float | None:
 
 
 def identify_campaign(
-    recordings: Sequence[Recording],
-    *,
-    geometry: Geometry | None = None,
-    progress: Callable[[str, float], None] | None = None,
-    finished: Callable[[str, object], None] | None = None,
-    known: Mapping[str, Any] | None = None,
-    workers: Workers = 1,
-) -> Campaign:
+    recordings: Sequence[Recording], *, geometry: Geometry | None = None,
+    progress: Callable[[str, float], None] | None = None, finished: Callable[[str, object], None] | None = None,
+    known: Mapping[str, Any] | None = None, workers: Workers = 1,
+) -> Campaign:  # fmt: skip
     """Identify one muscle from all recordings of a rig.
 
     The records are sorted by kind. Creep is fitted to holds; friction to loops freed of creep; the static

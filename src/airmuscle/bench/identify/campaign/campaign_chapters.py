@@ -107,13 +107,9 @@ class ValidationRow:
 
 
 def campaign_chapters(
-    campaign: Campaign,
-    entry: MuscleDescription | None,
-    *,
-    unread: Sequence[UnreadFile] = (),
-    scenarios: Sequence[tuple[str, str]] = (),
-    validation: Sequence[ValidationRow] = (),
-) -> list[Chapter]:
+    campaign: Campaign, entry: MuscleDescription | None, *, unread: Sequence[UnreadFile] = (),
+    scenarios: Sequence[tuple[str, str]] = (), validation: Sequence[ValidationRow] = (),
+) -> list[Chapter]:  # fmt: skip
     """Return the chapters of a campaign; `scenarios` are pairs of a record and its scenario file or the reason."""
     stages = [stage for _, stage in campaign.stages]
     chapters = [_predictions(campaign)]

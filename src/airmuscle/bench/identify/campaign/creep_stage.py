@@ -208,12 +208,9 @@ def _standard_errors(holds: Sequence[HeldRows], times: Array, coefficients: Arra
 
 
 def _build(
-    holds: Sequence[HeldRows],
-    elements: CreepElements,
-    standard_errors: Array,
-    fits: tuple[tuple[str, CreepFit], ...],
+    holds: Sequence[HeldRows], elements: CreepElements, standard_errors: Array, fits: tuple[tuple[str, CreepFit], ...],
     modelled: Sequence[Array],
-) -> CreepStage:
+) -> CreepStage:  # fmt: skip
     measured = [hold.recording["force"] for hold in holds]
     residuals = np.concatenate([a - b for a, b in zip(modelled, measured, strict=True)])
     times = [hold.recording["time"] - hold.recording["time"][0] for hold in holds]

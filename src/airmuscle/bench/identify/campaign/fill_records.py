@@ -9,15 +9,7 @@ from ....engine.loop.inputs import Schedule
 from ....physics.plant.plant import Plant
 from ....physics.pneumatics import Circuit, Tank, Valve, WithTubes
 from ...baselines import ARX, PERSISTENCE, TimedRecord, baseline_errors, skill
-from ..dynamic import (
-    CommandInstants,
-    DynamicFit,
-    Experiment,
-    InitialConditions,
-    StartTime,
-    commands_at,
-    fit_dynamic,
-)
+from .. import dynamic
 from ..result import Estimate
 from .fill_plants import HEAT_TRANSFER_BOUNDS, sensor_of, valves_of
 from .record import CampaignRecord
@@ -87,7 +79,7 @@ class ValveUnknowns:
         return [f"No record is a {missing}: the {missing} valve is supposed to be equal to the {shown} valve."]
 
 
-def poor_ratios(fit: DynamicFit) -> str:
+def poor_ratios(fit: dynamic.DynamicFit) -> str:
     """The critical ratios that a fit does not determine, as a sentence; empty if there are none."""
     poor = [
         e
@@ -126,7 +118,7 @@ def instant_margin(records: Sequence[CampaignRecord]) -> float:
     return max(0.25 * min(step.duration for r in records for step in r.steps), 2.0 * sample)
 
 
-def with_supply_volume(experiment: Experiment) -> Experiment:
+def with_supply_volume(experiment: dynamic.Experiment) -> dynamic.Experiment:
     """The experiment with a volume before its valve that is fed from the supply; initial guess (chosen)."""
     plant = experiment.plant
     assert isinstance(plant, Plant)
@@ -137,16 +129,16 @@ def with_supply_volume(experiment: Experiment) -> Experiment:
     return with_circuit(experiment, dataclasses.replace(circuit, supply=tank))
 
 
-def with_circuit(experiment: Experiment, circuit: Circuit) -> Experiment:
+def with_circuit(experiment: dynamic.Experiment, circuit: Circuit) -> dynamic.Experiment:
     """The experiment with another circuit; the recorded pressure is that behind the valves."""
     assert isinstance(experiment.plant, Plant)
     plant = dataclasses.replace(experiment.plant, circuit=circuit)
-    initial = InitialConditions.at_rest(plant, experiment.initial_conditions.known["pressure"])
+    initial = dynamic.InitialConditions.at_rest(plant, experiment.initial_conditions.known["pressure"])
     recording = experiment.recording.with_columns(**{sensor_of(plant): experiment.recording["pressure"]})
     return dataclasses.replace(experiment, recording=recording, plant=plant, initial_conditions=initial)
 
 
-def describe_tube(fit: DynamicFit) -> str:
+def describe_tube(fit: dynamic.DynamicFit) -> str:
     """The tube between valves and muscle, as a sentence."""
     volume, conductance = fit[TUBE_VOLUME], fit[TUBE_CONDUCTANCE]
     plant = fit.plant()
@@ -161,7 +153,7 @@ def describe_tube(fit: DynamicFit) -> str:
     )
 
 
-def describe_supply(fit: DynamicFit) -> str:
+def describe_supply(fit: dynamic.DynamicFit) -> str:
     """The volume before the valve, as a sentence."""
     names = ("supply.volume", "supply.feed.conductance")
     volume, feed = (next(e for e in fit.estimates if e.name.endswith(name)) for name in names)
@@ -185,48 +177,48 @@ def valve_commands(record: CampaignRecord) -> dict[str, tuple[tuple[float, float
     return {name: tuple(values) for name, values in points.items() if values}
 
 
-def detected_experiment(record: CampaignRecord, plant: Plant) -> Experiment:
+def detected_experiment(record: CampaignRecord, plant: Plant) -> dynamic.Experiment:
     """The record with the detected instants of its steps."""
     recording = thin(record.recording, FIT_ROWS)
     began = record.steps[0].start
     before = record.recording["time"] < began
     pressure = record.recording["pressure"]
     initial = float(np.median(pressure[before])) if before.sum() >= 3 else float(pressure[0])
-    conditions = InitialConditions.at_rest(plant, initial)
+    conditions = dynamic.InitialConditions.at_rest(plant, initial)
     recording = recording.with_columns(**{sensor_of(plant): recording["pressure"]})
-    return Experiment(recording, Schedule(valve_commands(record)), conditions, began, plant)
+    return dynamic.Experiment(recording, Schedule(valve_commands(record)), conditions, began, plant)
 
 
-def with_instants(experiment: Experiment, fit: DynamicFit, number: int) -> Experiment:
+def with_instants(experiment: dynamic.Experiment, fit: dynamic.DynamicFit, number: int) -> dynamic.Experiment:
     """The experiment with the instants that a fit has found for it as its record of this number."""
     model = fit.problem.record_models[number]
     return dataclasses.replace(experiment, command=model.command(fit.values), start_time=model.start_time(fit.values))
 
 
 def fit_pressure(
-    records: Sequence[CampaignRecord], experiments: Sequence[Experiment], free: Sequence[str | tuple[str, ...]],
+    records: Sequence[CampaignRecord], experiments: Sequence[dynamic.Experiment], free: Sequence[str | tuple[str, ...]],
     own: tuple[str, ...] = (),
-) -> DynamicFit:  # fmt: skip
+) -> dynamic.DynamicFit:  # fmt: skip
     """A fit with the heat transfer, and own instants of the valve commands, because the detected ones are inexact."""
     first, margin = experiments[0].plant, instant_margin(records)
     assert first is not None
-    return fit_dynamic(
+    return dynamic.fit_dynamic(
         first, experiments, free=(HEAT_TRANSFER, *free), observed={sensor_of(first): pressure_deviation(records)},
-        per_record=(*own, StartTime(margin), CommandInstants(margin)), bounds={HEAT_TRANSFER: HEAT_TRANSFER_BOUNDS},
-        starts=TUBE_STARTS if TUBE_VOLUME in free else 1,
+        per_record=(*own, dynamic.StartTime(margin), dynamic.CommandInstants(margin)),
+        bounds={HEAT_TRANSFER: HEAT_TRANSFER_BOUNDS}, starts=TUBE_STARTS if TUBE_VOLUME in free else 1,
     )  # fmt: skip
 
 
-def record_rms(fit: DynamicFit) -> tuple[float, ...]:
+def record_rms(fit: dynamic.DynamicFit) -> tuple[float, ...]:
     """Rms residual of the pressure of each record [Pa]."""
     return tuple(fit.rms(model.names[0], i) for i, model in enumerate(fit.problem.record_models))
 
 
-def fill_baselines(fit: DynamicFit) -> tuple[dict[str, float], ...]:
+def fill_baselines(fit: dynamic.DynamicFit) -> tuple[dict[str, float], ...]:
     """Rms errors [Pa] of the pressure of each record by persistence and by an ARX model of the others."""
     records, values = [], fit.values
     for model in fit.problem.record_models:
-        commands = commands_at(model.plant, model.command(values), model.times - model.start_time(values))
+        commands = dynamic.commands_at(model.plant, model.command(values), model.times - model.start_time(values))
         records.append(TimedRecord(model.times, model.measured, commands, model.valid))
     return tuple({name: float(rms[0]) for name, rms in each.items()} for each in baseline_errors(records))
 

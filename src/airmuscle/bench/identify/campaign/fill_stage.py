@@ -200,12 +200,9 @@ class _RelativeFit:
 
 
 def _fit_jointly(
-    records: Sequence[CampaignRecord],
-    experiments: Sequence[Experiment],
-    geometry: Geometry,
-    estimate: VolumeEstimate | None,
-    progress: Callable[[float], None],
-) -> FillStage:
+    records: Sequence[CampaignRecord], experiments: Sequence[Experiment], geometry: Geometry,
+    estimate: VolumeEstimate | None, progress: Callable[[float], None],
+) -> FillStage:  # fmt: skip
     """The fit with the volumes of one curve, and the prediction of each record from the others."""
     everything = range(len(records))
     valves = fills.ValveUnknowns.of(records, experiments[0].plant)

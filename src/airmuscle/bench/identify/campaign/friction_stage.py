@@ -13,17 +13,8 @@ from ....physics.muscle import CreepElements
 from ....physics.muscle.friction import Friction, NoFriction
 from ....recording import Recording
 from ...segment.sensor import estimate_noise
+from .. import hysteresis
 from ..candidates import evaluate_force
-from ..hysteresis import (
-    HysteresisLoop,
-    JointFit,
-    LoopFit,
-    find_loops,
-    fit_jointly,
-    fit_loop,
-    identified_friction,
-    preferred_fit,
-)
 from .creep_stage import creep_force
 from .record import CampaignRecord, RecordKind
 from .transient import PREDICTED_ROWS, LeftOutStage, displacement, held_steady, path_rows, with_force
@@ -39,15 +30,15 @@ class FrictionStage(ShortRepr):
 
     friction: Friction
     """With the range of its data; no friction where the loops justify none."""
-    loops: tuple[LoopFit, ...]
-    joint: tuple[JointFit, ...]
+    loops: tuple[hysteresis.LoopFit, ...]
+    joint: tuple[hysteresis.JointFit, ...]
     left_out: int = 0
     """Number of loops that were not fitted, because there are more than `MAX_LOOPS`."""
 
     @property
-    def selected(self) -> JointFit | None:
+    def selected(self) -> hysteresis.JointFit | None:
         """The joint fit whose friction is used; None without one."""
-        return preferred_fit(self.joint)
+        return hysteresis.preferred_fit(self.joint)
 
     @property
     def verdict(self) -> str:
@@ -85,25 +76,27 @@ def fit_friction_stage(
         count[0] += 1
         progress(0.5 + 0.5 * min(count[0] / 5.0, 1.0))
 
-    joint = fit_jointly(fits, progress=advance, workers=executor or 1)
-    best = preferred_fit(joint)
+    joint = hysteresis.fit_jointly(fits, progress=advance, workers=executor or 1)
+    best = hysteresis.preferred_fit(joint)
     return FrictionStage(_friction(best, fits), tuple(fits), joint, len(loops) - len(kept))
 
 
-def _fit_loop(_: None, loop: HysteresisLoop) -> LoopFit:
-    return fit_loop(loop)
+def _fit_loop(_: None, loop: hysteresis.HysteresisLoop) -> hysteresis.LoopFit:
+    return hysteresis.fit_loop(loop)
 
 
-def _friction(best: JointFit | None, fits: Sequence[LoopFit]) -> Friction:
+def _friction(best: hysteresis.JointFit | None, fits: Sequence[hysteresis.LoopFit]) -> Friction:
     if best is not None:
-        return identified_friction(best.friction, best.series)
+        return hysteresis.identified_friction(best.friction, best.series)
     only = fits[0].recommended if len(fits) == 1 else None
-    return NoFriction() if only is None else identified_friction(only.friction, (only.series,))
+    return NoFriction() if only is None else hysteresis.identified_friction(only.friction, (only.series,))
 
 
-def _find_loops(records: Sequence[CampaignRecord], creep: CreepElements) -> tuple[list[HysteresisLoop], list[str]]:
+def _find_loops(
+    records: Sequence[CampaignRecord], creep: CreepElements
+) -> tuple[list[hysteresis.HysteresisLoop], list[str]]:
     """The loops of each specimen; loops of different specimens are not repeats of each other."""
-    loops, failed = list[HysteresisLoop](), list[str]()
+    loops, failed = list[hysteresis.HysteresisLoop](), list[str]()
     by_length: dict[float | None, list[Recording]] = {}
     for record in records:
         if record.kind is RecordKind.ISOBARIC and record.resting_length is not None:
@@ -113,16 +106,16 @@ def _find_loops(records: Sequence[CampaignRecord], creep: CreepElements) -> tupl
         usable = []
         for recording in recordings:
             try:
-                find_loops([recording], all_rows=True)
+                hysteresis.find_loops([recording], all_rows=True)
             except AirmuscleError as error:
                 failed.append(error.message)
             else:
                 usable.append(recording)
-        loops += find_loops(usable, all_rows=True) if usable else ()
+        loops += hysteresis.find_loops(usable, all_rows=True) if usable else ()
     return loops, failed
 
 
-def _spread(loops: Sequence[HysteresisLoop]) -> list[HysteresisLoop]:
+def _spread(loops: Sequence[hysteresis.HysteresisLoop]) -> list[hysteresis.HysteresisLoop]:
     """At most `MAX_LOOPS` loops, at evenly spaced places in the order of their pressure."""
     ordered = sorted(loops, key=lambda loop: loop.run.constant_value or 0.0)
     places = np.unique(np.linspace(0, len(ordered) - 1, min(MAX_LOOPS, len(ordered))).round().astype(int))

@@ -21,12 +21,9 @@ MAX_OPTIMA = 8
 
 
 def dynamic_chapters(
-    fit: DynamicFit,
-    title: str,
-    profiles: Sequence[DynamicProfile] = (),
-    remarks: Sequence[str] = (),
+    fit: DynamicFit, title: str, profiles: Sequence[DynamicProfile] = (), remarks: Sequence[str] = (),
     cross: Sequence[CrossPrediction] = (),
-) -> list[Chapter]:
+) -> list[Chapter]:  # fmt: skip
     """Return the chapters of a dynamic fit: estimates and identifiability, profiles, and one chapter per record.
 
     `remarks` are sentences about the records, `cross` the predictions of each record by the others, which stand first.

@@ -140,12 +140,9 @@ class Unknown:
 
 
 def make_unknowns(
-    plant: System,
-    experiments: Sequence[Experiment],
-    free: Sequence[ParameterPaths],
-    per_record: Sequence[RecordUnknown],
-    bounds: Mapping[str, tuple[float, float]],
-) -> tuple[Unknown, ...]:
+    plant: System, experiments: Sequence[Experiment], free: Sequence[ParameterPaths],
+    per_record: Sequence[RecordUnknown], bounds: Mapping[str, tuple[float, float]],
+) -> tuple[Unknown, ...]:  # fmt: skip
     """The unknowns common to all records, then those of each record. Raises ParameterError for unknown names."""
     unknowns = [_plant_unknown(plant, paths, None, bounds) for paths in free]
     for i, experiment in enumerate(experiments):

@@ -37,17 +37,10 @@ after 14 simulations or fewer."""
 
 
 def fit_dynamic(
-    plant: System,
-    experiments: Sequence[Experiment],
-    *,
-    free: Sequence[ParameterPaths],
-    observed: Mapping[str, float],
-    per_record: Sequence[RecordUnknown] = (),
-    bounds: Mapping[str, tuple[float, float]] | None = None,
-    starts: int = 1,
-    seed: int = 0,
-    method: Integrator | None = None,
-) -> DynamicFit:
+    plant: System, experiments: Sequence[Experiment], *, free: Sequence[ParameterPaths], observed: Mapping[str, float],
+    per_record: Sequence[RecordUnknown] = (), bounds: Mapping[str, tuple[float, float]] | None = None, starts: int = 1,
+    seed: int = 0, method: Integrator | None = None,
+) -> DynamicFit:  # fmt: skip
     """Estimate plant parameters by weighted least squares over all records, with exact sensitivities.
 
     plant       structure and initial values; an experiment may replace it by a plant of the same structure

@@ -94,16 +94,9 @@ class RegulatorFit(Reported):
 
 
 def fit_regulator(
-    recordings: Sequence[Recording],
-    *,
-    supply_pressure: float,
-    volume: float = 1e-4,
-    noise: float = 1e3,
-    initial: PressureRegulator | None = None,
-    free: Sequence[str] = tuple(COMMANDS),
-    starts: int = 8,
-    seed: int = 0,
-) -> RegulatorFit:
+    recordings: Sequence[Recording], *, supply_pressure: float, volume: float = 1e-4, noise: float = 1e3,
+    initial: PressureRegulator | None = None, free: Sequence[str] = tuple(COMMANDS), starts: int = 8, seed: int = 0,
+) -> RegulatorFit:  # fmt: skip
     """Identify a regulator from recordings with the columns `setpoint` and `pressure` [Pa], by `fit_dynamic`.
 
     supply_pressure  gauge pressure of the supply [Pa]

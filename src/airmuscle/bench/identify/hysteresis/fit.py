@@ -117,14 +117,10 @@ def initial_friction_laws(path: Array, force: Array, elements: int = 8) -> tuple
 
 
 def fit_hysteresis(
-    friction: Friction,
-    recording: Recording,
-    *,
-    static_curve: StaticCurve,
-    friction_path: FrictionPath = ContractionPath(),
-    fitted_rows: RowMask | None = None,
+    friction: Friction, recording: Recording, *, static_curve: StaticCurve,
+    friction_path: FrictionPath = ContractionPath(), fitted_rows: RowMask | None = None,
     repeat: tuple[Recording, RowMask | None] | None = None,
-) -> HysteresisFit:
+) -> HysteresisFit:  # fmt: skip
     """Fit a friction law to the difference between a loop and its static curve, and test whether the data justify it.
 
     friction       the law with its initial parameters, see `initial_friction_laws`

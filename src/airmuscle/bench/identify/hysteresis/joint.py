@@ -147,12 +147,9 @@ def _f_test(smaller: Friction | None, larger: Friction, runs: Sequence[LoopSerie
 
 
 def _assess(
-    friction: Friction,
-    weak: tuple[UndeterminedCombination, ...],
-    scale_p_value: float,
-    own: Sequence[HysteresisFit],
+    friction: Friction, weak: tuple[UndeterminedCombination, ...], scale_p_value: float, own: Sequence[HysteresisFit],
     usable: Sequence[LoopFit],
-) -> JointFit:
+) -> JointFit:  # fmt: skip
     runs = [fit.series for fit in own]
     size = _sample_size(friction, runs)
     repeats = [

@@ -9,29 +9,9 @@ import numpy as np
 from ....core import AirmuscleWarning, Hint, HintedText, IdentificationError, ShortRepr
 from ....physics.muscle.characteristic.base import Characteristic
 from ....recording import Recording
-from ...segment import (
-    ISOBARIC,
-    ISOMETRIC,
-    Run,
-    Sensor,
-    estimate_sensors,
-    find_runs,
-    motion_direction,
-    quasi_static_rows,
-)
+from ... import segment
 from ...segment.runs import CONTRACTION_BAND, RELATIVE_BAND
-from .fit import (
-    ContractionPath,
-    FixedCharacteristic,
-    FrictionPath,
-    PolynomialCurve,
-    PressurePath,
-    RowMask,
-    StaticCurve,
-    fit_hysteresis,
-    initial_friction_laws,
-    make_loop_series,
-)
+from . import fit as loop_fit
 from .joint_result import preferred_fit
 from .limits import speed_reservation
 from .result import HysteresisFit
@@ -45,13 +25,13 @@ class HysteresisLoop(ShortRepr):
     """One run with a rising and a falling branch, the path of the friction, the static curve and the fitted rows."""
 
     recording: Recording
-    run: Run
-    friction_path: FrictionPath
-    static_curve: StaticCurve
-    fitted_rows: RowMask
+    run: segment.Run
+    friction_path: loop_fit.FrictionPath
+    static_curve: loop_fit.StaticCurve
+    fitted_rows: loop_fit.RowMask
     transient_rows: int = 0
     """Number of fitted rows in which the pressure changes quickly."""
-    repeat: tuple[Recording, RowMask] | None = None
+    repeat: tuple[Recording, loop_fit.RowMask] | None = None
     """A second run of the same kind at the same level, for validation, and its fitted rows."""
 
     @property
@@ -80,16 +60,13 @@ class LoopFit(ShortRepr):
     @property
     def usable_in_plant(self) -> bool:
         """Whether the friction acts along the contraction; friction along pressure describes isometric loops only."""
-        return isinstance(self.loop.friction_path, ContractionPath)
+        return isinstance(self.loop.friction_path, loop_fit.ContractionPath)
 
 
 def find_loops(
-    recordings: Sequence[Recording],
-    *,
-    law: Characteristic | None = None,
-    degree: int = CURVE_DEGREE,
+    recordings: Sequence[Recording], *, law: Characteristic | None = None, degree: int = CURVE_DEGREE,
     all_rows: bool = False,
-) -> tuple[HysteresisLoop, ...]:
+) -> tuple[HysteresisLoop, ...]:  # fmt: skip
     """The loops in the runs of recordings, one for each kind and level; a second run at a level validates the first.
 
     Each run with a rising and a falling branch gives a loop; if a recording has several runs, the loop is named after
@@ -102,7 +79,7 @@ def find_loops(
     quasi-static. Raises IdentificationError if no run gives a loop: each has one branch, or is neither isobaric nor
     isometric while no characteristic is given.
     """
-    sensors, loops, failed = estimate_sensors(recordings), list[HysteresisLoop](), list[IdentificationError]()
+    sensors, loops, failed = segment.estimate_sensors(recordings), list[HysteresisLoop](), list[IdentificationError]()
     empty = [recording.origin for recording in recordings if not len(recording)]
     failed += [IdentificationError(f"{origin}: the recording has no rows. Give one with a loop.") for origin in empty]
     each_run = [part for recording in recordings if len(recording) for part in _separate_runs(recording, sensors)]
@@ -133,47 +110,43 @@ def _is_repeat(first: HysteresisLoop, other: HysteresisLoop) -> bool:
     return constants[0] == constants[1] and _is_same_level(first.run, other.run)
 
 
-def _separate_runs(recording: Recording, sensors: Mapping[str, Sensor]) -> list[tuple[Recording, Run]]:
+def _separate_runs(recording: Recording, sensors: Mapping[str, segment.Sensor]) -> list[tuple[Recording, segment.Run]]:
     """The runs of a recording with two directions, each with its rows; the longest run if no run has two.
 
     Runs at one level belong together, and so do all rows of a recording with a single level.
     """
-    runs = find_runs(recording, sensors)
+    runs = segment.find_runs(recording, sensors)
     longest = max(runs, key=lambda run: len(run.interval))
-    if all(_is_same_level(longest, run) for run in runs) or longest.kind not in (ISOBARIC, ISOMETRIC):
+    if all(_is_same_level(longest, run) for run in runs) or longest.kind not in (segment.ISOBARIC, segment.ISOMETRIC):
         return [(recording, longest)]
     parts = [(_rows_of_run(recording, run), run) for run in runs]
     both = [(part, run) for part, run in parts if {1.0, -1.0} <= set(_directions(part, _path_of(run)))]
     return both or [(_rows_of_run(recording, longest), longest)]
 
 
-def _rows_of_run(recording: Recording, run: Run) -> Recording:
+def _rows_of_run(recording: Recording, run: segment.Run) -> Recording:
     """The rows of a run, named after the file and the rows."""
     origin = f"{recording.origin}, rows {run.interval.start + 1} to {run.interval.stop}"
     return dataclasses.replace(recording.rows(run.interval.rows), origin=origin)
 
 
-def _path_of(run: Run) -> FrictionPath:
-    return PressurePath() if run.kind == ISOMETRIC else ContractionPath()
+def _path_of(run: segment.Run) -> loop_fit.FrictionPath:
+    return loop_fit.PressurePath() if run.kind == segment.ISOMETRIC else loop_fit.ContractionPath()
 
 
-def _directions(recording: Recording, friction_path: FrictionPath) -> np.ndarray:
-    return motion_direction(friction_path.displacement(recording), recording.columns.get("time"))
+def _directions(recording: Recording, friction_path: loop_fit.FrictionPath) -> np.ndarray:
+    return segment.motion_direction(friction_path.displacement(recording), recording.columns.get("time"))
 
 
 def _make_loop(
-    recording: Recording,
-    run: Run,
-    sensors: Mapping[str, Sensor],
-    law: Characteristic | None,
-    degree: int,
-    all_rows: bool,
-) -> HysteresisLoop:
+    recording: Recording, run: segment.Run, sensors: Mapping[str, segment.Sensor], law: Characteristic | None,
+    degree: int, all_rows: bool,
+) -> HysteresisLoop:  # fmt: skip
     friction_path = _path_of(run)
     if law is not None:
-        static_curve: StaticCurve = FixedCharacteristic(law)
-    elif run.kind in (ISOBARIC, ISOMETRIC):
-        static_curve = PolynomialCurve("contraction" if run.kind == ISOBARIC else "pressure", degree)
+        static_curve: loop_fit.StaticCurve = loop_fit.FixedCharacteristic(law)
+    elif run.kind in (segment.ISOBARIC, segment.ISOMETRIC):
+        static_curve = loop_fit.PolynomialCurve("contraction" if run.kind == segment.ISOBARIC else "pressure", degree)
     else:
         raise IdentificationError(
             f"{recording.origin}: the run is {run.kind.name}, so pressure and contraction change together and the "
@@ -183,25 +156,27 @@ def _make_loop(
     rows = _select_rows(recording, sensors, all_rows)
     direction = _directions(recording, friction_path)
     _check_two_directions(recording, direction, rows)
-    transient = 0 if run.kind == ISOBARIC else int(np.count_nonzero(rows & ~_has_steady_pressure(recording, sensors)))
+    transient = (
+        0 if run.kind == segment.ISOBARIC else int(np.count_nonzero(rows & ~_has_steady_pressure(recording, sensors)))
+    )
     return HysteresisLoop(recording, run, friction_path, static_curve, rows, transient)
 
 
-def _has_steady_pressure(recording: Recording, sensors: Mapping[str, Sensor]) -> RowMask:
+def _has_steady_pressure(recording: Recording, sensors: Mapping[str, segment.Sensor]) -> loop_fit.RowMask:
     """Mask of the rows in which the pressure changes slowly, whatever the length does."""
     columns = {name: recording[name] for name in ("time", "pressure") if name in recording}
-    return quasi_static_rows(dataclasses.replace(recording, columns=columns), sensors)
+    return segment.quasi_static_rows(dataclasses.replace(recording, columns=columns), sensors)
 
 
-def _select_rows(recording: Recording, sensors: Mapping[str, Sensor], all_rows: bool) -> RowMask:
+def _select_rows(recording: Recording, sensors: Mapping[str, segment.Sensor], all_rows: bool) -> loop_fit.RowMask:
     force = recording["force"]
     rows = (force > 0) & np.isfinite(force)
     if "force" in sensors:
         rows &= sensors["force"].censoring(force) == 0
-    return rows if all_rows else rows & quasi_static_rows(recording, sensors)
+    return rows if all_rows else rows & segment.quasi_static_rows(recording, sensors)
 
 
-def _check_two_directions(recording: Recording, direction: np.ndarray, fitted_rows: RowMask) -> None:
+def _check_two_directions(recording: Recording, direction: np.ndarray, fitted_rows: loop_fit.RowMask) -> None:
     for sign, branch in ((1, "rising"), (-1, "falling")):
         rows, fitted = np.count_nonzero(direction == sign), np.count_nonzero((direction == sign) & fitted_rows)
         if not fitted:
@@ -217,7 +192,7 @@ def _check_two_directions(recording: Recording, direction: np.ndarray, fitted_ro
             )
 
 
-def _is_same_level(one: Run, other: Run) -> bool:
+def _is_same_level(one: segment.Run, other: segment.Run) -> bool:
     """Whether two runs have the same constant quantity and level, within the tolerance of one run."""
     if (
         one.kind is not other.kind
@@ -240,9 +215,11 @@ def fit_loop(loop: HysteresisLoop, *, elements: int = 8, progress: Callable[[str
     `elements` is the number of elements of MaxwellSlip and PrandtlIshlinskii; `progress` is called with the name of
     each law.
     """
-    series = make_loop_series(loop.recording, loop.static_curve, loop.friction_path, loop.fitted_rows)
+    series = loop_fit.make_loop_series(loop.recording, loop.static_curve, loop.friction_path, loop.fitted_rows)
     fits, failed = list[HysteresisFit](), dict[str, HintedText]()
-    for initial in initial_friction_laws(series.path[loop.fitted_rows], series.fitted_residuals(None), elements):
+    for initial in loop_fit.initial_friction_laws(
+        series.path[loop.fitted_rows], series.fitted_residuals(None), elements
+    ):
         name = type(initial).__name__
         too_uniform = "" if initial.rate_independent else speed_reservation(series.limits, series.axis)
         if too_uniform:
@@ -251,7 +228,7 @@ def fit_loop(loop: HysteresisLoop, *, elements: int = 8, progress: Callable[[str
         if progress is not None:
             progress(name)
         try:
-            fit = fit_hysteresis(
+            fit = loop_fit.fit_hysteresis(
                 initial,
                 loop.recording,
                 static_curve=loop.static_curve,

@@ -82,14 +82,9 @@ class PlantUncertainty(ShortRepr):
 
 
 def predict_dynamic(
-    plant: System,
-    experiment: Experiment,
-    observed: Mapping[str, float],
-    *,
-    uncertainty: PlantUncertainty | None = None,
-    own: Sequence[RecordUnknown] = (),
-    method: Integrator | None = None,
-) -> result.RecordPrediction:
+    plant: System, experiment: Experiment, observed: Mapping[str, float], *,
+    uncertainty: PlantUncertainty | None = None, own: Sequence[RecordUnknown] = (), method: Integrator | None = None,
+) -> result.RecordPrediction:  # fmt: skip
     """Predict quantities of a transient record by simulating an identified plant from its initial conditions.
 
     plant        the identified plant; that of the experiment replaces it, for example one in other ambient air, which a

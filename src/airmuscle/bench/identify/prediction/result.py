@@ -25,18 +25,11 @@ USUAL = "another specimen, a resting length or a zero of a sensor that differs, 
 
 
 def predict_static(
-    law: Characteristic,
-    recording: Recording,
-    *,
-    friction: Friction | None = None,
-    creep: CreepElements | None = None,
-    half_width: float | None = None,
-    validity_range: ValidityRange | None = None,
-    rates: Mapping[str, float | None] | None = None,
-    band: str = "",
-    notes: Sequence[str] = (),
+    law: Characteristic, recording: Recording, *, friction: Friction | None = None, creep: CreepElements | None = None,
+    half_width: float | None = None, validity_range: ValidityRange | None = None,
+    rates: Mapping[str, float | None] | None = None, band: str = "", notes: Sequence[str] = (),
     differences: Sequence[str] = (),
-) -> "RecordPrediction":
+) -> "RecordPrediction":  # fmt: skip
     """Predict the quantity that a law gives at the rows of a recording with pressure, contraction and force.
 
     law             the static law of the muscle of this recording

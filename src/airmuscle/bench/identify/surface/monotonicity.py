@@ -168,13 +168,9 @@ def find_monotonicity_violations(
 
 
 def fit_monotone(
-    recording: Recording,
-    saturation: float,
-    *,
-    pressure_degree: int = 4,
-    force_degree: int = 2,
+    recording: Recording, saturation: float, *, pressure_degree: int = 4, force_degree: int = 2,
     cells: tuple[int, int] = (16, 12),
-) -> SurfaceFit:
+) -> SurfaceFit:  # fmt: skip
     """Fit k by least squares with the constraint that it never rises with F and never falls with p.
 
     `recording` has pressure [Pa], force [N] and contraction [1]; `saturation` is k_max [1]. The slopes are enclosed on

@@ -65,12 +65,9 @@ class ShapeConstrainedFit(ShortRepr):
 
 
 def fit_shape_constrained(
-    law: ContractileSurface,
-    recordings: Recording | Sequence[Recording],
-    *,
-    free: Recording | None = None,
+    law: ContractileSurface, recordings: Recording | Sequence[Recording], *, free: Recording | None = None,
     cells: tuple[int, int] = (6, 6),
-) -> ShapeConstrainedFit:
+) -> ShapeConstrainedFit:  # fmt: skip
     """Fit a surface by least squares with the constraint that its force never falls with p and never rises with eps.
 
     The constraint holds on the validity range of the data. `free` holds points (pressure, contraction) of free
