@@ -211,7 +211,7 @@ ARGUMENTS = {
     "delimiter": "delimiter between the cells of a text file",
     "decimal": "decimal separator of a text file",
     "sheet": "worksheet of an Excel file",
-    "group": "group of a TDMS or MDF file, struct of a MAT file",
+    "group": "group of a TDMS or MDF file, struct of a MAT file, segment of an LVM file",
     "downsampling": "downsampling of long files",
     "ordered": "whether time must increase",
     "progress": "function called with the progress of reading",

@@ -36,7 +36,7 @@ def read_csv_table(path: str | Path, text_format: TextFormat = TextFormat()) -> 
         raise FileError(f"read_csv: {abridged(path)} is not a path. Pass the name of a file.")
     path = Path(path)
     check_text_file(path)
-    return parse_text(path.name, _read_text(path), text_format)
+    return parse_text(path.name, read_text(path), text_format)
 
 
 def parse_text(origin: str, text: str, text_format: TextFormat) -> RawTable:
@@ -49,7 +49,7 @@ def parse_text(origin: str, text: str, text_format: TextFormat) -> RawTable:
     return RawTable(origin, header.headings, header.units, columns, rows, constants=header.constants)
 
 
-def _read_text(path: Path) -> str:
+def read_text(path: Path) -> str:
     try:
         content = path.read_bytes()
     except OSError as reason:

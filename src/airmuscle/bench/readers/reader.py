@@ -19,6 +19,7 @@ from .mapping import ColumnMapping, apply_mapping, read_mapping
 from .plausibility import check_unit_consistency
 from .raw_columnar import read_hdf5_tables, read_parquet_tables
 from .raw_csv import Progress, is_large_file, read_csv_table, read_large_csv, read_text_stream
+from .raw_lvm import is_lvm, read_lvm_tables
 from .raw_mat import read_mat_tables
 from .raw_mdf import read_mdf_tables, read_tdms_tables
 from .raw_rosbag import read_rosbag_tables
@@ -29,7 +30,7 @@ Tables = tuple[RawTable, ...]
 
 WORKBOOKS = (".xlsx", ".xlsm", ".xls", ".ods")
 STANDARD_INPUT = Path("-")
-TEXT_EXTENSIONS = (".csv", ".txt", ".tsv", ".dat", ".asc", ".prn")
+TEXT_EXTENSIONS = (".csv", ".txt", ".tsv", ".dat", ".asc", ".prn", ".lvm")
 _BINARY_READERS: Mapping[str, Callable[[Path, ColumnMapping, Downsampling], Tables]] = {
     **dict.fromkeys(WORKBOOKS, lambda path, m, d: read_workbook_tables(path, m.sheet, m.text_format)),
     ".parquet": lambda path, m, d: read_parquet_tables(path, m.group),
@@ -61,7 +62,7 @@ def read(
     downsampling  reduction of very long files, which a note reports
     progress      called with the name of a file and the fraction that has been read
 
-    The extension gives the format: text (CSV), Excel, OpenDocument, MAT, TDMS, MDF, Parquet or HDF5. A load in kg
+    The extension gives the format: text (CSV), LVM, Excel, OpenDocument, MAT, TDMS, MDF, Parquet or HDF5. A load in kg
     becomes a force with standard gravity. Files whose units contradict each other are rejected.
 
     Raises FileError, ColumnError, UnitError or ParameterError; the message names file, row, value and remedy.
@@ -153,6 +154,10 @@ def read_tables(
     if suffix in _BINARY_READERS:
         return tuple(downsample(table, downsampling) for table in _BINARY_READERS[suffix](path, mapping, downsampling))
     check_text_file(path)
+    if is_lvm(path):
+        return tuple(
+            downsample(each, downsampling) for each in read_lvm_tables(path, mapping.group, mapping.text_format)
+        )
     if is_large_file(path):
         return (read_large_csv(path, mapping.text_format, downsampling, progress),)
     return (downsample(read_csv_table(path, mapping.text_format), downsampling),)

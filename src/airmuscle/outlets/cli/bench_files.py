@@ -22,7 +22,7 @@ Files = Annotated[
     list[Path],
     typer.Argument(
         metavar="FILES",
-        help="CSV, Excel, MAT, TDMS or MDF files with pressure, contraction or length, and force.",
+        help="CSV, LVM, Excel, MAT, TDMS or MDF files with pressure, contraction or length, and force.",
         autocompletion=complete_data,
     ),
 ]

@@ -23,7 +23,7 @@ Files = Annotated[
     list[str],
     typer.Argument(
         metavar="FILES",
-        help="Files, folders or glob patterns: CSV, Excel, MAT, TDMS, MDF; '-' is text on standard input.",
+        help="Files, folders or glob patterns: CSV, LVM, Excel, MAT, TDMS, MDF; '-' is text on standard input.",
     ),
 ]
 

@@ -92,8 +92,8 @@ class ReadingRequest:
         "Worksheet of an Excel file; default: all.", default=None, label="Worksheet of Excel files"
     )
     group: str | None = option(
-        "Group of a TDMS or MDF file, or struct of a MAT file.", default=None,
-        label="Group or struct of TDMS, MDF, HDF5 and MAT files",
+        "Group of a TDMS or MDF file, struct of a MAT file, segment of an LVM file.", default=None,
+        label="Group, struct or segment of TDMS, MDF, HDF5, MAT and LVM files",
     )  # fmt: skip
 
     def column_mapping(self, default: ColumnMapping = ColumnMapping(), **others: Any) -> ColumnMapping:
