@@ -42,6 +42,7 @@ from airmuscle.engine import (
 from airmuscle.engine.run import prepare_loop
 from airmuscle.errors import FileError, ParameterError
 from airmuscle.outlets import write_controller
+from airmuscle.outlets.export import write
 from airmuscle.outlets.export.compiler import COMPILER, EMULATOR, PROCESSORS, run_in_emulator
 from airmuscle.outlets.export.printed_controller import print_controller
 from airmuscle.physics import linearise
@@ -252,10 +253,37 @@ def test_a_predictive_controller_in_c_counts_samples_without_a_solution(tmp_path
     assert replay(tmp_path).returncode == 0
 
 
-def test_options_that_a_predictive_controller_has_not_are_refused(tmp_path):
-    for options in ({"precision": Single()}, {"arduino": True}, {"tunable": ["gain"]}):
-        with pytest.raises(ParameterError, match="LinearModelPredictive is exported as C in double precision"):
-            write_controller(predictive_problem(), tmp_path, **options)
+def test_a_predictive_controller_in_single_precision_stays_within_the_stated_tolerance(tmp_path):
+    """Its quadratic program converges with the tolerances of floats; also in a library and a sketch for Arduino, in C++."""
+    problem = predictive_problem()
+    write_controller(problem, tmp_path, name="law", precision=Single())
+    source = re.sub(r"/\*.*?\*/", "", (tmp_path / "law.c").read_text(), flags=re.DOTALL)
+    assert "double" not in source
+    assert not re.search(r"\b(fabs|fmax|fmin|sqrt)\(|\d\.\d*(e[-+]?\d+)?[,;) ]", source), (
+        "a function or number of doubles"
+    )
+    done = replay(tmp_path, "-O0")
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert re.match(r"50 samples, 0 commands differ by more than 0\.0001 of their range", done.stdout)
+    library = tmp_path / "library"
+    write_controller(problem, library, name="law", precision=Single(), arduino=True)
+    assert (library / "src/law.c").read_text() == (tmp_path / "law.c").read_text()
+    (sketch,) = library.glob("examples/*/*.ino")
+    (library / "sketch.cpp").write_text(f"{ARDUINO}{sketch.read_text()}int main() {{ setup(); loop(); }}\n")
+    flags = ["-Isrc", "-Wall", "-Wextra", "-Werror", "-fsyntax-only"]
+    subprocess.run([printed.require("g++"), *flags, "sketch.cpp"], cwd=library, check=True)
+
+
+def test_tolerances_of_doubles_do_not_suit_a_predictive_controller_of_floats(tmp_path, monkeypatch):
+    """The export runs the program in single precision, and refuses one whose commands differ."""
+    monkeypatch.setattr(write, "SINGLE_TOLERANCES", (1e-9, 1e-12, 1e-12, 1e-9))
+    with pytest.raises(ParameterError, match="LinearModelPredictive in single precision: the command '"):
+        write_controller(predictive_problem(), tmp_path, precision=Single())
+
+
+def test_tunable_parameters_of_a_predictive_controller_are_refused(tmp_path):
+    with pytest.raises(ParameterError, match="LinearModelPredictive has no tunable parameter 'gain'; leave it out"):
+        write_controller(predictive_problem(), tmp_path, tunable=["gain"])
 
 
 def test_drivers_that_are_not_part_of_the_program_are_named(tmp_path):

@@ -9,6 +9,7 @@ import numpy as np
 from ...core import Array, ParameterError, Reference, ShortRepr, SolveError, Status, check_field_types
 from ...engine.compile.cache.kernel import Kernel
 from ...recording.recording import Recording
+from ..laws.linear_model_predictive import TOLERANCES, UNLIMITED
 from .estimates import StateEstimate
 from .kalman_filters import ExtendedKalmanFilter
 from .riccati import check_known
@@ -26,7 +27,6 @@ RAO2003 = Reference(
 MAX_HORIZON, STEPS, SETTLED = 200, 20, 1e-9
 """Maximum number of samples of a window; Gauss-Newton steps, and the step in standard deviations that ends them
 (chosen)."""
-UNLIMITED = 1e300
 _shortest = Kernel("shortest_vector", "predictive")
 
 
@@ -204,7 +204,7 @@ def least_squares(jacobian: Array, wanted: Array, rows: Array, low: Array, high:
     w = np.zeros(size)
     if len(matrix):
         spare: list[Any] = [np.zeros(size) for _ in range(3)]
-        status = _shortest(np.ascontiguousarray(matrix), lower, upper, np.zeros(len(matrix)),
+        status = _shortest(np.ascontiguousarray(matrix), lower, upper, np.array(TOLERANCES), np.zeros(len(matrix)),
                            np.zeros(size, dtype=np.int64), np.zeros((size, size)), *spare, w)  # fmt: skip
         if status != Status.DONE:
             return None

@@ -76,8 +76,8 @@ CHISCI2001 = Reference(
     note="limits narrowed by the reach of bounded disturbances",
 )
 _sample = Kernel("predictive_sample", "predictive")
-UNLIMITED = 1e300
-"""A limit that nothing reaches."""
+UNLIMITED, TOLERANCES = 1e30, (1e-9, 1e-6, 1e-12, 1e-9)
+"""A limit that nothing reaches; tolerances of the quadratic program, by their places in the kernel (chosen)."""
 
 
 class PredictiveMemory(NamedTuple):
@@ -166,11 +166,15 @@ class LinearModelPredictive(ShortRepr, MultivariableController):
     observer: ObserverModel
     target: TargetMap
     problem: CondensedProblem
-    _idle: list[Any] = dataclasses.field(init=False, repr=False, default_factory=list)
+
+    @functools.cached_property
+    def _idle(self) -> list[Any]:
+        """Arrays and compiled samples that no thread uses."""
+        return []
 
     def __getstate__(self) -> dict[str, Any]:
         """The fields without compiled samples, which belong to one process."""
-        return {**{key: value for key, value in self.__dict__.items() if key != "constants"}, "_idle": []}
+        return {key: value for key, value in self.__dict__.items() if key not in ("constants", "_idle")}
 
     def init(self) -> PredictiveMemory:
         problem, m = self.problem, len(self.commanded)
@@ -229,9 +233,8 @@ class LinearModelPredictive(ShortRepr, MultivariableController):
 
     def arrays(self) -> dict[str, Array]:
         """New arrays of all arguments of `predictive_sample`, by name: signals, constants, memory and workspace."""
-        known, memory = self.constants, self.init()
+        known, memory, m = self.constants, self.init(), len(self.commanded)
         (p, _), (r, n), q = self.observer.output_matrix.shape, known["m"].shape, len(self.controlled)
-        m = len(self.commanded)
         return {
             **{name: np.zeros(size) for name, size in (("y", p), ("r", q), ("low", m), ("high", m))}, **known,
             **memory._asdict(), "innovation": np.zeros(p), "point": np.zeros(known["rest"].shape[1]),
@@ -265,10 +268,10 @@ class LinearModelPredictive(ShortRepr, MultivariableController):
             model.output_matrix, model.gain, model.transition, model.input_matrix, rest, matrix, of_input[used], scale,
             np.maximum(low[used] * scale, -UNLIMITED), np.minimum(high[used] * scale, UNLIMITED),
             shift[used] * scale[:, None] + matrix @ free, problem.moves @ held,
-            np.tile(rest, (problem.horizon, 1)) - problem.moves @ held @ free,
+            np.tile(rest, (problem.horizon, 1)) - problem.moves @ held @ free, np.array(TOLERANCES),
         )  # fmt: skip
         names = ("by_output", "gain", "transition", "by_input", "rest", "m", "of_input", "scale", "fixed_low",
-                 "fixed_high", "by_point", "plan_by_w", "plan_by_point")  # fmt: skip
+                 "fixed_high", "by_point", "plan_by_w", "plan_by_point", "tolerances")  # fmt: skip
         return {name: np.ascontiguousarray(array) for name, array in zip(names, arrays, strict=True)}
 
     def _limits(self, error: Array, at_rest: Array) -> tuple[Array, Array, Array, Array, Array]:

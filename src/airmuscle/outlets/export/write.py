@@ -8,7 +8,7 @@ import numpy as np
 
 from ...control import LinearModelPredictive
 from ...core import Array, ParameterError, atomic_folder, suggestion
-from ...engine.compile.kernel_text import CKernels
+from ...engine.compile.kernel_text import CKernels, plain_kernels
 from ...engine.loop import MEASURED, Controller, ControlLoop, EnclosingLaw, WithSensors, without_simulated
 from ...engine.loop.controller import Measurement
 from ...engine.run import Problem, solve
@@ -18,6 +18,7 @@ from ...physics.muscle.characteristic import Characteristic
 from .exported_run import CONTROLLER, check_open_loop, export_loop, run_data
 from .identifiers import c_array, c_integers, c_number, filled, make_identifier, provenance
 from .printed_controller import (
+    SINGLE_TOLERANCE,
     PrintedController,
     ReplayedSamples,
     check_control_law,
@@ -29,9 +30,11 @@ from .targets import C99, ExportedRun, Target, print_law, program_name
 
 TOLERANCE = 1e-9
 """Part of its range by which a command in C may differ from that in Python (chosen): sums are in another order."""
+SINGLE_TOLERANCES = (1e-5, 1e-3, 1e-6, 1e-5)
+"""Tolerances of the quadratic program in single precision, in place of `TOLERANCES` of the law (chosen)."""
 FRAME = ("y", "r", "low", "high", "predicted", "plan", "inputs", "active", "counts")
 """Arguments of the kernel that the frame in C names itself."""
-NOTE = (
+PREDICTIVE_NOTE = (
     "The quadratic program is solved by the dual active-set method that runs in Python, printed from the same source; "
     "no library is needed. A sample without a solution applies the last plan and counts it in the last number of the "
     "memory."
@@ -45,17 +48,17 @@ class PrintedPredictive(PrintedController):
     law: LinearModelPredictive  # type: ignore[assignment]
 
     def source_files(self) -> dict[str, str]:
-        law, arrays = self.law, self.law.arrays()
+        law, arrays, number = self.law, self.law.arrays(), self.number
         shapes = {name: tuple(map(str, array.shape)) for name, array in arrays.items()}
-        known = {**law.constants, "operating": law.observer.inputs, "sizes": law.observer.input_sizes,
-                 "at_measured": law.observer.measured, "at_controlled": law.target.controlled,
-                 "low": self._deviations(0), "high": self._deviations(1)}  # fmt: skip
+        model = law.observer
+        known = {**law.constants, **self._given, "operating": model.inputs, "sizes": model.input_sizes,
+                 "at_measured": model.measured, "at_controlled": law.target.controlled}  # fmt: skip
         places = {
             **self.places, "constants": self._constants(),
-            "tables": "".join(_table(f"{self.name}_{name}", array) for name, array in known.items()),
-            "functions": CKernels(shapes).text("predictive", ["predictive_sample"]),
+            "tables": "".join(_table(f"{self.name}_{name}", array, number) for name, array in known.items()),
+            "functions": CKernels(shapes, number=number).text("predictive", ["predictive_sample"]),
             "work": "".join(
-                f"  {'int' if array.dtype == np.int64 else 'double'} {name}{''.join(f'[{k}]' for k in array.shape)};\n"
+                f"  {'int' if array.dtype == np.int64 else number} {name}{''.join(f'[{k}]' for k in array.shape)};\n"
                 for name, array in arrays.items() if name not in {*FRAME, *law.constants}
             ).rstrip(),
             "arguments": ", ".join(f"{self.name}_{name}" if name in known else name for name in arrays),
@@ -67,13 +70,20 @@ class PrintedPredictive(PrintedController):
             f"{self.name}.c": filled("predictive.c", places, self.name),
         }
 
-    def _deviations(self, side: int) -> Array:
-        """The minima or maxima of the inputs as scaled deviations."""
-        model = self.law.observer
-        return (np.array([pair[side] for pair in self.ranges]) - model.inputs) / model.input_sizes
+    @property
+    def _given(self) -> dict[str, Array]:
+        """The limits of the inputs as scaled deviations, and the tolerances, by the names of the kernel."""
+        model, (low, high) = self.law.observer, np.array(self.ranges).T
+        ends = {"low": (low - model.inputs) / model.input_sizes, "high": (high - model.inputs) / model.input_sizes}
+        return ends | ({"tolerances": np.array(SINGLE_TOLERANCES)} if self.number == "float" else {})
 
     def replay(self, measured: Array, setpoints: Array, *, single: bool = False) -> ReplayedSamples:
-        """The commands to measurements (K, p) and set points (K, q), in Python; in double precision alone."""
+        """The commands to measurements (K, p) and set points (K, q), in Python.
+
+        single  the operations of the program itself, each rounded to single precision
+        """
+        if single:
+            return ReplayedSamples(measured, setpoints, self._in_single_precision(measured, setpoints))
         law, memory, rows = self.law, self.law.init(), []
         ranges = dict(zip(law.inputs, self.ranges, strict=True))
         for values, points in zip(measured.tolist(), setpoints.tolist(), strict=True):
@@ -84,25 +94,36 @@ class PrintedPredictive(PrintedController):
             rows.append([commands[name] for name in law.inputs])
         return ReplayedSamples(measured, setpoints, np.array(rows))
 
+    def _in_single_precision(self, measured: Array, setpoints: Array) -> Array:
+        law, sample, rows = self.law, plain_kernels("predictive")["predictive_sample"], []
+        single, known = np.float32, {**law.arrays(), **self._given}
+        arrays = {name: array if array.dtype == np.int64 else array.astype(single) for name, array in known.items()}
+        at, to = law.observer.measured.astype(single), law.target.controlled.astype(single)
+        sizes, operating = law.observer.input_sizes.astype(single), law.observer.inputs.astype(single)
+        for values, points in zip(measured.astype(single), setpoints.astype(single), strict=True):
+            arrays |= {"y": values - at, "r": points - to}
+            sample(*arrays.values())
+            rows.append(operating + sizes * arrays["inputs"])
+        return np.array(rows, dtype=float)
 
-def print_predictive(prepared: SampledLoop, name: str, title: str) -> PrintedPredictive:
+
+def print_predictive(prepared: SampledLoop, name: str, title: str, number: str) -> PrintedPredictive:
     """The predictive controller of a prepared loop, with its ranges as constants."""
     law = prepared.loop.controller
     assert isinstance(law, LinearModelPredictive)
     about = (f"Sample time {c_number(prepared.loop.sample_time)} s; set points {', '.join(law.controlled)}; measured "
              f"{', '.join(law.measured)}; commanded {', '.join(law.inputs)}.")  # fmt: skip
-    lines = provenance(title or type(law).__name__, law, notes=[about, NOTE])
-    return PrintedPredictive(
-        name, law, {}, {}, [prepared.ranges[n] for n in law.inputs], (), lines, tolerance=TOLERANCE
-    )
+    lines = provenance(title or type(law).__name__, law, notes=[about, PREDICTIVE_NOTE])
+    tolerance, ranges = SINGLE_TOLERANCE if number == "float" else TOLERANCE, [prepared.ranges[n] for n in law.inputs]
+    return PrintedPredictive(name, law, {}, {}, ranges, (), lines, number, tolerance)
 
 
-def _table(name: str, array: Array) -> str:
+def _table(name: str, array: Array, number: str) -> str:
     """A constant array; a table is not const, because C converts no pointer to rows of constants."""
     if array.dtype == np.int64:
         return c_integers(f"static const int {name}[{len(array)}]", array.tolist())
     size = "".join(f"[{k}]" for k in array.shape)
-    return c_array(f"static {'const ' if array.ndim == 1 else ''}double {name}{size}", array)
+    return c_array(f"static {'const ' if array.ndim == 1 else ''}{number} {name}{size}", array, number=number)
 
 
 NOTE = (
@@ -230,7 +251,7 @@ def write_controller(
     constants. The program `main.c` replays the measurements of the run. In double precision it compares the commands
     bit by bit with those of the same operations in IEEE 754; in single precision they differ from these by at most 1e-4
     of the range of the command. The program of a LinearModelPredictive contains the solver of its quadratic program;
-    its commands differ from those of Python by at most 1e-9 of their range.
+    in double precision its commands differ from those of Python by at most 1e-9 of their range.
 
     Raises ParameterError for a problem without a controller, a controller that is neither a ControlLaw nor a
     LinearModelPredictive, and one that single precision changes by more; SimulationError if the run fails, and
@@ -242,12 +263,13 @@ def write_controller(
     of_real_plant = dataclasses.replace(prepared, loop=dataclasses.replace(loop, controller=law))
     notes = () if law == loop.controller else (LEFT_OUT,)
     name = checked_name(name) or program_name(title or type(law).__name__)
+    number = "float" if precision == Single() else "double"
     printed: PrintedController
     if isinstance(law, LinearModelPredictive):
-        _check_predictive(tunable, precision, arduino)
-        printed = print_predictive(of_real_plant, name, title)
+        if tunable:
+            raise ParameterError(f"LinearModelPredictive has no tunable parameter '{tunable[0]}'; leave it out.")
+        printed = print_predictive(of_real_plant, name, title, number)
     else:
-        number = "float" if precision == Single() else "double"
         printed = print_controller(of_real_plant, name, title, tunable, number, notes)
     recording = solve(problem).raise_if_incomplete().recording
     rows = np.searchsorted(recording["time"], prepared.instants[:-1] - 1e-9 * loop.sample_time)
@@ -259,15 +281,6 @@ def write_controller(
     if arduino:
         return write_files(printed.arduino_files(loop.sample_time, prepared.setpoint_values[0].tolist()), folder)
     return write_files(printed.files(samples), folder)
-
-
-def _check_predictive(tunable: Sequence[str], precision: Precision, arduino: bool) -> None:
-    """Raise ParameterError for what a predictive controller in C has not."""
-    if tunable or precision != Double() or arduino:
-        raise ParameterError(
-            "LinearModelPredictive is exported as C in double precision with constant numbers; leave out tunable "
-            "parameters, single precision and the Arduino library."
-        )
 
 
 def _readings(law: Controller, measured: Array, sample_time: float) -> Array:

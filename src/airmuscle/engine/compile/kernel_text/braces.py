@@ -116,6 +116,7 @@ class CKernels(BraceKernels):
 
     shapes  sizes of the arrays of several dimensions, by the names of the arguments: ("", "CAPACITY")
     prefix  beginning of the names of the functions of the system
+    number  type of all numbers, double or float
     """
 
     reserved = frozenset(_C_KEYWORDS.split())
@@ -123,14 +124,16 @@ class CKernels(BraceKernels):
 
     counter = "int"
 
-    def __init__(self, shapes: Mapping[str, Sequence[str]], prefix: str = "") -> None:
-        self.shapes, self.prefix = shapes, prefix
+    def __init__(self, shapes: Mapping[str, Sequence[str]], prefix: str = "", number: str = "double") -> None:
+        self.shapes, self.prefix, self.type = shapes, prefix, number
+        self.suffix = "f" if number == "float" else ""
 
     def declaration(self, name: str, constant: bool) -> str:
-        return f"{'const ' if constant else ''}{_type(self.kernel.kinds[name].scalar)} "
+        return f"{'const ' if constant else ''}{self._type(self.kernel.kinds[name].scalar)} "
 
     def constant(self, name: str, value: float) -> str:
-        return f"static const {'int' if isinstance(value, int) else 'double'} {name} = {value!r};"
+        kind = "int" if isinstance(value, int) else self.type
+        return f"static const {kind} {name} = {self.number(value) if kind == self.type else value};"
 
     def comment(self, lines: Sequence[str]) -> list[str]:
         return ["/* " + "\n   ".join(lines).rstrip().replace("\n   \n", "\n\n") + " */"] if lines else []
@@ -141,27 +144,30 @@ class CKernels(BraceKernels):
     def head(self) -> list[str]:
         kernel, returned = self.kernel, self.kernel.returns
         given = [self._argument(name) for name in kernel.arguments]
-        given += [f"{_type(kind)} *{self._out(i)}" for i, kind in enumerate(returned) if i]
-        text = f"static {_type(returned[0]) if returned else 'void'} {kernel.source.name}({', '.join(given)})"
+        given += [f"{self._type(kind)} *{self._out(i)}" for i, kind in enumerate(returned) if i]
+        text = f"static {self._type(returned[0]) if returned else 'void'} {kernel.source.name}({', '.join(given)})"
         return [text, "{", *(f"  {self.declaration(name, False)}{self.name(name)};" for name in self.early)]
 
     def _argument(self, name: str) -> str:
         kind = self.kernel.kinds[name]
         if not kind.rank:
-            return f"{_type(kind.scalar)} {self.name(name)}"
+            return f"{self._type(kind.scalar)} {self.name(name)}"
         if kind.rank == 1:
-            return f"{'' if name in self.kernel.written else 'const '}{_type(kind.scalar)} *{self.name(name)}"
+            return f"{'' if name in self.kernel.written else 'const '}{self._type(kind.scalar)} *{self.name(name)}"
         if len(self.shapes.get(name, ())) != kind.rank:
             raise self.source.unprintable(self.source.node, f"the array '{name}' without a shape")
         widths = "".join(f"[{width}]" for width in self.shapes[name][1:])
-        return f"{_type(kind.scalar)} {self.name(name)}[]{widths}"
+        return f"{self._type(kind.scalar)} {self.name(name)}[]{widths}"
+
+    def _type(self, scalar: ElementType) -> str:
+        return self.type if scalar == ElementType.NUMBER else "int"
 
     def _out(self, i: int) -> str:
         names = self.kernel.returned_names
         return f"{names[i]}_out" if names else f"result_{i}"
 
     def number(self, value: float) -> str:
-        return "HUGE_VAL" if math.isinf(value) else repr(value)
+        return "HUGE_VAL" if math.isinf(value) else f"{value!r}{self.suffix}"
 
     def flag(self, value: bool) -> str:
         return "1" if value else "0"
@@ -178,7 +184,8 @@ class CKernels(BraceKernels):
         numbers = any(self.kernel.of(argument) == ElementType.NUMBER for argument in arguments)
         if name in {"min", "max"}:
             return self._extreme(name, arguments, numbers)
-        return f"{name if name == 'abs' and not numbers else _NAMES.get(name, name)}({self.joined(arguments)})"
+        own = "" if name in self.kernel.calls or (name == "abs" and not numbers) else self.suffix
+        return f"{name if name == 'abs' and not numbers else _NAMES.get(name, name)}{own}({self.joined(arguments)})"
 
     def _extreme(self, name: str, arguments: Sequence[ast.expr], numbers: bool) -> str:
         first, *others = arguments
@@ -186,7 +193,7 @@ class CKernels(BraceKernels):
             return self.expression(first)
         if numbers:
             rest = self._extreme(name, others, numbers)
-            return f"f{name}({self.expression(first)}, {rest})"
+            return f"f{name}{self.suffix}({self.expression(first)}, {rest})"
         if len(others) > 1:
             raise self.source.unprintable(first, "the extreme of more than two integers")
         a, b = (self.expression(each, 5) for each in arguments)
@@ -211,15 +218,11 @@ class CKernels(BraceKernels):
 
     def workspace(self, arrays: Mapping[str, Sequence[str]]) -> str:
         texts = [name + "".join(f"[{size}]" for size in sizes) for name, sizes in arrays.items()]
-        return self.lines(f"double {', '.join(texts)};") if texts else ""
+        return self.lines(f"{self.type} {', '.join(texts)};") if texts else ""
 
     def finish(self, values: Sequence[ast.expr], last: bool) -> list[str]:
         lines = [f"*{self._out(i)} = {self.expression(value)};" for i, value in enumerate(values) if i]
         return [*lines, f"return {self.expression(values[0])};"] if values else ["return;"]
-
-
-def _type(scalar: ElementType) -> str:
-    return "double" if scalar == ElementType.NUMBER else "int"
 
 
 class JavaScriptKernels(BraceKernels):

@@ -96,9 +96,12 @@ def plain_kernels(module: str) -> Mapping[str, Callable[..., Any]]:
     path = resources.files(_PACKAGE).joinpath(f"{module}.py")
     tree = _Plain().visit(ast.parse(path.read_text(encoding="utf-8")))
     defined = read_kernels(module)
-    names: dict[str, Any] = {"np": math}
+    names: dict[str, Any] = {"np": math, "sqrt": math.sqrt}
     for source in defined.values():
-        names |= source.constants
+        called = {
+            name: other for name, other in source.imported.items() if other != module and name in read_kernels(other)
+        }
+        names |= {**source.constants, **{name: plain_kernels(other)[name] for name, other in called.items()}}
     exec(compile(ast.fix_missing_locations(tree), str(path), "exec"), names)
     return {name: names[name] for name in defined}
 

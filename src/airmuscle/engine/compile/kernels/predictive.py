@@ -10,10 +10,10 @@ from .calls import CONTRACTED_PART, PART
 from .matrices import solve_factor
 
 DONE, SINGULAR, NOT_CONVERGED = Status.DONE.value, Status.SINGULAR.value, Status.NOT_CONVERGED.value
-ITERATIONS, FEASIBLE, ACCURATE, DEPENDENT = 10, 1e-9, 1e-6, 1e-12
-"""Iterations for each row; permitted violation of a limit of a row of length 1; permitted error of a limit that is
-active, before the refinement; square of the distance of such a row from the space of the active ones up to which it
-depends on them (chosen)."""
+ITERATIONS, FEASIBLE, ACCURATE, DEPENDENT, POSITIVE = 10, 0, 1, 2, 3
+"""Iterations for each row (chosen), and places of the tolerances: permitted violation of a limit of a row of length 1;
+permitted error of an active limit before the refinement; square of the distance of a row from the space of the active
+ones up to which it depends on them; what a slope of multipliers must exceed."""
 
 
 @CONTRACTED_PART
@@ -26,7 +26,7 @@ def add_product(row: Any, x: Any, count: Any, value: Any) -> Any:
 
 
 @PART
-def extend_factor(m: Any, order: Any, count: Any, row: Any, factor: Any) -> Any:
+def extend_factor(m: Any, order: Any, count: Any, row: Any, factor: Any, tolerances: Any) -> Any:
     """Write row `count` of the Cholesky factor of the products of the active rows; whether `row` is independent."""
     square = add_product(m[row], m[row], m.shape[1], 0.0)
     for j in range(count):
@@ -36,7 +36,7 @@ def extend_factor(m: Any, order: Any, count: Any, row: Any, factor: Any) -> Any:
         value /= factor[j, j]
         factor[count, j] = value
         square -= value * value
-    independent = square > DEPENDENT
+    independent = square > tolerances[DEPENDENT]
     factor[count, count] = sqrt(square) if independent else 1.0
     return independent
 
@@ -107,10 +107,10 @@ def blocking_place(order: Any, count: Any, active: Any, multipliers: Any, change
 
 
 @PART
-def worst_row(m: Any, lower: Any, upper: Any, active: Any, w: Any) -> Any:
+def worst_row(m: Any, lower: Any, upper: Any, active: Any, w: Any, tolerances: Any) -> Any:
     """The row whose limit is violated most; -1 where none is."""
     worst = -1
-    largest = FEASIBLE
+    largest = tolerances[FEASIBLE]
     for i in range(m.shape[0]):
         if active[i] == 0.0:
             value = add_product(m[i], w, m.shape[1], 0.0)
@@ -123,7 +123,7 @@ def worst_row(m: Any, lower: Any, upper: Any, active: Any, w: Any) -> Any:
 
 @PART
 def exchange(
-    m: Any, row: Any, order: Any, count: Any, active: Any, factor: Any, multipliers: Any, change: Any
+    m: Any, row: Any, order: Any, count: Any, active: Any, factor: Any, multipliers: Any, change: Any, tolerances: Any
 ) -> Any:  # fmt: skip
     """Make a row active that depends on the active ones, in place of one of them; whether a point keeps the limits."""
     side = active[row]
@@ -133,7 +133,7 @@ def exchange(
     place, least = -1, 0.0
     for k in range(count):
         slope = side * active[order[k]] * change[k]
-        if slope > 1e-9:
+        if slope > tolerances[POSITIVE]:
             share = abs(multipliers[k]) / slope
             if place < 0 or share < least:
                 place = k
@@ -143,18 +143,18 @@ def exchange(
         for k in range(count):
             multipliers[k] -= side * least * change[k]
         release(order, count, place, factor, multipliers, active)
-        possible = extend_factor(m, order, count - 1, row, factor)
+        possible = extend_factor(m, order, count - 1, row, factor, tolerances)
         order[count - 1] = row
         multipliers[count - 1] = side * least
     return possible
 
 
 @PART
-def append_row(m: Any, row: Any, order: Any, count: Any, factor: Any, multipliers: Any) -> Any:
+def append_row(m: Any, row: Any, order: Any, count: Any, factor: Any, multipliers: Any, tolerances: Any) -> Any:
     """Make a row the last active one, without a multiplier, if it is independent; whether it is."""
     independent = False
     if count < m.shape[1]:
-        independent = extend_factor(m, order, count, row, factor)
+        independent = extend_factor(m, order, count, row, factor, tolerances)
     if independent:
         order[count] = row
         multipliers[count] = 0.0
@@ -162,12 +162,12 @@ def append_row(m: Any, row: Any, order: Any, count: Any, factor: Any, multiplier
 
 
 @PART
-def begin_active(m: Any, active: Any, order: Any, factor: Any, multipliers: Any) -> Any:
+def begin_active(m: Any, active: Any, order: Any, factor: Any, multipliers: Any, tolerances: Any) -> Any:
     """Take the rows that were active, without multipliers; how many are independent."""
     count = 0
     for i in range(m.shape[0]):
         if active[i] != 0.0:
-            independent = append_row(m, i, order, count, factor, multipliers)
+            independent = append_row(m, i, order, count, factor, multipliers, tolerances)
             if independent:
                 count += 1
             else:
@@ -177,11 +177,12 @@ def begin_active(m: Any, active: Any, order: Any, factor: Any, multipliers: Any)
 
 @PART
 def shortest_vector(
-    m: Any, lower: Any, upper: Any, active: Any, order: Any, factor: Any, multipliers: Any, change: Any,
-    rest: Any, w: Any,
+    m: Any, lower: Any, upper: Any, tolerances: Any, active: Any, order: Any, factor: Any, multipliers: Any,
+    change: Any, rest: Any, w: Any,
 ) -> Any:  # fmt: skip
     """The shortest `w` (n,) with lower <= m w <= upper, for rows of `m` (r, n) of length 1; a status.
 
+    tolerances  (4,) by FEASIBLE, ACCURATE, DEPENDENT, POSITIVE
     active   (r,): 1.0 at the upper limit, -1 at the lower, 0 at none: the first guess, and the result
     order, multipliers, change, rest (n,), factor (n, n): workspace
 
@@ -189,7 +190,7 @@ def shortest_vector(
     becomes active, and one whose multiplier changes its sign is released. Every step lengthens w, so that no set of
     active rows returns. SINGULAR: there is no such w. Reference: Goldfarb and Idnani (1983).
     """
-    count = begin_active(m, active, order, factor, multipliers)
+    count = begin_active(m, active, order, factor, multipliers, tolerances)
     status = NOT_CONVERGED
     passes = 1
     for _ in range(ITERATIONS * m.shape[0] + ITERATIONS):
@@ -205,20 +206,20 @@ def shortest_vector(
             count -= 1
             continue
         vector_of(m, order, count, multipliers, w)
-        row = worst_row(m, lower, upper, active, w)
+        row = worst_row(m, lower, upper, active, w, tolerances)
         if row < 0 and passes == 1:
             passes = 2
             continue
         if row < 0:
-            status = DONE if error < ACCURATE else NOT_CONVERGED
+            status = DONE if error < tolerances[ACCURATE] else NOT_CONVERGED
             break
         value = add_product(m[row], w, m.shape[1], 0.0)
         active[row] = 1.0 if value > upper[row] else -1.0
-        possible = append_row(m, row, order, count, factor, multipliers)
+        possible = append_row(m, row, order, count, factor, multipliers, tolerances)
         if possible:
             count += 1
         else:
-            possible = exchange(m, row, order, count, active, factor, multipliers, change)
+            possible = exchange(m, row, order, count, active, factor, multipliers, change, tolerances)
         if not possible:
             status = SINGULAR
             break
@@ -260,8 +261,8 @@ def find_limits(
 def predictive_sample(
     y: Any, r: Any, low: Any, high: Any, by_output: Any, gain: Any, transition: Any, by_input: Any, rest: Any, m: Any,
     of_input: Any, scale: Any, fixed_low: Any, fixed_high: Any, by_point: Any, plan_by_w: Any, plan_by_point: Any,
-    predicted: Any, plan: Any, inputs: Any, active: Any, counts: Any, innovation: Any, point: Any, lower: Any,
-    upper: Any, order: Any, factor: Any, multipliers: Any, change: Any, spare: Any, w: Any,
+    tolerances: Any, predicted: Any, plan: Any, inputs: Any, active: Any, counts: Any, innovation: Any, point: Any,
+    lower: Any, upper: Any, order: Any, factor: Any, multipliers: Any, change: Any, spare: Any, w: Any,
 ) -> Any:  # fmt: skip
     """One sample: the inputs in `inputs` (m,), and the memory of the next sample in place; the status of the program.
 
@@ -269,15 +270,14 @@ def predictive_sample(
     by_output, gain, transition, by_input   (p, N), (N, p), (N, N), (N, m) of the observer
     rest              (m, N + q + m) the inputs of the target by the point
     m, of_input, scale, fixed_low, fixed_high, by_point   rows (r, n) of length 1, input or -1, scale, limits
-    plan_by_w, plan_by_point    (N_h m, n), (N_h m, N + q + m)
+    plan_by_w, plan_by_point    (N_h m, n), (N_h m, N + q + m); tolerances those of `shortest_vector`
     predicted, plan, active    (N,), (N_h m,), (r,); inputs (m,) those of the last sample
     counts            (2,): samples since the plan was found, -1 without one; failures so far
-
     Without a solution the next input of the last plan is applied, after its end that of the target.
     """
     find_point(y, r, by_output, gain, predicted, inputs, innovation, point)
     find_limits(low, high, of_input, scale, fixed_low, fixed_high, by_point, point, lower, upper)
-    status = shortest_vector(m, lower, upper, active, order, factor, multipliers, change, spare, w)
+    status = shortest_vector(m, lower, upper, tolerances, active, order, factor, multipliers, change, spare, w)
     number = inputs.shape[0]
     if status == DONE:
         counts[0] = 0

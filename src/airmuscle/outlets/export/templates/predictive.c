@@ -7,12 +7,12 @@
 /* Constants of the sample; deviations from the operating point, scaled. */
 @tables@
 @functions@
-int model_step(double *memory, const double *measurement, const double *setpoint, double *command)
+int model_step(@number@ *memory, const @number@ *measurement, const @number@ *setpoint, @number@ *command)
 {
 @work@
-  double y[@measured@], r[@controlled@];
-  double *predicted = memory + @predicted_at@, *plan = memory + @plan_at@, *inputs = memory + @inputs_at@;
-  double *active = memory + @active_at@;
+  @number@ y[@measured@], r[@controlled@];
+  @number@ *predicted = memory + @predicted_at@, *plan = memory + @plan_at@, *inputs = memory + @inputs_at@;
+  @number@ *active = memory + @active_at@;
   int counts[2], i;
   for (i = 0; i < @measured@; i++) {
     if (!isfinite(measurement[i])) return 1;
@@ -24,7 +24,7 @@ int model_step(double *memory, const double *measurement, const double *setpoint
   }
   for (i = 0; i < 2; i++) counts[i] = (int)memory[@counts_at@ + i];
   predictive_sample(@arguments@);
-  for (i = 0; i < 2; i++) memory[@counts_at@ + i] = counts[i];
+  for (i = 0; i < 2; i++) memory[@counts_at@ + i] = (@number@)counts[i];
   for (i = 0; i < MODEL_COMMANDS; i++) command[i] = model_operating[i] + model_sizes[i] * inputs[i];
   return 0;
 }
