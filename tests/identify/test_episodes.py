@@ -11,7 +11,7 @@ from arm_episodes import STEP, changed, made_episodes
 from command_line import airmuscle
 
 from airmuscle.bench import fit_joint, inspect_episodes, propose_mapping, read_episodes
-from airmuscle.bench.joint.episodes import cut
+from airmuscle.bench.joint.episodes import cut, long_enough, speed_of
 from airmuscle.errors import ColumnError, FileError, IdentificationError, ParameterError
 
 MADE = made_episodes(3)
@@ -235,6 +235,36 @@ def test_one_file_for_all_with_starts_scales_and_divisors(tmp_path, mapping):
         np.testing.assert_allclose(read.rows(name), MADE.rows(name), rtol=1e-12)
 
 
+def test_speeds_are_those_of_each_episode_where_one_file_holds_all(tmp_path, mapping):
+    table = {
+        "start": np.cumsum([0, *map(len, MADE.runs)]),
+        "q": np.degrees(MADE.rows("angle")),
+        "p": MADE.rows("pressure"),
+    }
+    np.savez(tmp_path / "all.npz", **table)
+    text = 'sample_time = "10 ms"\nstarts = "start"\n[angles]\ncolumns = "q"\nunit = "deg"\n[pressures]\ncolumns = "p"\nunit = "kPa"\n'
+    read = read_episodes(tmp_path / "all.npz", mapping(text))
+    for run, made in zip(read.runs, MADE.runs, strict=True):
+        np.testing.assert_allclose(run.speed, speed_of(made.angle, STEP), rtol=1e-9)
+        np.testing.assert_allclose(run.pressure, 1e3 * made.pressure)
+    for starts in ([0, 5000, 10], [0, 95.5], [0, 400], []):
+        np.savez(tmp_path / "bad.npz", **{**table, "start": np.array(starts)})
+        with pytest.raises(
+            ColumnError, match=r"starts, column 'start', must be the first rows .* rising below 285 rows"
+        ):
+            read_episodes(tmp_path / "bad.npz", mapping(text))
+
+
+def test_a_sample_time_that_contradicts_the_column_of_times_is_named(tmp_path, mapping):
+    np.savez(tmp_path / "0.npz", **{**by_columns(MADE.runs[0]), "t": 1e3 * STEP * np.arange(len(MADE.runs[0]))})
+    stated = COLUMNS.replace('time = "t"', 'sample_time = "10 ms"')
+    assert read_episodes(tmp_path / "0.npz", mapping(stated)).sample_time == STEP  # the times are ms
+    with pytest.raises(
+        ColumnError, match="column 't' advances by 10 in a row, the mapping file states a sample time of 20 ms"
+    ):
+        read_episodes(tmp_path / "0.npz", mapping(stated.replace("10", "20")))
+
+
 def test_json_holds_a_list_of_episodes(tmp_path, mapping):
     tables = [{n: c.tolist() for n, c in by_columns(run).items()} for run in MADE.runs]
     (tmp_path / "all.json").write_text(json.dumps(tables))
@@ -251,7 +281,12 @@ def test_json_holds_a_list_of_episodes(tmp_path, mapping):
         (COLUMNS.replace('time = "t"', ""), "state either sample_time"),
         (COLUMNS + "[arm]\npairs = [[1, 1]]\n", "give for each joint the numbers of two muscles, each muscle once"),
         (COLUMNS + '[arm]\naxes = ["w"]\n', "arm.axes holds 'w'; allowed: x, "),
-        (COLUMNS.replace("[angles]\n", '[angles]\nunit = "turn"\n'), "angles.unit is 'turn'; it must be"),
+        (COLUMNS.replace("[angles]\n", '[angles]\nunit = "turn"\n'), "angles.unit is 'turn'; allowed: rad, deg"),
+        (COLUMNS.replace("[pressures]\n", '[pressures]\nunit = "mm"\n'), "pressures.unit is 'mm'; allowed: Pa, hPa"),
+        (COLUMNS + "[commands]\nunit = 3\ncolumns = 'p1'", "commands.unit is '3'; allowed: none"),
+        (COLUMNS + "[arm]\npairs = 3\n", "arm.pairs is 3; give for each joint"),
+        (COLUMNS + "[arm]\npairs = [['a', 'b']]\n", "give for each joint the numbers of two muscles"),
+        (COLUMNS + "[arm]\naxes = [[0, 0, 1]]\n", r"arm.axes holds '\[0, 0, 1\]'; allowed: x, "),
         (COLUMNS.replace('columns = ["q1"]', "columns = 3"), "angles.columns must be a name or a list of names"),
         ("tim = 3\n" + COLUMNS, "unknown key 'tim'"),
     ],
@@ -268,6 +303,7 @@ def test_errors_of_a_mapping_file(tmp_path, mapping, text, message):
         ({"q1": None}, "no column 'q1'; there are t, p1, p2"),
         ({"p1": np.full(95, np.nan)}, "row 1 of p1, p2 .column 1. is not a finite number"),
         ({"q1": np.zeros(90)}, "pressures have 95 rows, angles 90; they must have as many"),
+        ({"q1": np.zeros(0)}, "q1 has no row"),
         ({"t": np.r_[0:40, 60:115] * STEP}, "the times of column 't' have gaps or do not rise"),
     ],
 )
@@ -324,11 +360,21 @@ def jumped(angle):
     return angle
 
 
+def dead(pressure):
+    """A sensor that records its noise alone."""
+    pressure[:, 1] = 1e5 + 100.0 * np.random.default_rng(0).standard_normal(len(pressure))
+    return pressure
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
         ({"angle": jumped}, r"episode 1: angle 1 jumps from .* at row 51, as an encoder does that wraps"),
-        ({"pressure": lambda p: p * [1.0, 0.0]}, "pressure 2 never varies, it is 0 Pa in all rows"),
+        ({"pressure": lambda p: p * [1.0, 0.0]}, "pressure 2 never varies, it is 0 to 0 Pa in 98 % of"),
+        ({"pressure": dead}, r"pressure 2 never varies, it is 9.\d+e\+04 to 1.00\d+e\+05 Pa in 98 % of the rows"),
+        ({"angle": lambda q: 0.1 + 0 * q}, "angle 1 never varies, it is 0.1 to 0.1 rad in 98 % of the rows"),
+        ({"angle": np.degrees}, r"angle 1 reaches .* rad, further than a joint turns: state its unit .* \[angles\]"),
+        ({"pressure": lambda p: 1e3 * p}, r"pressure 1 reaches .* Pa, more than a muscle bears: .* \[pressures\]"),
         ({"speed": lambda v: v / 1.5}, "angles move 1.49 times as fast as the speeds say: the sample time of 10 ms"),
     ],
 )
@@ -357,6 +403,10 @@ def test_episodes_shorter_than_a_window_are_refused():
     with pytest.raises(IdentificationError, match="the longest has 45 rows, a window needs 52"):
         fit_joint(made_episodes(20, rows=45))
     assert len(cut(made_episodes(2, rows=62))) == 2
+    mixed = replace(JOINT, runs=(*JOINT.runs[:4], *made_episodes(2, rows=45).runs))
+    kept, (remark,) = long_enough(mixed, 40)
+    assert kept.runs == JOINT.runs[:4]
+    assert remark == "2 of 6 episodes are shorter than a window of 52 rows and are left out: episode 1, episode 2"
 
 
 def test_a_window_reads_no_pressure_after_its_end():

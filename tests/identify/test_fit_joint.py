@@ -41,6 +41,13 @@ def test_the_band_grows_with_the_horizon_and_holds_what_it_says(fitted):
     assert fit.coverage[0] > 0.85
 
 
+def test_a_model_that_a_baseline_beats_and_a_band_of_one_episode_are_named(fitted):
+    fit, _ = fitted
+    assert "joint 1: ARX of depth 4 predicts better than the model" in str(replace(fit, errors=20.0 * fit.errors))
+    assert "predicts better" not in str(fit)
+    assert np.isnan(replace(fit, episode=np.zeros_like(fit.episode)).coverage).all()
+
+
 def test_the_remarks_name_the_scale_of_the_torques(fitted):
     fit, _ = fitted
     assert any("do not contain the scale of the torques" in remark for remark in fit.remarks)

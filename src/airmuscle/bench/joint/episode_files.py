@@ -44,7 +44,17 @@ AXES = {
     sign + name: axis for name, axis in zip("xyz", ((1, 0, 0), (0, 1, 0), (0, 0, 1)), strict=True) for sign in ("", "+")
 }
 AXES |= {f"-{name}": (-AXES[name][0], -AXES[name][1], -AXES[name][2]) for name in "xyz"}
-ANGLES = {"rad": 1.0, "deg": 0.017453292519943295}
+TIMES = ("t", "time", "stamp", "timestamp")
+"""Names of columns of times, in seconds or a thousandth, millionth or billionth of them."""
+SAME_TIME = 0.02
+"""Difference of the decimal logarithms of two sample times, over 3, up to which they are the same (chosen)."""
+_DEGREE = 0.017453292519943295
+UNITS = {
+    "angles": {"rad": 1.0, "deg": _DEGREE},
+    "speeds": {"rad": 1.0, "deg": _DEGREE, "rad/s": 1.0, "deg/s": _DEGREE, "rpm": 6.0 * _DEGREE},
+    "pressures": {"Pa": 1.0, "hPa": 100.0, "kPa": 1e3, "MPa": 1e6, "bar": 1e5, "mbar": 100.0, "psi": 6894.757293168361},
+}
+"""Units of gauge pressures, angles and their speeds, in SI units."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -116,18 +126,23 @@ def _channels(path: Path, name: str, table: Any) -> Channels:
     columns = (columns,) if isinstance(columns, str) else columns
     if not isinstance(columns, list | tuple) or not columns or not all(isinstance(column, str) for column in columns):
         raise FileError(f'{path}: {name}.columns must be a name or a list of names, columns = ["q1", "q2"].')
-    unit = table.get("unit", "rad")
-    if name == "angles" and unit not in ANGLES:
-        raise FileError(f'{path}: angles.unit is \'{unit}\'; it must be "rad" or "deg".')
-    factor = ANGLES[unit] if name in ("angles", "speeds") and unit in ANGLES else 1.0
+    factor, allowed = 1.0, UNITS.get(name, {})
+    if "unit" in table:
+        if table["unit"] not in tuple(allowed):
+            raise FileError(
+                f"{path}: {name}.unit is '{table['unit']}'; allowed: {', '.join(allowed) or 'none'}. State other units "
+                "as a number, scale."
+            )
+        factor = allowed[table["unit"]]
     target = "Pa" if name == "pressures" else "1"
     scale = quantity(table.get("scale", 1.0), target, where=f"{path}: {name}.scale")
     return Channels(tuple(columns), factor * scale, table.get("divisors"))
 
 
 def _pairs(path: Path, pairs: Any) -> tuple[tuple[int, int], ...]:
-    flat = [m for pair in pairs for m in (pair if isinstance(pair, list) else [pair])]
-    if any(not isinstance(pair, list) or len(pair) != 2 for pair in pairs) or len(set(flat)) < len(flat):
+    whole = isinstance(pairs, list | tuple) and all(isinstance(pair, list) and len(pair) == 2 for pair in pairs)
+    flat = [muscle for pair in pairs for muscle in pair] if whole else [None]
+    if not all(isinstance(muscle, int) and muscle > 0 for muscle in flat) or len(set(flat)) < len(flat):
         raise FileError(
             f"{path}: arm.pairs is {pairs}; give for each joint the numbers of two muscles, each muscle once: "
             "[[1, 2], [3, 4]], first the one that raises the angle."
@@ -136,7 +151,7 @@ def _pairs(path: Path, pairs: Any) -> tuple[tuple[int, int], ...]:
 
 
 def _axis(path: Path, name: Any) -> tuple[int, int, int]:
-    if name not in AXES:
+    if not isinstance(name, str) or name not in AXES:
         raise FileError(f"{path}: arm.axes holds '{name}'; allowed: {', '.join(AXES)}.")
     return AXES[name]
 
@@ -169,21 +184,27 @@ def _episodes_of(path: Path, mapping: EpisodeMapping) -> Episodes:
         name = path.name if len(tables) == 1 else f"{path.name}, episode {number + 1}"
         whole, step = _episode(name, arrays, mapping)
         times.append(step)
-        runs += _split(whole, arrays, mapping)
+        runs += _split(whole, arrays, mapping, step)
     return Episodes(tuple(runs), float(np.median(times)), notes)
 
 
-def _split(whole: Episode, arrays: Arrays, mapping: EpisodeMapping) -> list[Episode]:
+def _split(whole: Episode, arrays: Arrays, mapping: EpisodeMapping, step: float) -> list[Episode]:
     if mapping.starts is None:
         return [whole]
     marks = _array(whole.name, arrays, mapping.starts).ravel()
     flags = len(marks) == len(whole) and bool(np.isin(marks, (0, 1)).all())
-    starts = [int(row) for row in (np.flatnonzero(marks) if flags else marks)]
-    edges = sorted({*starts, len(whole)})
+    starts = np.flatnonzero(marks) if flags else marks
+    if not len(starts) or np.any(starts != starts.astype(int)) or np.any(np.diff([*starts, len(whole) + 0.5]) <= 0.0):
+        raise ColumnError(
+            f"{whole.name}: starts, column '{mapping.starts}', must be the first rows of the episodes, from 0, whole "
+            f"and rising below {len(whole)} rows, or 1 in these rows and 0 elsewhere."
+        )
+    edges = [*(int(row) for row in starts if row < len(whole)), len(whole)]
     return [
         Episode(
-            whole.angle[a:b], whole.speed[a:b], whole.pressure[a:b],
-            None if whole.command is None else whole.command[a:b], f"{whole.name}, episode {number}",
+            whole.angle[a:b], whole.speed[a:b] if mapping.speeds else speed_of(whole.angle[a:b], step),
+            whole.pressure[a:b], None if whole.command is None else whole.command[a:b],
+            f"{whole.name}, episode {number}",
         )
         for number, (a, b) in enumerate(itertools.pairwise(edges), start=1)
     ]  # fmt: skip
@@ -203,6 +224,7 @@ def _episode(name: str, arrays: Arrays, mapping: EpisodeMapping) -> tuple[Episod
             )
     else:
         step = mapping.sample_time or 0.0
+        _check_times(name, arrays, step)
     speed = _columns(name, arrays, mapping.speeds) if mapping.speeds else speed_of(angle, step)
     command = _columns(name, arrays, mapping.commands) if mapping.commands else None
     for what, given in (("pressures", pressure), ("speeds", speed), ("commands", command)):
@@ -211,8 +233,21 @@ def _episode(name: str, arrays: Arrays, mapping: EpisodeMapping) -> tuple[Episod
     return Episode(angle, speed, pressure, command, name), step
 
 
+def _check_times(name: str, arrays: Arrays, step: float) -> None:
+    """Raise ColumnError for a column of times that contradicts a sample time [s], in whatever unit it is."""
+    for column in (each for each in arrays if each.lower() in TIMES and arrays[each].size > 1):
+        ratio = float(np.median(np.diff(arrays[column].ravel()))) / step
+        if ratio > 0.0 and abs(np.log10(ratio) / 3 - round(np.log10(ratio) / 3)) > SAME_TIME:
+            raise ColumnError(
+                f"{name}: column '{column}' advances by {ratio * step:.4g} in a row, the mapping file states a sample "
+                f'time of {1e3 * step:.4g} ms. Correct sample_time, or state time = "{column}" [s] in its place.'
+            )
+
+
 def _columns(name: str, arrays: Arrays, channels: Channels) -> Array:
     parts = [_array(name, arrays, column) for column in channels.columns]
+    if not all(part.ndim and part.size for part in parts):
+        raise ColumnError(f"{name}: {', '.join(channels.columns)} has no row; leave the episode out.")
     stacked = np.concatenate([part.reshape(len(part), -1) for part in parts], axis=1) * channels.scale
     if channels.divisors is not None:
         stacked = stacked / _array(name, arrays, channels.divisors).ravel()

@@ -16,6 +16,7 @@ from ...core import Array, ColumnError, FileError
 from ..readers.raw_csv import read_csv_table
 from ..readers.raw_rosbag import read_rosbag_tables
 from ..readers.separate_process import import_lab_package, run_reader
+from .episode_inspection import TURN
 
 Arrays = Mapping[str, Array]
 METADATA = "metadata.yaml"
@@ -172,8 +173,6 @@ ROLES = {
 """Words in the names of arrays, by what they contain; the first role whose word a name has."""
 STEP_WORDS = {"sample", "time", "dt", "step", "period"}
 """Words in the name of a single number that is the sample time [s]."""
-TURN = 10.0
-"""Greatest angle [rad] (chosen): greater numbers are degrees."""
 PRESSURE_SCALES = ((30.0, "1 bar"), (3000.0, "1 kPa"))
 """Units of pressures that stay below a limit (chosen); others are Pa, or counts."""
 

@@ -13,6 +13,10 @@ MAX_DELAY = 8
 """Greatest delay of the pressure sensors that is looked for [rows] (chosen)."""
 CERTAIN, CLEAR = 5.0, 1.25
 """t-value from which a pressure acts on an angle, and its ratio to that of the next joint (chosen)."""
+TURN, BURST = 10.0, 1e7
+"""Greatest angle [rad] of a joint and gauge pressure [Pa] of a muscle (chosen)."""
+DEAD = 0.01
+"""Spread of a reading, relative to the greatest of its kind, up to which it is none (chosen)."""
 JUMP = np.pi
 """Change of an angle between two rows [rad] that no arm makes."""
 SPEED_RATIO = 1.15
@@ -92,7 +96,7 @@ class EpisodeInspection:
 
 def inspect_episodes(episodes: Episodes, pairs: Sequence[tuple[int, int]] = ()) -> EpisodeInspection:
     """Inspect episodes before a fit; with `pairs`, the muscles that are said to raise and lower each angle."""
-    errors = [*_jumps(episodes), *_constant(episodes), *_sample_time(episodes)]
+    errors = [*_units(episodes), *_jumps(episodes), *_constant(episodes)] or _sample_time(episodes)
     delay, actions = (0, ()) if errors else _actions(episodes)
     errors += _exchanged(actions, pairs)
     return EpisodeInspection(episodes, delay, actions, tuple(errors), tuple(_saturated(episodes) + _scale(episodes)))
@@ -109,6 +113,19 @@ def _range_line(name: str, values: Array, unit: str) -> str:
     return f"{name}: {low:.4g} to {high:.4g} {unit} (1 to 99 %), median {middle:.4g}"
 
 
+def _units(episodes: Episodes) -> list[str]:
+    """Readings beyond what an arm has, whose unit is another one."""
+    kinds = (
+        ("angle", "rad", TURN, "further than a joint turns"),
+        ("pressure", "Pa", BURST, "more than a muscle bears"),
+    )
+    return [
+        f"{name} {i} reaches {high:.4g} {unit}, {why}: state its unit or scale in the mapping file, [{name}s]."
+        for name, unit, limit, why in kinds
+        for i, high in enumerate(np.quantile(np.abs(episodes.rows(name)), 0.99, axis=0), start=1) if high > limit
+    ]  # fmt: skip
+
+
 def _jumps(episodes: Episodes) -> list[str]:
     for run in episodes.runs:
         rows, joints = np.nonzero(np.abs(np.diff(run.angle, axis=0)) > JUMP)
@@ -122,13 +139,16 @@ def _jumps(episodes: Episodes) -> list[str]:
 
 
 def _constant(episodes: Episodes) -> list[str]:
-    pressure = episodes.rows("pressure")
-    dead = [i for i, spread in enumerate(np.ptp(pressure, axis=0), start=1) if not spread > 0.0]
-    return [
-        f"pressure {i} never varies, it is {pressure[0, i - 1]:.4g} Pa in all rows: its sensor does not record. Leave "
-        "its joint out, or give commands in its place."
-        for i in dead
-    ]
+    found = []
+    for name, unit in (("pressure", "Pa"), ("angle", "rad")):
+        low, high = np.quantile(episodes.rows(name), (0.01, 0.99), axis=0)
+        dead = np.flatnonzero(high - low <= DEAD * np.max(high - low))
+        found += [
+            f"{name} {i + 1} never varies, it is {low[i]:.4g} to {high[i]:.4g} {unit} in 98 % of the rows: its sensor "
+            "does not record. Leave its joint out, or give commands in place of pressures."
+            for i in dead
+        ]
+    return found
 
 
 def _sample_time(episodes: Episodes) -> list[str]:
@@ -208,12 +228,12 @@ def _exchanged(actions: Sequence[PressureAction], pairs: Sequence[tuple[int, int
 def _saturated(episodes: Episodes) -> list[str]:
     found = []
     for i, values in enumerate(episodes.rows("pressure").T, start=1):
-        for edge in (values.min(), values.max()):
+        for edge, cause in ((values.min(), "the muscle is empty"), (values.max(), "it has the pressure of its supply")):
             share = float(np.mean(values == edge))
             if share > SATURATED and np.ptp(values) > 0.0:
                 found.append(
                     f"pressure {i} is {edge:.4g} Pa in {100 * share:.0f} % of the rows: its reading saturates there, "
-                    "or the muscle is empty"
+                    f"or {cause}"
                 )
     return found
 

@@ -86,7 +86,7 @@ def count_fitted(episodes: Episodes, left_out: float | None) -> int:
     share = min(max(0.1, ENOUGH / count), 1 / 3) if left_out is None else left_out
     if not 0.0 < share < 1.0 or count < 4:
         raise ParameterError(
-            f"left_out is {share:g} of {count} episodes; give 4 episodes or more, and a share between 0 and 1."
+            f"left_out is {share:.3g} of {count} episodes; give 4 episodes or more, and a share between 0 and 1."
         )
     return max(1, round((1.0 - share) * count))
 
@@ -173,6 +173,23 @@ class Windows:
         return dataclasses.replace(self, **columns, episode=self.episode[which], first=self.first[which])
 
 
+def long_enough(episodes: Episodes, rows: int) -> tuple[Episodes, list[str]]:
+    """The episodes that hold a window, and a remark on the others. Raises IdentificationError if none does."""
+    needed = HISTORY + rows + 2
+    kept = tuple(run for run in episodes.runs if len(run) >= needed)
+    if not kept:
+        raise IdentificationError(
+            f"no episode is as long as a window: the longest has {max(map(len, episodes.runs))} rows, a window needs "
+            f"{needed} ({HISTORY} before its start). Give longer episodes, or a shorter horizon (--horizon)."
+        )
+    short = [run.name for run in episodes.runs if len(run) < needed]
+    names = ", ".join(short[:3]) + (", ..." if len(short) > 3 else "")
+    text = (
+        f"{len(short)} of {len(episodes)} episodes are shorter than a window of {needed} rows and are left out: {names}"
+    )
+    return dataclasses.replace(episodes, runs=kept), [text] if short else []
+
+
 def cut(episodes: Episodes, delay: int = 0, rows: int = ROWS, stride: int = ROWS) -> Windows:
     """The windows that begin at rows HISTORY, HISTORY + stride, ... of every episode while `rows` further rows follow.
 
@@ -183,11 +200,7 @@ def cut(episodes: Episodes, delay: int = 0, rows: int = ROWS, stride: int = ROWS
         (number, k) for number, run in enumerate(episodes.runs) for k in range(HISTORY, len(run) - rows - 1, stride)
     ]
     if not found:
-        longest = max(len(run) for run in episodes.runs)
-        raise IdentificationError(
-            f"no episode is as long as a window: the longest has {longest} rows, a window needs {HISTORY + rows + 2} "
-            f"({HISTORY} before its start). Give longer episodes, or a shorter horizon (--horizon)."
-        )
+        long_enough(episodes, rows)  # raises
     rates = {number: speed_of(episodes.runs[number].angle, episodes.sample_time) for number, _ in found}
     later = np.minimum(np.arange(-HISTORY, rows + 1) + delay, rows)
 
@@ -273,5 +286,7 @@ def band(errors: Array) -> Array:
 def coverage(errors: Array, episode: Array) -> Array:
     """Share (J,) of errors inside a band that comes from the other half of the episodes, both ways."""
     odd = np.searchsorted(np.unique(episode), episode) % 2 == 1
+    if odd.all() or not odd.any():
+        return np.full(errors.shape[2], np.nan)
     held = [np.abs(errors[part]) <= band(errors[~part]) for part in (odd, ~odd)]
     return np.asarray(np.mean(np.concatenate(held), axis=(0, 1)))

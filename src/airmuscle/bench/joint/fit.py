@@ -19,7 +19,7 @@ from ...physics import (
 )
 from .descent import CLIP, Descent, SearchStage, gradients, typical_size
 from .episode_inspection import EpisodeInspection, check_episodes, inspect_episodes
-from .episodes import HISTORY, ROWS, Episodes, Windows, band, count_fitted, cut, in_pairs, rms
+from .episodes import HISTORY, ROWS, Episodes, Windows, band, count_fitted, cut, in_pairs, long_enough, rms
 from .free_run import baseline_errors, fit_regulator_lags, free_run, from_commands, judged_residual
 from .result import ArmFit, ArmParameter
 
@@ -64,6 +64,7 @@ def fit_joint(
     robust error of the free run over windows of 40 rows, with exact gradients.
     Raises IdentificationError for episodes that `inspect_episodes` refuses, ParameterError for impossible arguments.
     """
+    episodes, short = long_enough(episodes, rows)
     split = count_fitted(episodes, left_out)
     inspection, found = _inspected(episodes, tuple(pairs), tuple(axes))
     progress(f"delay of the pressures: {inspection.delay} rows")
@@ -72,7 +73,7 @@ def fit_joint(
     train, judge = cut(fitted, delay, rows), cut(left, delay, rows)
     arm, paths = _search(fitted, train, tuple(axes), seed, progress)
     separated = [separate(arm, joint, own, train) for joint, own in paths.items()]
-    gain, remarks = None, [*inspection.remarks, SCALE, *(text for _, texts, _ in separated for text in texts)]
+    gain, remarks = None, [*short, *inspection.remarks, SCALE, *(text for _, texts, _ in separated for text in texts)]
     if residual:
         arm, gain, words = judged_residual(arm, fitted, judge, delay, seed, progress)
         remarks.append(words)
@@ -202,7 +203,7 @@ def separated(
 def _words(joint: int, paths: Sequence[str], shares: Array) -> list[str]:
     """The parameters of the directions that are not separated, first those that have the least information."""
     names = list(dict.fromkeys(_name(paths[i]) for i in np.argsort(-shares) if shares[i] > SHARE))
-    further = f" and {len(names) - NAMED} others" if len(names) > NAMED else ""
+    further = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
     text = (
         f"joint {joint + 1}: the record does not separate {', '.join(names[:NAMED])}{further}: combinations of them "
         "may have any value; fix or measure them before they are read as properties of the arm"

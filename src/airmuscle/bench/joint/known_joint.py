@@ -10,7 +10,7 @@ from ...engine import WithSensitivities, sensitivity
 from ...physics import PressureDriven
 from .descent import CLIP, OUTLIER, over, with_values
 from .episode_inspection import check_episodes, inspect_episodes
-from .episodes import HISTORY, ROWS, Episodes, Windows, WindowSignal, band, count_fitted, cut, lagged
+from .episodes import HISTORY, ROWS, Episodes, Windows, WindowSignal, band, count_fitted, cut, lagged, long_enough
 from .fit import NAMED, SHARE, separated
 from .free_run import baseline_errors
 from .result import ArmFit, ArmParameter
@@ -73,6 +73,7 @@ def fit_known_joint(
     ParameterError for another number of pressures or angles, other pairs, and a path that the arm does not have.
     """
     count, joints = len(arm.muscle), len(arm.mechanism.coordinates)
+    episodes, short = long_enough(episodes, rows)
     split = count_fitted(episodes, left_out)
     if (episodes.muscles, episodes.joints, count) != (count, joints, 2 * joints):
         raise ParameterError(
@@ -100,7 +101,7 @@ def fit_known_joint(
     return ArmFit(
         system.arm, inspection, own, errors, judge.episode,
         baseline_errors(episodes[:split], episodes[split:], rows), band(errors), tuple(estimates[i] for i in of_arm),
-        (*inspection.remarks, *remarks), split, covariance=covariance[np.ix_(of_arm, of_arm)],
+        (*short, *inspection.remarks, *remarks), split, covariance=covariance[np.ix_(of_arm, of_arm)],
     )  # fmt: skip
 
 

@@ -120,10 +120,11 @@ class ArmFit(Reported):
         """The description of the fit: errors beside those of the baselines, skill, band, muscles and parameters."""
         end, count = self.horizon[-1], len(np.unique(self.episode))
         skill = ", ".join(f"joint {j}: {value:.2f}" for j, value in enumerate(self.skill, start=1))
-        caption = (
-            "Root mean square error against the horizon: the model, its baselines, and the 95 % band of the model "
-            "(shaded), which is the 95th percentile of the errors at each row."
-        )
+        band = (
+            "the 95 % band of the model (shaded), which is the 95th percentile of the errors at each row."
+            if count >= ENOUGH else f"the greatest errors of {count} episodes (shaded), which are no 95 % band."
+        )  # fmt: skip
+        caption = f"Root mean square error against the horizon: the model, its baselines, and {band}"
         return Chapter(
             name="joint",
             title="Identified arm",
@@ -141,13 +142,17 @@ class ArmFit(Reported):
         )
 
     def _doubt(self, count: int) -> list[str]:
-        """What a band of few episodes means."""
+        """What a band of few episodes means, and joints whose baseline is better."""
         text = (
             f"the band comes from {count} episodes left out: it is no 95 % band. Their greatest errors hold those of a "
             f"further episode with {100 * count / (count + 1):.0f} %, n/(n + 1), and {ENOUGH} episodes are needed; "
             "record more, or leave out a greater share"
         )
-        return [text] if count < ENOUGH else []
+        worse = [
+            f"joint {j}: {name} predicts better than the model, which is of no use there"
+            for j, (name, skill) in enumerate(zip(self.best_baseline, self.skill, strict=True), 1) if skill < 0.0
+        ]  # fmt: skip
+        return [*([text] if count < ENOUGH else []), *worse]
 
     def _error_table(self) -> Table:
         found = {**self.by_baseline, "model": self.errors, "model, from commands": self.commanded}

@@ -42,7 +42,7 @@
       card("Result", ...arm.paragraphs.map((text) => element("p", {}, text)), element("div.row", {}, ...links)),
       card("Error of the free run", ...[errors, joints].filter(Boolean).flatMap((table) => [element("h3", {}, table.title), element("div.scroll", {}, chapterTable(table))]),
         ...figures.flatMap(({ src, caption }) => [element("img.figure", { src, alt: caption }), element("p.small.soft", {}, caption)])),
-      card("What the record does not separate", element("ul", {}, ...arm.notes.map((text) => element("li", {}, text)))),
+      card("Remarks", element("ul", {}, ...arm.notes.map((text) => element("li", {}, text)))),
       card("Parameters", element("details", {}, element("summary", {}, "Identified parameters with their standard errors"), ...Object.values(others).flatMap((table) => [element("h3", {}, table.title), element("div.scroll", {}, chapterTable(table))]), chapterTable(values))));
   }
 
