@@ -146,7 +146,7 @@ def campaign(
     complete = complete_bench([*recordings, *aside], columns)
     print_row_notes(complete)
     recordings, aside = complete[: len(recordings)], complete[len(recordings) :]
-    geometry = None if size is None else braid_of_length(size, _one_length(recordings))
+    geometry = None if size is None else braid_of_length(size, check_one_length(resting_lengths(recordings)))
     writes = execution.writes(out)
     if writes:
         check_writable(out)
@@ -189,12 +189,6 @@ def _read_each(files: Sequence[Path], mapping: ColumnMapping) -> tuple[list[Reco
         reasons = (x.reason if x.name in x.reason else f"{x.name}: {x.reason}" for x in unread)
         raise FileError(f"no file of the campaign could be read. {' '.join(reasons)}")
     return recordings, unread
-
-
-def _one_length(recordings: Sequence[Recording]) -> float:
-    lengths = resting_lengths(recordings)
-    check_one_length(lengths)
-    return lengths[0]
 
 
 def _identify(

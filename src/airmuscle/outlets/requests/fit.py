@@ -93,11 +93,12 @@ def with_braid(entry: Entry, size: BraidSize | None, recordings: Sequence[Record
     return dataclasses.replace(entry, geometry=braid_of_length(size, lengths[0]))
 
 
-def check_one_length(lengths: Sequence[float]) -> None:
-    """Raise ParameterError unless there is exactly one resting length [m] for the braid of --braid."""
+def check_one_length(lengths: Sequence[float]) -> float:
+    """The one resting length [m] for the braid of --braid. Raises ParameterError unless there is exactly one."""
     problem = problem_of_lengths(lengths)
     if problem:
         raise ParameterError(f"--braid: {problem} Give --resting-length, or files of one muscle.")
+    return lengths[0]
 
 
 def problem_of_lengths(lengths: Sequence[float]) -> str:

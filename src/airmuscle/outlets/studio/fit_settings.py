@@ -35,14 +35,8 @@ COLUMN_CHOICES = (*am.recording.QUANTITIES, "resting_length", "ambient")
 """Quantities of a column."""
 SPLITS: Mapping[str, am.bench.GroupSplit | None] = {"": None, **GROUPS}
 """Groups that are left out in turn; by default those that the data allow."""
-_UNITS = {
-    "braid_radius": "m",
-    "braid_angle": "rad",
-    "resting_length": "m",
-    "ambient": "Pa",
-    "displacement_zero": "m",
-    "length": "m",
-}
+_UNITS = {"braid_angle": "rad", "ambient": "Pa"}
+"""Units of the facts; of others metres."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -140,7 +134,7 @@ def _check_quantity(text: str, name: str, field: str) -> None:
     words = name.replace("_", " ")
     example = {**CONSTANTS, **BRAID}.get(name, "300 mm")
     try:
-        value = quantity(text, _UNITS[name], ambient=0.0, where=words)
+        value = quantity(text, _UNITS.get(name, "m"), ambient=0.0, where=words)
     except AirmuscleError as error:
         raise RequestError(f"{error.message} Write a number with its unit, such as {example}.", field) from None
     signed = name == "displacement_zero"
