@@ -36,16 +36,10 @@ Progress = Callable[[str], None]
 
 
 def fit_joint(
-    episodes: Episodes,
-    *,
-    pairs: Sequence[tuple[int, int]] = (),
-    axes: Sequence[tuple[int, int, int]] = (),
-    left_out: float | None = None,
-    rows: int = ROWS,
-    residual: bool = False,
-    seed: int = 0,
+    episodes: Episodes, *, pairs: Sequence[tuple[int, int]] = (), axes: Sequence[tuple[int, int, int]] = (),
+    left_out: float | None = None, rows: int = ROWS, residual: bool = False, seed: int = 0,
     progress: Progress = lambda text: None,
-) -> ArmFit:
+) -> ArmFit:  # fmt: skip
     """Identify a joint, or an arm of joints, from episodes of pressures and angles.
 
     pairs     for each joint the muscles, from 1, that raise and lower its angle; found from the record unless given

@@ -94,20 +94,11 @@ Progress = Callable[[int, int], None]
 
 
 def tune(
-    cases: Sequence[LoopCase],
-    bounds: Mapping[str, tuple[float, float]],
-    *,
-    duration: float,
-    index: TrackingIndex = RootMeanSquareError(),
-    objective: Objective = RobustObjective(),
-    budget: int = 4000,
-    seed: int = 0,
-    start: Sequence[Mapping[str, float]] = (),
-    start_time: float = 0.0,
-    integrator: Integrator | None = None,
-    progress: Progress | None = None,
-    workers: Workers = 1,
-) -> Tuning:
+    cases: Sequence[LoopCase], bounds: Mapping[str, tuple[float, float]], *, duration: float,
+    index: TrackingIndex = RootMeanSquareError(), objective: Objective = RobustObjective(), budget: int = 4000,
+    seed: int = 0, start: Sequence[Mapping[str, float]] = (), start_time: float = 0.0,
+    integrator: Integrator | None = None, progress: Progress | None = None, workers: Workers = 1,
+) -> Tuning:  # fmt: skip
     """Find the gains of a controller that minimise an objective over a family of cases.
 
     cases       the family: LoopCase with the same controller; the first one is the nominal case

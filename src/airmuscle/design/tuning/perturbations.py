@@ -69,15 +69,10 @@ class PerturbedFamily(NamedTuple):
 
 
 def perturbed_family(
-    plant: Plant,
-    loop: ControlLoop,
-    perturbations: Perturbations = Perturbations(),
-    *,
-    initial_state: InitialState = lambda plant: None,
-    uncertainties: Sequence[ParameterUncertainty | None] = (),
-    fitted: PlantUncertainty | None = None,
-    seed: int = 0,
-) -> PerturbedFamily:
+    plant: Plant, loop: ControlLoop, perturbations: Perturbations = Perturbations(), *,
+    initial_state: InitialState = lambda plant: None, uncertainties: Sequence[ParameterUncertainty | None] = (),
+    fitted: PlantUncertainty | None = None, seed: int = 0,
+) -> PerturbedFamily:  # fmt: skip
     """The nominal case and one case for each perturbation.
 
     initial_state   function from a perturbed plant to its initial state; None is equilibrium at ambient pressure
@@ -151,12 +146,9 @@ def _delayed(law: Any, delay: int) -> WithSensors:
 
 
 def _draws(
-    plant: Plant,
-    uncertainties: Sequence[ParameterUncertainty | None],
-    fitted: PlantUncertainty | None,
-    count: int,
+    plant: Plant, uncertainties: Sequence[ParameterUncertainty | None], fitted: PlantUncertainty | None, count: int,
     seed: int,
-) -> Iterator[tuple[str, Plant]]:
+) -> Iterator[tuple[str, Plant]]:  # fmt: skip
     """Plants whose fitted parameters deviate by draws of a normal distribution that are within the declared ranges."""
     if len(uncertainties) not in (0, len(plant.muscles)):
         raise ParameterError(

@@ -115,13 +115,9 @@ class CampaignRequest:
 
 @with_requests
 def campaign(
-    folder: CampaignFolder,
-    request: CampaignRequest,
-    reading: ReadingRequest,
-    execution: Execution,
-    out: Folder = Path("campaign"),
-    json: Json = False,
-) -> None:
+    folder: CampaignFolder, request: CampaignRequest, reading: ReadingRequest, execution: Execution,
+    out: Folder = Path("campaign"), json: Json = False,
+) -> None:  # fmt: skip
     """Identify a muscle from all files of a test rig.
 
     \b

@@ -20,13 +20,9 @@ from .terminal import computation_progress
 
 @with_requests
 def fit(
-    files: Files,
-    request: FitRequest,
-    reading: ReadingRequest,
-    execution: Execution,
-    out: Folder = Path("fit"),
+    files: Files, request: FitRequest, reading: ReadingRequest, execution: Execution, out: Folder = Path("fit"),
     json: Json = False,
-) -> None:
+) -> None:  # fmt: skip
     """Fit a characteristic to measured points, or compare several.
 
     \b

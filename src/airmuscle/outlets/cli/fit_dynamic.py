@@ -100,12 +100,9 @@ class RegulatorRequest:
 
 @with_requests
 def fit_regulator_command(
-    files: Files,
-    request: RegulatorRequest,
-    reading: ReadingRequest,
-    out: Folder = Path("regulator"),
+    files: Files, request: RegulatorRequest, reading: ReadingRequest, out: Folder = Path("regulator"),
     json: Json = False,
-) -> None:
+) -> None:  # fmt: skip
     """Identify a pressure regulator from its response.
 
     \b

@@ -45,12 +45,9 @@ class HysteresisRequest:
 
 @with_requests
 def hysteresis(
-    files: Files,
-    request: HysteresisRequest,
-    reading: ReadingRequest,
-    out: Folder = Path("hysteresis"),
+    files: Files, request: HysteresisRequest, reading: ReadingRequest, out: Folder = Path("hysteresis"),
     json: Json = False,
-) -> None:
+) -> None:  # fmt: skip
     """Fit friction models to hysteresis loops.
 
     \b

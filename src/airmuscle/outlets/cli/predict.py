@@ -64,13 +64,9 @@ class PredictRequest:
 
 @with_requests
 def predict(
-    model: Model,
-    files: Records,
-    request: PredictRequest,
-    reading: ReadingRequest,
-    out: Folder = Path("prediction"),
+    model: Model, files: Records, request: PredictRequest, reading: ReadingRequest, out: Folder = Path("prediction"),
     json: Json = False,
-) -> None:
+) -> None:  # fmt: skip
     """Predict further records by an identified muscle or plant.
 
     \b

@@ -60,12 +60,9 @@ class FittedMuscle:
 
 
 def fit_requested(
-    request: FitRequest,
-    names: Sequence[Path],
-    recordings: Sequence[Recording],
-    progress: Progress | None = None,
+    request: FitRequest, names: Sequence[Path], recordings: Sequence[Recording], progress: Progress | None = None,
     workers: Workers = 1,
-) -> FittedMuscle:
+) -> FittedMuscle:  # fmt: skip
     """The fit of the named law, or the recommended one of the comparison, with what else is requested.
 
     names  of the files of the recordings
