@@ -18,7 +18,7 @@ from airmuscle.bench import (
     fit_held_creep,
 )
 from airmuscle.bench.identify.campaign import check_one_rig, find_motion, find_pressure_steps, volume_change, with_force
-from airmuscle.bench.identify.campaign.release_stage import _mass
+from airmuscle.bench.identify.campaign.friction_and_release import _mass
 from airmuscle.bench.identify.campaign.static_stage import _band, _inner, _left_out_residuals
 from airmuscle.bench.identify.dynamic import SensorLocation, searches_at_lowest
 from airmuscle.bench.identify.dynamic.candidate_records import _Context

@@ -14,7 +14,7 @@ import printed
 import pytest
 
 from airmuscle.engine.compile import compile_system
-from airmuscle.engine.compile.jacobians import event_indicators
+from airmuscle.engine.compile.function import event_indicators
 
 SOME = ("dmsp-20-300", "Serres", "series spring with a stop", "Prandtl-Ishlinskii", "overlap")
 """Plants with jumps on these lines."""

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from airmuscle.bench import BlockMeans, ColumnMapping, Decimation, read
-from airmuscle.bench.readers import downsampling as pieces
 from airmuscle.bench.readers import raw_columnar, raw_mat, raw_mdf, read_contents
+from airmuscle.bench.readers import time_base as pieces
 from airmuscle.errors import AirmuscleError, ColumnError
 
 h5py = pytest.importorskip("h5py", reason="h5py is not installed")

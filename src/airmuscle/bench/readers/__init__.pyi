@@ -1,7 +1,5 @@
 from .channels import Channel as Channel
 from .channels import merge_channels as merge_channels
-from .downsampling import BlockMeans as BlockMeans
-from .downsampling import Decimation as Decimation
 from .follow import MAX_UNREADABLE as MAX_UNREADABLE
 from .follow import RowReader as RowReader
 from .follow import follow_lines as follow_lines
@@ -23,6 +21,8 @@ from .reader import read as read
 from .reader import read_csv as read_csv
 from .separate_process import call_in_separate_process as call_in_separate_process
 from .separate_process import is_installed as is_installed
+from .time_base import BlockMeans as BlockMeans
+from .time_base import Decimation as Decimation
 from .time_base import NoTime as NoTime
 from .time_base import RecordedTime as RecordedTime
 from .time_base import TimeBase as TimeBase

@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from ...core import Array
-from .downsampling import Downsampling, Reduction, check_reduced_lengths, read_reduced
 from .raw_columnar import check_no_external_links, check_own_values
 from .separate_process import import_lab_package
+from .time_base import Downsampling, Reduction, check_reduced_lengths, read_reduced
 
 MAX_CELLS = 10_000
 """Maximum number of elements of a cell array of version 7.3 that is read, such as names of columns (chosen)."""

@@ -10,8 +10,8 @@ import numpy as np
 
 from ...core import FileError, suggestion
 from .channels import Channel, RawTable, merge_channels
-from .downsampling import Decimation, Downsampling, Reduction, check_reduced_lengths, read_reduced, with_reduction
 from .separate_process import import_lab_package, in_separate_process, run_reader
+from .time_base import Decimation, Downsampling, Reduction, check_reduced_lengths, read_reduced, with_reduction
 
 
 class StoredTable(NamedTuple):

@@ -12,7 +12,6 @@ import numpy as np
 from ...core import ColumnError, FileError, Hint, abridged, listed
 from ...recording.recording import list_rows
 from .channels import Cells, RawTable
-from .downsampling import Decimation, Downsampling, downsample
 from .file_kind import check_beginning, check_text_file
 from .header import COMMA_NUMBER, POINT_NUMBER
 from .missing_values import MAX_LISTED
@@ -26,6 +25,7 @@ from .text_format import (
     parse_header,
     split_cells,
 )
+from .time_base import Decimation, Downsampling, downsample
 
 _THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2}[.,]\d{3}")
 

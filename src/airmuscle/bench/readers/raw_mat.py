@@ -16,11 +16,11 @@ import numpy as np
 from ...core import ColumnError, FileError, Hint, suggestion
 from ...recording.columns import parse_heading
 from .channels import Channel, RawTable, merge_channels
-from .downsampling import Decimation, Downsampling, Reduction, with_reduction
 from .mat_contents import is_plain_hdf5, read_contents
 from .mat_objects import READABLE, MatlabObject, find_objects, read_objects
 from .raw_columnar import read_hdf5_tables
 from .separate_process import in_separate_process, run_reader
+from .time_base import Decimation, Downsampling, Reduction, with_reduction
 
 
 def read_mat_tables(

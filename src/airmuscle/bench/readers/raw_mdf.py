@@ -10,8 +10,8 @@ import numpy as np
 
 from ...core import Array, FileError, listed, suggestion
 from .channels import Channel, RawTable, merge_channels
-from .downsampling import Decimation, Downsampling, read_reduced
 from .separate_process import import_lab_package, in_separate_process, run_reader
+from .time_base import Decimation, Downsampling, read_reduced
 
 _TIME_MASTER = 1
 """Type of a master channel that contains time, in both versions of the format."""

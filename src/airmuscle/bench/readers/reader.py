@@ -12,7 +12,6 @@ from ..checks import warn_of_suspicious_values
 from ..segment.outliers import without_outliers
 from .channels import RawTable
 from .constants import split_specimens
-from .downsampling import Decimation, Downsampling, downsample
 from .file_kind import check_text_file
 from .interpret import interpret
 from .mapping import ColumnMapping, apply_mapping, read_mapping
@@ -24,6 +23,7 @@ from .raw_mat import read_mat_tables
 from .raw_mdf import read_mdf_tables, read_tdms_tables
 from .raw_rosbag import read_rosbag_tables
 from .raw_workbook import read_workbook_tables
+from .time_base import Decimation, Downsampling, downsample
 
 Source = str | Path | Iterable[str | Path]
 Tables = tuple[RawTable, ...]

@@ -3,7 +3,6 @@ from .angle_and_stiffness import AntagonisticInverse as AntagonisticInverse
 from .composition import Cascade as Cascade
 from .composition import GainSchedule as GainSchedule
 from .composition import WithFeedForward as WithFeedForward
-from .computed_torque import ComputedTorque as ComputedTorque
 from .enclosing import Multirate as Multirate
 from .enclosing import WithCommandDelay as WithCommandDelay
 from .enclosing import WithManual as WithManual
@@ -36,6 +35,7 @@ from .pressures import Decentralised as Decentralised
 from .pressures import ProportionalFeedback as ProportionalFeedback
 from .sliding_mode import SlidingMode as SlidingMode
 from .sliding_mode import SuperTwisting as SuperTwisting
+from .state_feedback import ComputedTorque as ComputedTorque
 from .state_feedback import StateFeedback as StateFeedback
 from .static_inverse import StaticFeedForward as StaticFeedForward
 from .static_inverse import StaticInverse as StaticInverse

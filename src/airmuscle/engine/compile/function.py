@@ -1,6 +1,8 @@
-"""Expressions as compiled functions of arrays, at one point or at several side by side; rates with disturbances."""
+"""Expressions as compiled functions of arrays, rates with disturbances, partial derivatives, and event indicators."""
 
 import dataclasses
+import math
+import weakref
 from collections.abc import Sequence
 from typing import Any
 
@@ -9,7 +11,11 @@ import numpy as np
 from ...core import Array
 from .cache.kernel import evaluate
 from .cache.store import load_module
-from .functions import PARAMETERS, Printer
+from .functions import PARAMETERS, Printer, TracedSystem
+from .ir import emission, jacobian
+from .ir.instructions import Code, Instruction, Operand, Operation, finished, recorded
+from .ir.interpreter import InterpretedBody
+from .ir.jacobian import ZERO, Tape
 from .llvm import vector_math
 from .llvm.emit import LlvmLanguage, LlvmType
 from .program import CompiledSystem, Program, prepare_function
@@ -127,3 +133,126 @@ def states_and_outputs(functions: AugmentedRates, count: int, states: Array, inp
     values = np.empty((len(states), outputs))
     evaluate(functions.outputs, functions.constants, np.ascontiguousarray(states), np.ascontiguousarray(inputs), values)
     return np.hstack([states[:, :count], values])
+
+
+_functions: weakref.WeakKeyDictionary[Program, Any] = weakref.WeakKeyDictionary()
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Derivatives:
+    """Rates f (n,) and outputs o (k,), and their slopes by state x and input u."""
+
+    rates: Array
+    outputs: Array
+    rates_by_state: Array
+    rates_by_input: Array
+    outputs_by_state: Array
+    outputs_by_input: Array
+
+
+def derivatives(ready: CompiledSystem, state: Sequence[float], inputs: Sequence[float]) -> Derivatives:
+    """The derivatives at a state vector (n,) under inputs (m,). At a kink they are those of one of its sides."""
+    results = _function(ready.program)(np.asarray(state, float), np.asarray(inputs, float), ready.parameters)
+    f, o, *slopes = (np.asarray(part, dtype=float) for part in results)
+    return Derivatives(f[:, 0], o.reshape(-1), *slopes)
+
+
+def _function(program: Program) -> Any:
+    """(x, u, p) -> (f, o, df/dx, df/du, do/dx, do/du), differentiated once for a structure."""
+    if program not in _functions:
+        import casadi
+
+        t = program.traced
+        slopes = [casadi.jacobian(value, by) for value in (t.f, t.o) for by in (t.x, t.u)]
+        _functions[program] = casadi.Function("derivatives", [t.x, t.u, t.p], [t.f, t.o, *slopes])
+    return _functions[program]
+
+
+Place = tuple[int, int]
+"""Row among the rates followed by the outputs, and column among the states followed by the inputs."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class Partials:
+    """The non-zeros of d(f, o)/d(x, u): instructions for their values, and the places where they stand."""
+
+    code: Code
+    places: tuple[Place, ...]
+
+    def extend(self, printer: Printer) -> None:
+        """Print `partials(x, u, c, D)`, whose result D has one value for each place."""
+        printer.add_code("partials", ["x", "u", PARAMETERS], self.code, ["D"])
+
+
+def partials(t: TracedSystem) -> Partials:
+    """The partial derivatives of a traced system."""
+    code = recorded([t.x, t.u, t.p], [t.f, t.o])
+    n, m = t.x.numel(), t.u.numel()
+    tape, operands = Tape(code.body), {(k, index): operand for k, index, operand in code.outputs}
+    results = [operands.get((0, i), ZERO) for i in range(n)] + [operands.get((1, i), ZERO) for i in range(t.o.numel())]
+    columns = [("in", 0, j) for j in range(n)] + [("in", 1, j) for j in range(m)]
+    rows = jacobian.derivatives(tape, results, columns)
+    values = {(i, j): row[x] for i, row in enumerate(rows) for j, x in enumerate(columns) if x in row}
+    outputs = tuple((0, k, operand) for k, operand in enumerate(values.values()))
+    return Partials(finished(Code(tuple(tape.body), outputs)), tuple(values))
+
+
+ARGUMENTS = ["x", "u", PARAMETERS]
+_COMPARISONS = frozenset({
+    Operation.LESS, Operation.LESS_EQUAL, Operation.FMIN, Operation.FMAX, Operation.MINIMUM, Operation.MAXIMUM,
+})  # fmt: skip
+_OF_ZERO = frozenset({Operation.ABS, Operation.SIGN})
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class EventIndicators:
+    """The instructions that compute `count` event indicators: differences of values that the rates compare.
+
+    They change sign where the rates are continuous but their slopes are not, for instance where a stop is touched, a
+    flow chokes or reverses, or a friction element begins to slip. An integrator of variable order restarts there.
+    """
+
+    code: Code
+    count: int
+
+    def extend(self, printer: Printer) -> None:
+        """Print `indicators(x, u, c, z)`, whose result z has one value for each."""
+        printer.add_code("indicators", ARGUMENTS, self.code, ["z"])
+
+    def values(self, x: Array, u: Array, p: Array) -> list[float]:
+        """The event indicators at a state under inputs, by interpretation of the instructions."""
+        block = InterpretedBody(dict(zip(ARGUMENTS, (x.tolist(), u.tolist(), p.tolist()), strict=True)))
+        for (_, index), value in emission.computed(block, self.code, ARGUMENTS, {}, {}).items():
+            block.store("z", index, value)
+        return [block.stored["z", i] for i in range(self.count)]
+
+    def scales(self, x: Array, u: Array, p: Array, sizes: Array) -> list[float]:
+        """The magnitude of each indicator: its largest change if one state changes by its nominal size, else 1."""
+        at = self.values(x, u, p)
+        greatest = [0.0] * self.count
+        for i, size in enumerate(sizes):
+            moved = self.values(x + size * (np.arange(x.size) == i), u, p)
+            changes = [abs(b - a) for a, b in zip(at, moved, strict=True)]
+            greatest = [max(g, c) if math.isfinite(c) else g for g, c in zip(greatest, changes, strict=True)]
+        return [value or 1.0 for value in greatest]
+
+
+def event_indicators(t: TracedSystem) -> EventIndicators:
+    """The event indicators of a traced system: one for each pair of values that its rates compare.
+
+    A pair that depends on parameters only never changes its order, and has none.
+    """
+    code = finished(recorded([t.x, t.u, t.p], [t.f]))
+    varying: set[Operand] = set()
+    body = list(code.body)
+    pairs: dict[frozenset[Operand], tuple[Operand, Operand]] = {}
+    for line in code.body:
+        if any(a in varying or (a[0] == "in" and a[1] < 2) for a in line.arguments):
+            varying.add(line.result)
+            if line.operation in _COMPARISONS:
+                pairs.setdefault(frozenset(line.arguments), (line.arguments[0], line.arguments[1]))
+            elif line.operation in _OF_ZERO:
+                pairs.setdefault(frozenset({line.arguments[0], ("c", 0.0)}), (line.arguments[0], ("c", 0.0)))
+    body += [Instruction(Operation.SUBTRACT, ("t", "z", i), pair) for i, pair in enumerate(pairs.values())]
+    outputs = tuple((0, i, ("t", "z", i)) for i in range(len(pairs)))
+    return EventIndicators(finished(Code(tuple(body), outputs)), len(pairs))

@@ -5,11 +5,11 @@ from .entry_point import check_interrupted as check_interrupted
 from .entry_point import deferred_sigint as deferred_sigint
 from .entry_point import main as main
 from .library import as_bibtex as as_bibtex
-from .option_hints import INSTRUCTIONS as INSTRUCTIONS
-from .option_hints import in_options as in_options
 from .options import SHELLS as SHELLS
 from .options import complete_data as complete_data
 from .options import complete_entry as complete_entry
 from .options import complete_plant as complete_plant
+from .terminal import INSTRUCTIONS as INSTRUCTIONS
+from .terminal import in_options as in_options
 from .terminal import print_json as print_json
 from .terminal import print_table as print_table

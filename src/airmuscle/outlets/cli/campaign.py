@@ -33,9 +33,8 @@ from ..requests import BraidSize, ReadingRequest, braid_of_length, check_one_len
 from .bench_files import print_row_notes, reading_chapters
 from .delivery import deliver
 from .execution import Execution
-from .option_hints import in_options
 from .options import Folder, Json, with_requests
-from .terminal import computation_progress, echo, reading_progress
+from .terminal import computation_progress, echo, in_options, reading_progress
 
 OMITTED_ROOMS = ("outlets", "papers", "report", "design", "files", "control")
 """Rooms of the program that do not affect the stages of a campaign."""

@@ -15,9 +15,8 @@ from typer.core import TyperGroup
 
 from ...core import AirmuscleError, AirmuscleWarning, exclusive_folders, quotable, suggestion
 from .entry_point import INTERRUPTED, check_interrupted, deferred_sigint
-from .option_hints import in_options
 from .options import install_completion_classes, print_completion_script
-from .terminal import echo, show_warning
+from .terminal import echo, in_options, show_warning
 
 SETTINGS: dict[str, Any] = {
     "add_completion": False,
@@ -57,14 +56,14 @@ COMMANDS = (
     CommandRow("fit-volume", "fit", "fit_volume_command", "Fit the volume of a muscle over its contraction."),
     CommandRow("plan", "plan", "plan", "Design the most informative experiments."),
     CommandRow("fit-live", "fit_live", "fit_live", "Fit a surface while rows arrive; name the next point."),
-    CommandRow("size", "size", "size", "Size muscles of the catalogue for a lift or a joint."),
+    CommandRow("size", "plan", "size", "Size muscles of the catalogue for a lift or a joint."),
     CommandRow("simulate", "simulate", "simulate", "Simulate the plant of a scenario file."),
     CommandRow("study", "study", "study", "Run a parameter study of a scenario."),
     CommandRow("tune", "tune", "tune", "Tune the controller of a scenario for a family of plants."),
     CommandRow("benchmark", "benchmark", "benchmark", "Benchmark controllers of a joint on common tasks."),
     CommandRow("export", "export", "export", "Export to C, MATLAB, FMU, MuJoCo, PyTorch and other targets."),
     CommandRow("studio", "studio", "studio", "Show muscles and plants in the browser."),
-    CommandRow("schema", "schema", "schema", "Print the JSON schema of scenario or muscle files."),
+    CommandRow("schema", "simulate", "schema", "Print the JSON schema of scenario or muscle files."),
 )
 """All commands, in the order of use."""
 RUN_CODE = ("simulate", "study", "tune", "benchmark", "export", "schema")

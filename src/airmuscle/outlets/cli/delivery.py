@@ -9,8 +9,7 @@ from ...report.chapter import Chapter
 from ...report.data import as_data, in_words
 from ...report.text import as_text
 from ...report.write import REPORT_FILE, write_into
-from .option_hints import in_options
-from .terminal import echo, on_one_screen, print_json, terminal_width, warned
+from .terminal import echo, in_options, on_one_screen, print_json, terminal_width, warned
 
 Files = Mapping[str, "str | Callable[[Path], object]"]
 """Files of a result by name: a text, or a function that writes the file at a path."""

@@ -1,4 +1,4 @@
-"""`airmuscle plan`: D-optimal design of static experiments, and the record that separates parameters of a plant."""
+"""`airmuscle plan`: D-optimal static experiments, and records that separate parameters; `airmuscle size`: muscles."""
 
 import dataclasses
 from pathlib import Path
@@ -7,13 +7,17 @@ from ...bench.identify.dynamic import rank_records
 from ...bench.identify.experiment_design import BenchLimits, optimal_design
 from ...bench.readers import write
 from ...core import check_writable
+from ...design.sizing.chapter import sizing_chapter
+from ...design.sizing.scenario import sizing_scenario
 from ...files.library import is_path, load_law, read_toml
 from ...files.scenario.identification import load_dynamic_fit
 from ...physics.muscle.characteristic import ValidityRange
 from ...report.write import save_table
 from ..requests.declaration import RequestError, option, request
+from ..requests.size import SizeRequest
 from .delivery import deliver
 from .options import Json, Name, OptionalFolder, with_requests
+from .terminal import computation_progress
 
 PLAN_FILE = "plan.csv"
 
@@ -93,3 +97,31 @@ def _plan_record(study: Path, separate: tuple[str, ...], out: Path | None, json:
     chapter = dataclasses.replace(chapter, title=f"{chapter.title}: {loaded.title}")
     files = {PLAN_FILE: lambda path: save_table(chapter.tables[0], path)}
     deliver("plan", [chapter], json=json, out=out, title="Next record", files=files)
+
+
+SCENARIO_FILE = "scenario.toml"
+
+
+@with_requests
+def size(request: SizeRequest, out: OptionalFolder = None, json: Json = False) -> None:
+    """Size muscles of the catalogue for a lift or a joint.
+
+    \b
+    For each muscle whose law and permitted values are known: the shortest length that reaches both ends of the motion
+    within ratings, validity range and supply, alone and in parallel, with pressures, reserve and air of a cycle.
+    With --out, DIR/report.html shows the force-contraction chart and all choices, and DIR/scenario.toml is the best
+    choice that `airmuscle simulate` can run, with valves for the cycle time.
+
+    \b
+    Examples:
+      airmuscle size --load "20 kg" --stroke "40 mm" --supply "6 bar" --max-length "400 mm" --out lift
+      airmuscle size --load "100 N" --stiffness "2 N/mm" --stroke "40 mm" --supply "6 bar" --sort length
+      airmuscle size --torque "5 N m" --angle "60 deg" --inertia "0.05 kg m^2" --supply "6 bar" --max-count 1
+    """
+    if out is not None:
+        check_writable(out)
+    with computation_progress("sizing") as progress:
+        result = request.evaluate(progress)
+    scenario = sizing_scenario(result.choices, SCENARIO_FILE if out is not None else "scenario.toml of --out")
+    files = {SCENARIO_FILE: scenario.text} if scenario.text else {}
+    deliver("size", [sizing_chapter(result, scenario)], json=json, out=out, title="Sizing", files=files)

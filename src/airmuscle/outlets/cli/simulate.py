@@ -1,4 +1,4 @@
-"""`airmuscle simulate`: simulation of a scenario file."""
+"""`airmuscle simulate`: simulation of a scenario file; `airmuscle schema`: JSON schema of scenario and muscle files."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -6,16 +6,18 @@ from typing import Annotated, Any
 import typer
 
 from ...bench.readers import write
-from ...core import SimulationError, check_writable
+from ...core import SimulationError, atomic_folder, check_writable
 from ...design.study.paths import changed_scenario
 from ...files.scenario.scenario import Scenario, load_scenario
+from ...files.scenario.schema import muscle_schema, scenario_schema
 from ...files.scenario.simulation_chapter import run_chapter
 from ...recording import Recording
 from ...report.chapter import Chapter
+from ...report.data import as_json
 from ..requests import option, read_pair, request
 from .delivery import Files, deliver, write_result
 from .options import Folder, Json, complete_plant, with_requests
-from .terminal import echo
+from .terminal import echo, print_json
 
 
 @request
@@ -74,3 +76,34 @@ def _results(scenario: Scenario, recording: Recording) -> tuple[list[Chapter], s
     """The chapters, the title of the report, and the file of the recording."""
     files = {"recording.csv": lambda path: write(scenario.select_columns(recording), path)}
     return [run_chapter(scenario, recording)], "Simulation", files
+
+
+def schema(
+    muscle: Annotated[
+        bool, typer.Option("--muscle", help="The schema of muscle files; default: of scenario files.")
+    ] = False,
+    out: Annotated[
+        Path | None, typer.Option("--out", metavar="FILE", help="Output file; default: print to stdout.")
+    ] = None,
+) -> None:
+    """Print the JSON schema of scenario or muscle files.
+
+    \b
+    Editors use the schema to check and complete TOML files. It is generated from the models of this version, so it
+    allows exactly what this version reads.
+    The first line of a TOML file names its schema: #:schema scenario.schema.json
+
+    \b
+    Examples:
+      airmuscle schema --out scenario.schema.json
+      airmuscle schema --muscle --out muscle.schema.json
+    """
+    content = muscle_schema() if muscle else scenario_schema()
+    if out is None:
+        print_json(content)
+        return
+    if not out.name:
+        raise typer.BadParameter("--out must be a file name, such as scenario.schema.json")
+    with atomic_folder(out.parent) as folder:
+        (folder / out.name).write_text(as_json(content), encoding="utf-8")
+    echo(f"schema: {out}")

@@ -1,4 +1,4 @@
-"""Terminal output: messages, tables and JSON without raw control characters, and progress."""
+"""Terminal output: messages with the options for their hints, tables and JSON without control characters, progress."""
 
 import contextlib
 import json
@@ -10,11 +10,129 @@ from typing import Any
 
 import typer
 
-from ...core import printable
+from ...bench.readers.missing_values import MISSING_VALUES
+from ...bench.readers.time_base import TIME_BASES
+from ...core import Hint, HintedText, printable
 from ...report.chapter import Table
 from ...report.data import as_json
 from ...report.text import table_lines
 from .entry_point import check_interrupted
+
+TIME_BASE_NAMES = {base: name for name, base in TIME_BASES.items()}
+"""Names of the time bases of the option --time."""
+MISSING_NAMES = {treatment: name for name, treatment in MISSING_VALUES.items()}
+"""Names of the treatments of missing values of the option --missing."""
+Instruction = Callable[[Hint], str]
+"""The end of a sentence that states what to do on the command line."""
+
+
+def _toml_table(hint: Hint) -> str:
+    entries = (f"{json.dumps(key) if isinstance(key, str) else key} = {json.dumps(text)}"
+               for key, text in hint.value.items())  # fmt: skip
+    return f"columns = {{ {', '.join(entries)} }}"
+
+
+def _unit(hint: Hint) -> str:
+    return "use " + " ".join(f"--unit '{name}=...'" for name in hint.value)
+
+
+def _fix(hint: Hint) -> str:
+    return "use " + ("--fix PARAMETER" if hint.value is ... else " ".join(f"--fix '{name}'" for name in hint.value))
+
+
+def _column(hint: Hint) -> str:
+    return "use " + " ".join(f'--column "{key}={text}"' for key, text in hint.value.items())
+
+
+def _leave_out(hint: Hint) -> str:
+    return f"use --leave-out {hint.value.quantity}"
+
+
+def _censoring(hint: Hint) -> str:
+    return "use --uncensored" if hint.constant == "UNCENSORED" else "omit --uncensored"
+
+
+def _constant(hint: Hint) -> str:
+    return "use " + " ".join(f"--constant '{name}={value}'" for name, value in hint.value.items())
+
+
+def _time(hint: Hint) -> str:
+    return f"use --time {TIME_BASE_NAMES[hint.value]}"
+
+
+def _missing(hint: Hint) -> str:
+    """The name of a treatment of missing values, with its codes."""
+    codes = [f"{code:g}" if isinstance(code, float) else code for code in hint.value.codes]
+    options = "".join(f" --missing-code '{code}'" for code in codes)
+    return f"use --missing {MISSING_NAMES[type(hint.value)]}{options}"
+
+
+_FILES: Mapping[str, Instruction] = {
+    "units": _unit,
+    "columns": _column,
+    "constants": _constant,
+    "file_name": lambda hint: f"use --file-name '{hint.value}'",
+    "time": _time,
+    "decimal": lambda hint: f"use --decimal '{hint.value}'",
+    "resting_length": lambda hint: 'use --resting-length "..."',
+    "displacement_zero": lambda hint: f'use --displacement-zero "{hint.value}"',
+    "skip_rows": lambda hint: "use --skip-rows N",
+    "missing": _missing,
+    "drop_outliers": lambda hint: "use --outliers drop",
+}
+_RECORDS: Mapping[str, Instruction] = {
+    "units": lambda hint: "write it in the heading under [columns] of the record's mapping file",
+    "columns": lambda hint: f"write {_toml_table(hint)} in the record's mapping file",
+    "decimal": lambda hint: f"write decimal = {json.dumps(hint.value)} in the record's mapping file",
+    "resting_length": lambda hint: 'write resting_length = "..." under [[record]]',
+    "displacement_zero": lambda hint: f'write displacement_zero = "{hint.value}" in the mapping of the record',
+    "skip_rows": lambda hint: "write skip_rows = N in the mapping of the record",
+    "missing": lambda hint: f'write missing = "{MISSING_NAMES[type(hint.value)]}" in the mapping of the record',
+}
+INSTRUCTIONS: Mapping[str, Mapping[str, Instruction]] = {
+    "inspect": _FILES,
+    "fit": {
+        **_FILES,
+        "fixed": _fix,
+        "degree": lambda hint: f"use --degree {hint.value}",
+        "censoring": _censoring,
+        "loss": lambda hint: f"use --robust '{hint.value.scale:g} N'",
+        "sigma": lambda hint: "use --equal-weights",
+        "by": _leave_out,
+        "leave_out": _leave_out,
+        "bench.fit_hysteresis": lambda hint: "run `airmuscle hysteresis`",
+        "bench.estimate_length_error": lambda hint: "use --length-error SPECIMEN",
+    },
+    "hysteresis": {
+        **_FILES,
+        "all_rows": lambda hint: "use --all-rows",
+        "law": lambda hint: "use --muscle NAME with --use-characteristic",
+    },
+    "campaign": _FILES,
+    "predict": _FILES,
+    "convert": _FILES,
+    "plan": {"fixed": _fix},
+    **{
+        name: {"files.allow_code": lambda hint: "use --allow-code"}
+        for name in ("simulate", "study", "tune", "benchmark", "export")
+    },
+    "fit-dynamic": {**_RECORDS, "free": lambda hint: f"write free = {json.dumps(list(hint.value))} under [fit]"},
+}
+"""Instructions by command and argument; a hint without an argument is found by its function."""
+
+
+def in_options(text: str, command: str | None) -> str:
+    """The text with hints in the words of a command; a hint for which the command has no remedy is omitted."""
+    if not isinstance(text, HintedText):
+        return text
+    instructions = INSTRUCTIONS.get(command or "", {})
+
+    def sentence(hint: Hint) -> str:
+        instruction = instructions.get(hint.argument or hint.function)
+        return f"{hint.purpose}, {instruction(hint)}." if instruction else ""
+
+    return text.written(sentence)
+
 
 WIDE = 160
 """Width [characters] of a table that is written to a file or to another program."""

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from xml.etree.ElementTree import Element, SubElement
 
 from ...core import Leaf, ParameterError, printable
-from ...engine.compile.jacobians import Place
+from ...engine.compile.function import Place
 from ...engine.run.integrators import Rodas4
 from ...recording.columns import quantity_of
 from .exported_run import RunData

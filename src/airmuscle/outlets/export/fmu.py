@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...engine.compile.function import EventIndicators, Partials, event_indicators, partials
 from ...engine.compile.functions import Printer
-from ...engine.compile.jacobians import EventIndicators, Partials, event_indicators, partials
 from ...engine.run import Problem, solve
 from ...engine.run.integrators import Rodas4
 from ...physics.plant.diagnostics import column_limits, describe_limit

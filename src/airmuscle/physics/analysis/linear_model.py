@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from ...core import Array, ParameterError, System, suggestion
 from ...core.system import check_system, state_vector
-from ...engine.compile.jacobians import derivatives
+from ...engine.compile.function import derivatives
 from ...engine.compile.program import CompiledSystem, compile_system
 from ...recording.columns import column_units
 from ..equilibrium import complete_inputs

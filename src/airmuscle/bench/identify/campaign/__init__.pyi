@@ -12,9 +12,11 @@ from .creep_stage import fit_creep_stage as fit_creep_stage
 from .fill_records import valve_commands as valve_commands
 from .fill_stage import FillStage as FillStage
 from .fill_stage import fit_fill_stage as fit_fill_stage
-from .friction_stage import FrictionStage as FrictionStage
-from .friction_stage import fit_friction_stage as fit_friction_stage
-from .friction_stage import friction_along as friction_along
+from .friction_and_release import FrictionStage as FrictionStage
+from .friction_and_release import ReleaseStage as ReleaseStage
+from .friction_and_release import fit_friction_stage as fit_friction_stage
+from .friction_and_release import fit_release_stage as fit_release_stage
+from .friction_and_release import friction_along as friction_along
 from .held_creep import HeldCreep as HeldCreep
 from .held_creep import fit_held_creep as fit_held_creep
 from .held_creep import free_of_creep as free_of_creep
@@ -23,8 +25,6 @@ from .next_experiment import check_one_rig as check_one_rig
 from .record import CampaignRecord as CampaignRecord
 from .record import RecordKind as RecordKind
 from .record import classify_records as classify_records
-from .release_stage import ReleaseStage as ReleaseStage
-from .release_stage import fit_release_stage as fit_release_stage
 from .static_stage import ErrorBand as ErrorBand
 from .static_stage import StaticStage as StaticStage
 from .static_stage import fit_static_stage as fit_static_stage

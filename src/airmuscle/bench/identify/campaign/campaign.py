@@ -16,10 +16,9 @@ from ....recording import Recording
 from ..compared_points import FORCE_MARGIN, law_of_length
 from .creep_stage import CreepStage, fit_creep_stage
 from .fill_stage import FillStage, fit_fill_stage
-from .friction_stage import FrictionStage, fit_friction_stage, predicted_force
+from .friction_and_release import FrictionStage, ReleaseStage, fit_friction_stage, fit_release_stage, predicted_force
 from .next_experiment import NextExperiment, check_one_rig, plan_next
 from .record import CampaignRecord, RecordKind, classify_records
-from .release_stage import ReleaseStage, fit_release_stage
 from .static_stage import StaticStage, fit_static_stage
 from .transient import LeftOutStage, named
 from .volume import scaled_to_length, volume_change

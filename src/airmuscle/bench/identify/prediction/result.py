@@ -14,7 +14,7 @@ from ....physics.muscle.friction import Friction, NoFriction
 from ....recording import Recording
 from ....recording.columns import displayed
 from ...segment import rate_of_change
-from ..campaign.friction_stage import predicted_force
+from ..campaign.friction_and_release import predicted_force
 from ..compared_points import FORCE_MARGIN
 from ..problem import FORCE, evaluate, fitted_quantity_of
 
