@@ -69,6 +69,51 @@ def test_a_clean_bench_has_no_remark(tmp_path, tables):
     assert notes_of(tmp_path, tables) == ""
 
 
+def cycles(
+    pressure: float, *, scale=1.0, period=10.0, count=1, friction=20.0, viscous=0.0, drift=0.0, noise=1.0, begin=0.0
+):
+    """Columns of isobaric cycles of 20 % with friction, damping and drift of the force, from `begin` [s] on."""
+    random = np.random.default_rng(int(pressure) + int(begin))
+    time = np.arange(0.0, count * period, period / 100.0)
+    contraction = 0.1 - 0.1 * np.cos(2.0 * np.pi * time / period)
+    speed = np.gradient(contraction, time)
+    force = scale * pressure * 1.5e-3 * (1.0 - contraction / 0.25) ** 1.3 * (1.0 + drift * (time + begin) / 40.0)
+    force += random.normal(0.0, noise, time.size) - friction * np.sign(speed) - viscous * speed
+    return {"time": time + begin, "pressure": np.full(time.size, pressure), "contraction": contraction, "force": force}
+
+
+def group_notes(*parts: dict[str, float]) -> str:
+    """The remark on two groups of cycles at five pressures, one file for each."""
+    recordings = []
+    for pressure in (1e5, 2e5, 3e5, 4e5, 5e5):
+        tables = [cycles(pressure, **part) for part in parts]
+        columns = {name: np.concatenate([table[name] for table in tables]) for name in tables[0]}
+        recordings.append(Recording(columns, f"{pressure / 1e3:.0f}.csv", {"resting_length": RESTING_LENGTH}))
+    return "\n".join(note for note in DataChecks.of(recordings).notes if "two groups" in note)
+
+
+def test_two_muscles_in_files_without_a_column_are_named():
+    notes = group_notes({}, {"scale": 1.15, "begin": 15.0})
+    assert re.search(r"forces differ by 1\d % .*, and agree to 0.\d+ % within a group", notes)
+    assert re.search(r"\(100.csv rows 1 to 10\d, .* more; 500.csv rows 10\d to 200.*\)\. Are they two muscles", notes)
+    assert "columns={'muscle': 'specimen'}" in notes
+
+
+@pytest.mark.parametrize(
+    "parts",
+    [
+        ({"count": 4},),
+        ({"count": 4, "friction": 120.0},),
+        ({"viscous": 3e3}, {"viscous": 3e3, "period": 2.0, "count": 2, "begin": 15.0}),
+        ({"count": 6, "drift": 0.2},),
+        ({"count": 4, "noise": 40.0},),
+    ],
+    ids=["one muscle", "hysteresis", "two speeds", "drift", "noise"],
+)
+def test_what_is_no_second_muscle_gives_no_two_groups(parts):
+    assert group_notes(*parts) == ""
+
+
 @pytest.mark.parametrize("values", [("A", "B"), (1, 2)], ids=["text", "numbers"])
 def test_two_muscles_in_one_file_are_named_with_the_column_that_tells_them_apart(tmp_path, values):
     notes = notes_of(tmp_path, one_file(sweeps(), sweeps(OTHER, seed=90), column="muscle", values=values))

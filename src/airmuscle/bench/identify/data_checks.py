@@ -18,6 +18,7 @@ from ..segment import Outlier, estimate_noise, estimate_sensors, find_outliers, 
 from .branch_residuals import SensorDelay, delay_notes, find_delay
 from .contradictions import contradiction_notes, repeatability
 from .matched_rows import match_rows
+from .two_groups import two_muscle_notes
 from .weighting import Huber
 
 MAX_MISFIT = 3.0
@@ -144,5 +145,8 @@ class DataChecks:
 def _check(recordings: Sequence[Recording]) -> DataChecks:
     measured = without_missing_codes([recording for recording in recordings if len(recording)])
     matches, delay = match_rows(measured), find_delay(measured)
-    found = (*contradiction_notes(matches), *outlier_notes(measured), *delay_notes(delay))
+    contradictions = contradiction_notes(matches)
+    if not any(" tells the contradicting rows apart" in note for note in contradictions):
+        contradictions += two_muscle_notes(match_rows(measured, by_branch=True))
+    found = (*contradictions, *outlier_notes(measured), *delay_notes(delay))
     return DataChecks((*find_suspicious(recordings), *found), Scatter.of(measured, repeatability(matches)), delay)

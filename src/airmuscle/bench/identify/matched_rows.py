@@ -95,8 +95,9 @@ class Matches:
     greatest: float
 
 
-def match_rows(recordings: Sequence[Recording]) -> Matches:
-    """The matched runs of recordings with pressure, contraction and force, by specimen."""
+def match_rows(recordings: Sequence[Recording], *, by_branch: bool = False) -> Matches:
+    """The matched runs of recordings with pressure, contraction and force, by specimen; with `by_branch` each branch of
+    a run is matched with its other branches of the same direction, too."""
     given = [run for run in recordings if len(run) and all(n in run for n in ("pressure", "contraction", "force"))]
     greatest = max((float(np.nanquantile(run["force"], 0.99)) for run in given), default=0.0)
     if not greatest > 0:
@@ -105,7 +106,7 @@ def match_rows(recordings: Sequence[Recording]) -> Matches:
     matched: list[MatchedRuns] = []
     for name in dict.fromkeys(names):
         members = [run for run, own in zip(given, names, strict=True) if own == name]
-        matched += _matched_runs(_blocks(members, greatest), members)
+        matched += _matched_runs(_blocks(members, greatest, by_branch), members)
     return Matches(tuple(matched), greatest)
 
 
@@ -118,13 +119,13 @@ def label_columns(recording: Recording) -> list[str]:
     ]
 
 
-def _blocks(recordings: Sequence[Recording], greatest: float) -> list[Block]:
-    rows = sum(map(len, recordings))
-    blocks = [block for run in recordings for block in _blocks_of(run, MIN_FORCE * greatest, -(-rows // MAX_ROWS))]
+def _blocks(recordings: Sequence[Recording], greatest: float, by_branch: bool) -> list[Block]:
+    step, least = -(-sum(map(len, recordings)) // MAX_ROWS), MIN_FORCE * greatest
+    blocks = [block for run in recordings for block in _blocks_of(run, least, step, by_branch)]
     return _with_residuals([block for block in blocks if len(block.rows) >= MIN_MATCHES][:MAX_BLOCKS])
 
 
-def _blocks_of(recording: Recording, least: float, step: int) -> Iterator[Block]:
+def _blocks_of(recording: Recording, least: float, step: int, by_branch: bool) -> Iterator[Block]:
     """The blocks of a recording: rows of one run, direction and combination of labels; every n-th row."""
     columns = np.stack([recording[name] for name in ("pressure", "contraction", "force")])
     complete = np.isfinite(columns).all(axis=0)
@@ -135,6 +136,8 @@ def _blocks_of(recording: Recording, least: float, step: int) -> Iterator[Block]
     keys = [branch_directions(recording, branches), np.full(len(recording), -1.0)]
     for i, run in enumerate(find_runs(recording)):
         keys[1][run.interval.rows] = i
+    for i, branch in enumerate(branches if by_branch else ()):
+        keys[1][branch.interval.rows] += 1e3 * (i + 1)
     names = label_columns(recording)
     keys += [recording.columns[name] for name in names]
     values, member = np.unique(np.stack(keys), axis=1, return_inverse=True)
