@@ -71,7 +71,7 @@ def save_fit(page: Any) -> None:
 
 
 def episodes() -> bytes:
-    """A computed record of a joint of two muscles of the library, 24 episodes of 0.95 s as a ZIP archive of CSV files;
+    """A computed record of a joint of two muscles of the library, 60 episodes of 0.95 s as a ZIP archive of CSV files;
     random pressures, noise of the angle 0.03 deg (both chosen)."""
     import numpy as np
 
@@ -80,7 +80,7 @@ def episodes() -> bytes:
     plant, rng, rows = am.load("joint-dmsp-20-matrix").plant, np.random.default_rng(0), 0.01 * np.arange(95)
     truth, data = am.physics.PressureDriven(plant.muscles, plant.mechanism, (0.03, 0.03)), io.BytesIO()
     with zipfile.ZipFile(data, "w") as archive:
-        for number in range(24):
+        for number in range(60):
             levels = rng.uniform(1e5, 4e5, (2, 12))
             signal = {f"{p}measured_pressure": list(zip(np.linspace(0, 0.94, 12), row, strict=True))
                       for p, row in zip(truth.prefixes, levels, strict=True)}  # fmt: skip
@@ -126,7 +126,7 @@ def main(address: str) -> None:
         page.wait_for_timeout(300)
         save(page, "muscle")
         save_fit(opened(browser, address, "Fit", "ready", viewport={"width": 1200, "height": 1250}))
-        save_arm(opened(browser, address, "Fit", "ready", viewport={"width": 1200, "height": 1400}))
+        save_arm(opened(browser, address, "Fit", "ready", viewport={"width": 1200, "height": 1460}))
         page = opened(browser, address, "Plant", "lift-dmsp-20", color_scheme="dark", **wide)
         page.get_by_label("Plant of the library").select_option("joint-dmsp-20-proportional")
         page.wait_for_selector('#panel-plant[data-shown="joint-dmsp-20-proportional"]')

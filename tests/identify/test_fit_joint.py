@@ -70,6 +70,20 @@ def test_the_identified_arm_is_a_plant_that_settles(fitted):
     assert abs(solved["joint1.angular_speed"][-1]) < 0.05
 
 
+def test_the_identified_joint_is_an_environment_whose_plants_are_drawn_from_its_covariance(fitted):
+    pytest.importorskip("gymnasium")
+    fit, _ = fitted
+    drawn = (am.environments.FitUncertainty(fit.uncertainty()),)
+    env = am.environments.PlantEnv(am.environments.JointTracking(fit.plant()), randomisation=drawn)
+    first, second = (env.reset(seed=seed)[0] for seed in (1, 2))
+    assert np.abs(first - second).max() > 0.0
+    observed, reward, *_ = env.step(env.action_space.sample())
+    assert np.isfinite(observed).all()
+    assert 0.0 <= reward <= 1.0
+    with pytest.raises(ParameterError, match="JointTracking: the coordinates of the plant are none; one is needed"):
+        am.environments.JointTracking(am.load("vessel-smc-itv2050").plant)
+
+
 def test_angles_from_pressures_alone_hold_their_band_and_need_motion(fitted):
     fit, _ = fitted
     found = estimate_angles(fit, made_episodes(60, seed=1))

@@ -9,7 +9,7 @@ from typing import Any
 
 from ...core import AirmuscleWarning, ParameterError, Value, bar, model, ops, parameter
 from ...files.library import Entry, PlantEntry, ValveEntry, load
-from ...physics.mechanism import HangingMass
+from ...physics.mechanism import Coordinate, HangingMass
 from ...physics.muscle import LinearDamper
 from ...physics.plant import Plant
 from ...physics.pneumatics import FillDischarge, Supply
@@ -67,7 +67,7 @@ class LoadLifting(EnvironmentTask):
 class JointTracking(EnvironmentTask):
     """Tracking of a sine by a joint: theta_r(t) = A sin(2 pi f t + phi); all numbers are chosen.
 
-    The plant has one coordinate 'angle' and two muscles. Observed are the angle, its speed, the pressures of both
+    The plant has one rotational coordinate and two muscles. Observed are the angle, its speed, the pressures of both
     muscles, and the reference now and one period later. The error theta - theta_r is scaled by `error_scale`. An
     episode ends where the angle exceeds `largest_angle`, or a number is not finite.
     """
@@ -84,6 +84,18 @@ class JointTracking(EnvironmentTask):
     min_pressure: float = parameter("Pa", "p_min", "lowest initial pressure", bounds=(0.0, 1e6), default=1.5e5)
     max_pressure: float = parameter("Pa", "p_max", "highest initial pressure", bounds=(0.0, 1e6), default=2.5e5)
 
+    def check(self) -> None:
+        if len(self.plant.mechanism.coordinates) != 1:
+            names = ", ".join(c.name for c in self.plant.mechanism.coordinates) or "none"
+            raise ParameterError(
+                f"JointTracking: the coordinates of the plant are {names}; one is needed. Give ArmReaching an arm."
+            )
+
+    @property
+    def joint(self) -> Coordinate:
+        """The coordinate of the joint."""
+        return self.plant.mechanism.coordinates[0]
+
     @property
     def observations(self) -> tuple[Observation, ...]:
         reference = "reference angle"
@@ -98,7 +110,7 @@ class JointTracking(EnvironmentTask):
     @property
     def initial_ranges(self) -> Mapping[str, tuple[float, float]]:
         pressures = {f"{p}pressure": (self.min_pressure, self.max_pressure) for p in self.plant.prefixes}
-        return {**pressures, "angle": (-self.initial_angle, self.initial_angle)}
+        return {**pressures, self.joint.name: (-self.initial_angle, self.initial_angle)}
 
     def target(self, time: Value) -> Value:
         """The reference [rad] at a time [s]."""
@@ -107,13 +119,13 @@ class JointTracking(EnvironmentTask):
     def observe(self, state: Mapping[str, Value], outputs: Mapping[str, Value], time: Value) -> tuple[Value, ...]:
         pressures = (outputs[f"{p}pressure"] / bar for p in self.plant.prefixes)
         later = self.target(time + self.period)
-        return (state["angle"], state["angular_speed"], *pressures, self.target(time), later)
+        return (state[self.joint.name], state[self.joint.speed], *pressures, self.target(time), later)
 
     def errors(self, state: Mapping[str, Value], time: Value) -> tuple[Value, ...]:
-        return ((state["angle"] - self.target(time)) / self.error_scale,)
+        return ((state[self.joint.name] - self.target(time)) / self.error_scale,)
 
     def ends(self, state: Mapping[str, Value]) -> Value:
-        return ops.absolute_value(state["angle"]) > self.largest_angle
+        return ops.absolute_value(state[self.joint.name]) > self.largest_angle
 
 
 @model
