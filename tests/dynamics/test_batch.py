@@ -30,7 +30,7 @@ from airmuscle.engine import (
     simulate,
     simulate_batch,
 )
-from airmuscle.engine.run.batch import thread_pool, variations
+from airmuscle.engine.run.batch import job, variations
 from airmuscle.errors import ColumnError, FileError, GeometryLimitError, ParameterError
 from airmuscle.papers.hosovsky_plant import UnpublishedParameters, hanging_load
 from airmuscle.papers.hosovsky_plant import plant as third_paper
@@ -540,7 +540,7 @@ def test_an_error_on_the_way_leaves_nothing_behind(tmp_path, monkeypatch):
 @pytest.mark.parametrize("where", ["memory", "disk"])
 def test_an_interruption_keeps_what_is_done(tmp_path, monkeypatch, method, where):
     """The user stops as soon as the first plants are done; the rest says so, and what is there is right."""
-    take, once = thread_pool.Queue._take, threading.Lock()
+    take, once = job.Queue._take, threading.Lock()
 
     def interrupting(self):
         if self.done >= (1 if isinstance(method, ExplicitRungeKutta) else 20) and once.acquire(blocking=False):
@@ -560,7 +560,7 @@ def test_an_interruption_keeps_what_is_done(tmp_path, monkeypatch, method, where
     }
     varied = around({"mechanism.mass": 10.0}, count)
     whole = simulate_batch(plain(), varied, PULSE, **given)
-    monkeypatch.setattr(thread_pool.Queue, "_take", interrupting)
+    monkeypatch.setattr(job.Queue, "_take", interrupting)
     into = {"into": tmp_path / "out"} if where == "disk" else {}
     found = simulate_batch(plain(), varied, PULSE, **given, **into)
     assert found.interrupted
@@ -603,12 +603,12 @@ def test_a_system_whose_states_take_plain_numbers_only_has_its_own_sizes_too():
 
 
 def test_a_bar_is_drawn_on_a_terminal_once_it_takes_long(monkeypatch, capsys):
-    with thread_pool.progress("simulating", 10) as advanced:
+    with job.progress("simulating", 10) as advanced:
         advanced(5)
     assert capsys.readouterr().err == ""
-    monkeypatch.setattr(thread_pool, "BAR_DELAY", -1.0)
+    monkeypatch.setattr(job, "BAR_DELAY", -1.0)
     monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
-    with thread_pool.progress("simulating", 10) as advanced:
+    with job.progress("simulating", 10) as advanced:
         advanced(5)
     assert "simulating" in capsys.readouterr().err
 

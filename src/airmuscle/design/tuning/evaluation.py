@@ -11,8 +11,8 @@ from ...core import AirmuscleError, Array, flatten, leaves, structure
 from ...engine.distribution import DistributedCalls
 from ...engine.loop import COMMAND, SETPOINT, ControlLaw, ControlLoop, with_designed_laws
 from ...engine.run.batch import BatchSolution, simulate_batch
+from ...engine.run.batch.job import hidden_progress
 from ...engine.run.batch.loops import CONTROLLER
-from ...engine.run.batch.thread_pool import hidden_progress
 from ...engine.run.integrators import Integrator
 from ...physics.plant.plant import Plant
 from .case import LoopCase, loop_with_gains, with_gains

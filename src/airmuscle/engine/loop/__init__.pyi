@@ -18,9 +18,9 @@ from .driver import WithDrivers as WithDrivers
 from .inputs import ZERO_INPUT as ZERO_INPUT
 from .inputs import InputSignal as InputSignal
 from .inputs import Periodic as Periodic
+from .inputs import PiecewiseLinear as PiecewiseLinear
 from .inputs import Schedule as Schedule
-from .piecewise_linear import PiecewiseLinear as PiecewiseLinear
-from .piecewise_linear import merge_columns as merge_columns
+from .inputs import merge_columns as merge_columns
 from .sampled_signal import SampledSignal as SampledSignal
 from .sampled_signal import Trajectory as Trajectory
 from .sampled_signal import spline_trajectory as spline_trajectory
@@ -46,9 +46,9 @@ from .controller import RELATIVE as RELATIVE
 from .controller import MultivariableController as MultivariableController
 from .controller import named_signal_units as named_signal_units
 from .controller import parameter_units as parameter_units
+from .inputs import FEW_SEGMENTS as FEW_SEGMENTS
 from .inputs import check_input_names as check_input_names
 from .inputs import check_input_signal as check_input_signal
-from .piecewise_linear import FEW_SEGMENTS as FEW_SEGMENTS
 from .sensors import LECUYER1999 as LECUYER1999
 from .sensors import MAX_DELAY as MAX_DELAY
 from .sensors import STATE as STATE

@@ -19,8 +19,15 @@ from ...recording.recording import Recording
 from .control_law import ControlLaw, EnclosingLaw, Memory, Sampled, rebuilt
 from .controller import Controller, Measurement, named_signal_units
 from .driver import Driver, WithDrivers
-from .inputs import ZERO_INPUT, InputSignal, Schedule, check_input_names, check_input_signal
-from .piecewise_linear import PiecewiseLinear, merge_columns
+from .inputs import (
+    ZERO_INPUT,
+    InputSignal,
+    PiecewiseLinear,
+    Schedule,
+    check_input_names,
+    check_input_signal,
+    merge_columns,
+)
 
 COMMAND, SETPOINT, MEASURED = "command.", "setpoint.", "measured."
 """Prefixes of the columns of a recording that hold commands, set points and measurements of a controller."""

@@ -15,8 +15,7 @@ import numpy as np
 
 from ...core import INFINITY, ParameterError, ShortRepr, abridged, model, parameter
 from ..compile.kernel_text.source import plain_kernels
-from .inputs import InputSignal, check_input_names, check_input_signal
-from .piecewise_linear import PiecewiseLinear, Segment, merge_columns
+from .inputs import InputSignal, PiecewiseLinear, Segment, check_input_names, check_input_signal, merge_columns
 
 MAX_PERIODS = 10_000_000
 """Periods of a carrier in one run."""

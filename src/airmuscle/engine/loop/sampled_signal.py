@@ -10,8 +10,7 @@ import numpy.typing as npt
 
 from ...core import AirmuscleWarning, Array, ParameterError, as_float, one_line
 from ...recording.recording import Recording
-from .inputs import InputSignal, as_pairs, check_input_names, check_mapping, check_points
-from .piecewise_linear import PiecewiseLinear
+from .inputs import InputSignal, PiecewiseLinear, as_pairs, check_input_names, check_mapping, check_points
 
 INITIAL_LINES = 64
 """Straight lines that a sampled function is first approximated by (chosen)."""

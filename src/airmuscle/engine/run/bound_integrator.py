@@ -8,7 +8,7 @@ import numpy as np
 from ...core import Array, Status, flat_view
 from ..compile.cache.kernel import Kernel
 from ..compile.functions import ArraySizes
-from ..loop.piecewise_linear import PiecewiseLinear
+from ..loop.inputs import PiecewiseLinear
 
 INTERRUPT_CHECK_STEPS = 100_000
 """Steps between two checks whether the user wants to stop, or the state is impossible."""

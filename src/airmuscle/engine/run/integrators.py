@@ -7,7 +7,7 @@ from typing import ClassVar
 from ...core import Array, ParameterError, Reference, abridged, model, parameter
 from ..compile.cache.kernel import fixed_step, rodas4
 from ..compile.program import CompiledSystem, Tableau
-from ..loop.piecewise_linear import PiecewiseLinear
+from ..loop.inputs import PiecewiseLinear
 from .bound_integrator import MAX_STEPS, Binding, BoundIntegrator, RawSolution
 
 HAIRER_WANNER1996 = Reference(

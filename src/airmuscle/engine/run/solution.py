@@ -17,7 +17,7 @@ from ...recording.recording import recording_card
 from ..compile.cache.kernel import record
 from ..compile.program import CompiledSystem
 from ..loop.control_loop import ControlLoopState
-from ..loop.piecewise_linear import PiecewiseLinear
+from ..loop.inputs import PiecewiseLinear
 from .bound_integrator import RawSolution
 from .integrators import Integrator
 from .problem import Problem

@@ -10,9 +10,8 @@ import numpy.typing as npt
 from ...core import AirmuscleError, Array, EquilibriumError, ParameterError, System, one_line, quantity
 from ...engine.compile.program import CompiledSystem, compile_system
 from ...engine.loop.inputs import check_input_names
-from .multi_dof import equilibria_of_several_coordinates
 from .single_dof import GRID_POINTS, equilibria_of_one_coordinate, grid
-from .stability import are_stable, no_equilibrium
+from .stability import are_stable, equilibria_of_several_coordinates, no_equilibrium
 from .statics import Rows, StaticPlant, Statics
 
 MuscleValues: TypeAlias = float | str | Sequence[float | str] | None

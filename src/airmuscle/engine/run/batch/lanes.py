@@ -12,8 +12,7 @@ from ....core import ParameterError, Status
 from ...compile.cache.kernel import lanes
 from ...compile.llvm.emit import LlvmType
 from ..integrators import ExplicitRungeKutta
-from .job import BatchJob
-from .thread_pool import Queue
+from .job import BatchJob, Queue
 
 ALIGNMENT = 64
 """Alignment of vectors in memory, in bytes."""

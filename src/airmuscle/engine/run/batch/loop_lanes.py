@@ -11,10 +11,9 @@ from ...compile.cache.kernel import loop_lanes
 from ...loop.control_law import ControlLaw
 from ..compiled_law import parameters_of, sample_in_lanes
 from ..integrators import ExplicitRungeKutta
-from .job import BatchJob
+from .job import BatchJob, Queue
 from .lanes import Double, aligned_arrays, retry_alone
 from .loops import LoopBatch
-from .thread_pool import Queue
 
 NUMBER = Double().number
 MAX_SAMPLES = 200_000

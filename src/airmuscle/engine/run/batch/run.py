@@ -15,12 +15,11 @@ from ..bound_integrator import MAX_STEPS
 from ..integrators import ExplicitRungeKutta, Integrator, default_integrator
 from ..output_times import output_times as times_of
 from ..problem import check_input_range
-from .job import NOT_RUN, BatchJob
+from .job import NOT_RUN, BatchJob, Queue, progress, run_workers
 from .lanes import Double, Precision, check_precision, lane_workers
 from .loop_lanes import loop_lane_workers, run_in_lanes
 from .loops import LoopBatch, loops_of, vary
 from .solution import BatchSolution, InMemory, OnDisk
-from .thread_pool import Queue, progress, run_workers
 from .variations import Variations, check_states, count_of_states, default_states, given_states
 
 
