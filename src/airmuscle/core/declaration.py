@@ -45,15 +45,9 @@ class Parameter:
 
 
 def parameter(
-    unit: str,
-    symbol: str,
-    meaning: str,
-    *,
-    bounds: tuple[float, float] = (-INFINITY, INFINITY),
-    fitted: bool = True,
-    plausible: float = 0.0,
-    **field: Any,
-) -> Any:
+    unit: str, symbol: str, meaning: str, *, bounds: tuple[float, float] = (-INFINITY, INFINITY), fitted: bool = True,
+    plausible: float = 0.0, **field: Any,
+) -> Any:  # fmt: skip
     """Declare a parameter as a dataclass field; documentation, fits, TOML files and the command line read it from here.
 
     `bounds` are closed and physical. `fitted=False` excludes the parameter from fits by default (a length measured

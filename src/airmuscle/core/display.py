@@ -131,15 +131,6 @@ def level_text(quantity: str, level: float, span: float) -> str:
     return quantity_text(rounded, *units) if units else f"{rounded:.4g}"
 
 
-def in_display_unit(value: Any, unit: str) -> tuple[Any, str]:
-    """A value in a declared SI unit, with that unit; in the chosen display unit if there is one.
-
-    A ratio stays a ratio: not each one is a contraction.
-    """
-    factor, shown = (1.0, unit) if unit == "1" else chosen_scale(unit, 1.0, unit)
-    return (value if factor == 1.0 else value * factor), shown
-
-
 def heading_scale(heading: str) -> tuple[float, str]:
     """Factor and heading of a column or axis whose heading ends with its unit: 'pressure [kPa]' in the chosen unit.
 

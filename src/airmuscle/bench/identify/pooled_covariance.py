@@ -14,19 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core import Array, as_slice
+from . import parameter_covariance as rows_of
 from .model_evidence import student_quantile
-from .parameter_covariance import (
-    LEAST_DEGREES_OF_FREEDOM,
-    MIN_GROUP_ROWS,
-    MIN_GROUPS,
-    PARTS,
-    ROWS,
-    RUNS,
-    Indices,
-    Runs,
-    is_correlated,
-    successive_parts,
-)
 
 MIN_DEGREES_OF_FREEDOM = 1.6
 """Minimum of the median of the estimates' degrees of freedom for groups of rows (chosen)."""
@@ -74,7 +63,7 @@ class EffectRows(NamedTuple):
     matrix: Array
     basis: Array
     residuals: Array
-    member: Indices
+    member: rows_of.Indices
     specimens: int
 
     def sums(self, rows: npt.NDArray[np.bool_] | None = None, number: float | None = None) -> Sums:
@@ -135,11 +124,11 @@ class PooledCovariance:
         total, freedoms = between + within, self.group_freedoms(combinations)
         parts = between**2 / max(self.freedom, 1.0) + within**2 / freedoms
         known = np.where(parts > 0, total**2 / np.where(parts > 0, parts, 1.0), freedoms)
-        return np.asarray(student_quantile(np.maximum(known, LEAST_DEGREES_OF_FREEDOM), level) * np.sqrt(total))
+        return np.asarray(student_quantile(np.maximum(known, rows_of.LEAST_DEGREES_OF_FREEDOM), level) * np.sqrt(total))
 
     def group_freedoms(self, combinations: Array) -> Array:
         """Degrees of freedom (N,) of the scatter of the groups for combinations (N, T), 1 to G."""
-        if self.unit == ROWS:
+        if self.unit == rows_of.ROWS:
             return np.full(len(combinations), float(self.rows))
         rows = combinations @ self.by_rows
         shares = np.einsum("ni,gij,nj->ng", rows, self.moments, rows, optimize=True)
@@ -149,16 +138,20 @@ class PooledCovariance:
         """What the errors are estimated from, and what they do not contain, as a phrase."""
         unknown = "the scatter between runs (zero and gain of the sensors) is not known"
         parts = f"of {len(self.shifts)} successive parts of the runs; {unknown}"
-        within = {RUNS: f"of {self.run_count} runs", PARTS: parts, ROWS: f"of independent rows; {unknown}"}
+        within = {
+            rows_of.RUNS: f"of {self.run_count} runs",
+            rows_of.PARTS: parts,
+            rows_of.ROWS: f"of independent rows; {unknown}",
+        }
         return f"from the scatter of the specimens and {within[self.unit]}"
 
     @property
     def _factor(self) -> float:
-        return 1.0 if self.unit == ROWS else (len(self.shifts) - 1) / len(self.shifts)
+        return 1.0 if self.unit == rows_of.ROWS else (len(self.shifts) - 1) / len(self.shifts)
 
 
 def estimate_pooled_covariance(
-    rows: EffectRows, runs: Runs, ratio: float, deviation: float, freedom: float
+    rows: EffectRows, runs: rows_of.Runs, ratio: float, deviation: float, freedom: float
 ) -> PooledCovariance:
     """The covariance from the rows that are active and the residuals of the pooled law.
 
@@ -172,16 +165,16 @@ def estimate_pooled_covariance(
     counts = [np.unique(runs.run[rows.member == i]).size for i in range(rows.specimens)]
     run_count = int(np.unique(runs.run).size)
     independent = _independent(rows.sums(), ratio, deviation, freedom, run_count)
-    found = _by_groups(independent, rows, ratio, runs.run, RUNS) if min(counts) >= MIN_GROUPS else None
-    parts, in_order = 2, runs.in_time or is_correlated(rows.residuals, runs.run)
-    while found is None and in_order and run_count * parts * MIN_GROUP_ROWS <= len(rows.member):
-        found = _by_groups(independent, rows, ratio, successive_parts(runs.run, parts), PARTS)
+    found = _by_groups(independent, rows, ratio, runs.run, rows_of.RUNS) if min(counts) >= rows_of.MIN_GROUPS else None
+    parts, in_order = 2, runs.in_time or rows_of.is_correlated(rows.residuals, runs.run)
+    while found is None and in_order and run_count * parts * rows_of.MIN_GROUP_ROWS <= len(rows.member):
+        found = _by_groups(independent, rows, ratio, rows_of.successive_parts(runs.run, parts), rows_of.PARTS)
         parts += 1
     return found or independent
 
 
 def _by_groups(
-    independent: PooledCovariance, rows: EffectRows, ratio: float, group: Indices, unit: str
+    independent: PooledCovariance, rows: EffectRows, ratio: float, group: rows_of.Indices, unit: str
 ) -> PooledCovariance | None:
     """The covariance by groups (N,); None where the others of a group do not determine the estimates."""
     sums, total = [rows.sums(group == i) for i in np.unique(group)], rows.sums()
@@ -209,7 +202,7 @@ def _independent(total: Sums, ratio: float, deviation: float, freedom: float, ru
         by_rows=by_rows,
         moments=total.moments[None],
         shifts=(vectors * np.sqrt(ratio * np.maximum(values, 0.0))).T * deviation,
-        unit=ROWS,
+        unit=rows_of.ROWS,
         run_count=run_count,
         rows=int(total.rows),
     )

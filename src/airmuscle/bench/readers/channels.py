@@ -151,13 +151,9 @@ def _rounding(time: Array) -> float:
 
 
 def _make_table(
-    origin: str,
-    channels: Sequence[Channel],
-    time: Array | None,
-    notes: tuple[str, ...],
-    constants: Mapping[str, float | str],
-    row_label: str,
-) -> RawTable:
+    origin: str, channels: Sequence[Channel], time: Array | None, notes: tuple[str, ...],
+    constants: Mapping[str, float | str], row_label: str,
+) -> RawTable:  # fmt: skip
     has_time = any(find_quantity_name(c.name.partition(" ")[0].partition("_")[0]) == "time" for c in channels)
     if time is not None and not has_time:
         channels = [Channel("time", time - time[0], unit="s"), *channels]

@@ -104,12 +104,9 @@ def check_no_external_links(h5py: Any, group: Any, path: Path) -> None:
 
 
 def _groups(
-    h5py: Any,
-    group: Any,
-    origin: str,
-    downsampling: Downsampling,
+    h5py: Any, group: Any, origin: str, downsampling: Downsampling,
     outer: Mapping[str, float | str] = MappingProxyType({}),
-) -> Iterator[StoredTable]:
+) -> Iterator[StoredTable]:  # fmt: skip
     """The table of each group with vectors and of each dataset that is a table; no links are followed.
 
     The constants of the `outer` groups and of the file count in each group, which may state others.

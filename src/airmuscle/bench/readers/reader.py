@@ -49,12 +49,9 @@ EXTENSIONS = (*TEXT_EXTENSIONS, *_BINARY_READERS)
 
 
 def read(
-    source: Source,
-    mapping: str | Path | ColumnMapping = ColumnMapping(),
-    *,
-    downsampling: Downsampling = Decimation(),
+    source: Source, mapping: str | Path | ColumnMapping = ColumnMapping(), *, downsampling: Downsampling = Decimation(),
     progress: Progress | None = None,
-) -> tuple[Recording, ...]:
+) -> tuple[Recording, ...]:  # fmt: skip
     """Read the recordings in a file, several files, a glob pattern (`runs/*.csv`) or a folder, in SI units; `-` is a
     table of text on the standard input, which may be a pipe.
 

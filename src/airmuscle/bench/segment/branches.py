@@ -55,12 +55,9 @@ def branch_name(column: str, direction: int) -> str:
 
 @remembered
 def find_branches(
-    recording: Recording,
-    sensor: Sensor | None = None,
-    *,
-    reversal: float = REVERSAL_FRACTION,
+    recording: Recording, sensor: Sensor | None = None, *, reversal: float = REVERSAL_FRACTION,
     runs: tuple[Run, ...] | None = None,
-) -> tuple[Branch, ...]:
+) -> tuple[Branch, ...]:  # fmt: skip
     """The branches of a recording in order; empty if there is no pressure or if the driven quantity is constant.
 
     A reversal exceeds the fraction `reversal` of the range of the driven quantity and ten standard deviations of its

@@ -86,12 +86,9 @@ _COLOURS = {1: BLUE, -1: RED}
 
 
 def plot_segments(
-    recording: Recording,
-    sensors: Mapping[str, Sensor],
-    branches: Sequence[Branch],
-    plateaus: Sequence[Plateau],
+    recording: Recording, sensors: Mapping[str, Sensor], branches: Sequence[Branch], plateaus: Sequence[Plateau],
     outliers: Sequence[Outlier],
-) -> Any:
+) -> Any:  # fmt: skip
     """A Matplotlib figure, one axis per column: readings coloured by branch, plateaus as bars, outliers as crosses."""
     names = [n for n in _PLOTTED if n in recording] or [n for n in recording if n != "time"]
     if "contraction" in names and "length" in names:

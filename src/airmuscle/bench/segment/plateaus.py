@@ -25,12 +25,9 @@ _MONITORED = ("pressure", *MOVED)
 
 
 def quasi_static_rows(
-    recording: Recording,
-    sensors: Mapping[str, Sensor] | None = None,
-    *,
-    settling_time: float = SETTLING_TIME,
+    recording: Recording, sensors: Mapping[str, Sensor] | None = None, *, settling_time: float = SETTLING_TIME,
     max_change: float = MAX_CHANGE,
-) -> Mask:
+) -> Mask:  # fmt: skip
     """Whether each row is quasi-static (N,). Without time, every row is taken as a steady state."""
     quasi_static = np.ones(len(recording), dtype=bool)
     if "time" not in recording or len(recording) < 3:
@@ -110,12 +107,9 @@ class Plateau:
 
 
 def find_plateaus(
-    recording: Recording,
-    sensors: Mapping[str, Sensor] | None = None,
-    *,
-    min_duration: float = MIN_DURATION,
+    recording: Recording, sensors: Mapping[str, Sensor] | None = None, *, min_duration: float = MIN_DURATION,
     columns: Collection[str] = CONSTANT_COLUMNS,
-) -> tuple[Plateau, ...]:
+) -> tuple[Plateau, ...]:  # fmt: skip
     """The plateaus among the quasi-static rows; empty without time or pressure, and for a slow ramp.
 
     In a plateau each of the `columns` that were measured stays within twice the maximum quasi-static change of its
