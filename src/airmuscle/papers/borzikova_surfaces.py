@@ -12,20 +12,8 @@ import airmuscle as am
 from ..bench.identify.statistics import CorrelationIndex, correlation_index
 from ..bench.identify.surface.basis import LoadRange
 from ..bench.identify.surface.monotonicity import fit_monotone
-from ..core import (
-    BLACK,
-    BLUE,
-    DASHES,
-    LINES,
-    MARKERS,
-    ORANGE,
-    RED,
-    AirmuscleWarning,
-    autodiff,
-    bar,
-    legend_outside,
-    new_figure,
-)
+from ..core import AirmuscleWarning, autodiff, bar
+from ..core.plotting import BLACK, BLUE, DASHES, LINES, MARKERS, ORANGE, RED, legend_outside, new_figure
 from ..files.library.entry_file import load_law
 from ..physics.muscle.characteristic.borzikova import SAM_30X290, PlaneCurves
 from ..report.chapter import Plot

@@ -6,17 +6,8 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from ...core import Array, ParameterError, tree
-from ...physics import (
-    Braid,
-    LinearInPressure,
-    Muscle,
-    MuscleRoute,
-    PressureDriven,
-    SerialArm,
-    SpatialLink,
-    StickSlip,
-    WithStickSlip,
-)
+from ...physics import Braid, Muscle, MuscleRoute, PressureDriven, SerialArm, SpatialLink, StickSlip, WithStickSlip
+from ...physics.muscle.characteristic.linear_in_pressure import LinearInPressure
 from .descent import CLIP, Descent, SearchStage, gradients, typical_size
 from .episode_inspection import EpisodeInspection, check_episodes, inspect_episodes
 from .episodes import HISTORY, ROWS, Episodes, Windows, band, count_fitted, cut, in_pairs, long_enough, rms

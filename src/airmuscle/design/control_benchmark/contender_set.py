@@ -3,18 +3,9 @@
 import dataclasses
 import functools
 
-from ...control.laws import (
-    PID,
-    AngleAndStiffness,
-    AntagonisticInverse,
-    FrictionFeedForward,
-    MotionFeedForward,
-    SetpointLead,
-    SlidingMode,
-    SuperTwisting,
-    WithFeedForward,
-    WithSetpointDelay,
-)
+from ...control.laws import PID, SlidingMode, SuperTwisting, WithFeedForward, WithSetpointDelay
+from ...control.laws.angle_and_stiffness import AngleAndStiffness, AntagonisticInverse
+from ...control.laws.open_loop import FrictionFeedForward, MotionFeedForward, SetpointLead
 from ...control.laws.pressures import DIFFERENCE
 from ...engine.loop import ControlLaw
 from .contenders import Bounds, Contender

@@ -16,19 +16,10 @@ from ...physics.muscle import LinearDamper
 from ...physics.muscle.characteristic import ForceLaw, TonduLopez2000
 from ...physics.muscle.friction import BoucWen, Friction, LuGre, MaxwellSlip
 from ...physics.plant.plant import Plant
-from ...physics.pneumatics import (
-    EnergyBalance,
-    FillDischarge,
-    Gas,
-    Isothermal,
-    Orifice,
-    SubsonicIndexValve,
-    Supply,
-    Tube,
-    WallHeatTransfer,
-    WithTubes,
-)
+from ...physics.pneumatics import EnergyBalance, Gas, Isothermal, Supply, Tube, WallHeatTransfer, WithTubes
+from ...physics.pneumatics.circuit import FillDischarge
 from ...physics.pneumatics.gas import HEAT_CAPACITY_RATIO, REFERENCE_DENSITY, REFERENCE_TEMPERATURE
+from ...physics.pneumatics.valve import Orifice, SubsonicIndexValve
 
 SIDES = ("left", "right")
 SUPPLY = 6e5

@@ -36,16 +36,8 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ...bench.identify.dynamic import (
-    CrossPrediction,
-    DynamicFit,
-    Experiment,
-    InitialValue,
-    cross_predict,
-    fit_dynamic,
-    stated_ambient,
-)
-from ...bench.identify.dynamic.experiment import ParameterPaths, RecordUnknown
+from ...bench.identify.dynamic import CrossPrediction, DynamicFit, cross_predict, fit_dynamic
+from ...bench.identify.dynamic.experiment import Experiment, InitialValue, ParameterPaths, RecordUnknown, stated_ambient
 from ...bench.readers import ColumnMapping, read, read_mapping
 from ...bench.readers.mapping import mapping_of_tables
 from ...core import ParameterError, ShortRepr, abridged, ambient_pressure

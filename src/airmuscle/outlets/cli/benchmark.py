@@ -4,20 +4,10 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
 from ...core import InputError, SimulationError, suggestion
-from ...design.control_benchmark import (
-    BenchmarkJoint,
-    BenchmarkResult,
-    Contender,
-    LearningCurve,
-    benchmark_controllers,
-    learn,
-    on_off_joint,
-    proportional_joint,
-    scenario_contender,
-    standard_contenders,
-)
-from ...design.control_benchmark.benchmark import COMMISSIONING_RUNS
+from ...design.control_benchmark import Contender, LearningCurve, learn, scenario_contender, standard_contenders
+from ...design.control_benchmark.benchmark import COMMISSIONING_RUNS, BenchmarkResult, benchmark_controllers
 from ...design.control_benchmark.chapter import benchmark_chapter
+from ...design.control_benchmark.joints import BenchmarkJoint, on_off_joint, proportional_joint
 from ...design.control_benchmark.tasks import find_tasks
 from ...design.control_benchmark.truths import TRUTH_SEEDS
 from ...files.library.files import is_path

@@ -11,20 +11,7 @@ from ...core import check_writable
 from ...engine.run.batch.lanes import Precision
 from ...files.library.entry_file import load_law
 from ...files.scenario.scenario import load_scenario
-from ..export import (
-    C99,
-    PRECISIONS,
-    JavaScript,
-    Octave,
-    OnnxStack,
-    Stack,
-    Target,
-    TorchStack,
-    WarpStack,
-    write_controller,
-    write_law,
-    write_program,
-)
+from ..export import PRECISIONS, OnnxStack, Stack, TorchStack, WarpStack, write_controller, write_law, write_program
 from ..export.compiler import (
     PLATFORMS,
     PROCESSORS,
@@ -36,6 +23,7 @@ from ..export.compiler import (
 )
 from ..export.identifiers import make_identifier
 from ..export.robot_description import WRITERS
+from ..export.targets import C99, JavaScript, Octave, Target
 from ..requests.declaration import RequestError, Where, option, request
 from .export_models import export_actuator, export_fmu, export_modelica, export_mujoco, export_robot
 from .options import Folder, Json, complete_entry, with_requests

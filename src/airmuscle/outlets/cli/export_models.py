@@ -8,17 +8,9 @@ from ...core import check_writable
 from ...files import list_plants
 from ...files.library import load_law, read_toml
 from ...files.scenario.scenario import load_scenario
-from ..export import (
-    Stack,
-    regulated_plant,
-    write_actuator,
-    write_controller_fmu,
-    write_fmu,
-    write_modelica,
-    write_mujoco_plugin,
-    write_ssp,
-)
+from ..export import write_controller_fmu, write_fmu, write_modelica, write_mujoco_plugin, write_ssp
 from ..export.compiler import Platform
+from ..export.learning import Stack, regulated_plant, write_actuator
 from ..export.robot_description import WRITERS
 from .terminal import echo, print_json
 

@@ -7,21 +7,12 @@ from typing import Annotated, Any
 import typer
 
 from ...core import check_writable, leaves
-from ...design.tuning import (
-    IntegralAbsoluteError,
-    IntegralTimeAbsoluteError,
-    Perturbations,
-    RobustObjective,
-    RootMeanSquareError,
-    RuleSettings,
-    TrackingIndex,
-    Tuning,
-    rule_settings,
-    rule_starts,
-    step_experiment,
-)
+from ...design.tuning import IntegralAbsoluteError, IntegralTimeAbsoluteError, RootMeanSquareError, TrackingIndex
 from ...design.tuning import tune as find_gains
 from ...design.tuning.chapter import history_table, tuning_chapter
+from ...design.tuning.perturbations import Perturbations
+from ...design.tuning.result import RobustObjective, Tuning
+from ...design.tuning.rules import RuleSettings, rule_settings, rule_starts, step_experiment
 from ...design.tuning.scenario_loop import ScenarioLoop, load_scenario_loop
 from ...engine.processes import Workers
 from ...files.scenario.controller import signal_units

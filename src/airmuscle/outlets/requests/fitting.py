@@ -7,17 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from ...bench.identify import (
-    UNCENSORED,
-    Candidate,
-    Fit,
-    bootstrap,
-    estimate_length_error,
-    fit,
-    profile,
-    standard_candidates,
-    weakly_determined,
-)
+from ...bench.identify import UNCENSORED, Fit, bootstrap, estimate_length_error, fit, profile, weakly_determined
+from ...bench.identify.candidates import Candidate, standard_candidates
 from ...bench.identify.compare_chapter import LawSelection, compare_chapters, select_law
 from ...bench.identify.problem import fitted_quantity_of
 from ...bench.identify.specimen_errors import odd_specimen_notes, ranked_specimen_errors, specimen_errors

@@ -6,17 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from ...bench.joint import (
-    ArmFit,
-    EpisodeInspection,
-    EpisodeMapping,
-    fit_joint,
-    fit_known_joint,
-    inspect_episodes,
-    read_episode_mapping,
-    read_episodes,
-)
+from ...bench.joint import ArmFit, EpisodeMapping, fit_joint, fit_known_joint, read_episode_mapping, read_episodes
 from ...bench.joint.episode_formats import propose_mapping
+from ...bench.joint.episode_inspection import EpisodeInspection, inspect_episodes
 from ...control.laws import PID, Cascade, CoContraction, Decentralised
 from ...files.library import list_plants
 from ...files.library.write import entry_of, model_table, scenario_toml, to_toml

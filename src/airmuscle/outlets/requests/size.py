@@ -4,15 +4,8 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from ...core import UnitError, quantity
-from ...design.sizing import (
-    SORT_KEYS,
-    JointRequirement,
-    LiftRequirement,
-    Requirement,
-    SizingConditions,
-    SizingResult,
-    size_muscles,
-)
+from ...design.sizing import JointRequirement, LiftRequirement, SizingConditions, SizingResult, size_muscles
+from ...design.sizing.choice import SORT_KEYS, Requirement
 from ...files.library import load_law
 from .declaration import RequestError, Where, option, request
 

@@ -3,18 +3,8 @@
 import itertools
 from collections.abc import Mapping, Sequence
 
-from ...core import (
-    STANDARD_GRAVITY,
-    Input,
-    ParameterError,
-    StateVariable,
-    Value,
-    Values,
-    check_structure,
-    model,
-    ops,
-    parameter,
-)
+from ...core import Input, ParameterError, StateVariable, Value, Values, check_structure, model, ops, parameter
+from ...core.units import STANDARD_GRAVITY
 from .base import Coordinate, Mechanism
 
 

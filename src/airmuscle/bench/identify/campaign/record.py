@@ -10,21 +10,9 @@ import numpy.typing as npt
 
 from ....core import Array, ShortRepr
 from ....recording import Recording
-from ...segment import (
-    AT_REST,
-    ISOBARIC,
-    ISOMETRIC,
-    ISOTONIC,
-    Inspection,
-    Run,
-    Sensor,
-    estimate_sensors,
-    inspect,
-    inspect_all,
-    quasi_static_rows,
-)
+from ...segment import Inspection, Sensor, estimate_sensors, inspect, inspect_all, quasi_static_rows
 from ...segment.interval import true_intervals
-from ...segment.runs import CONTRACTION_BAND, RELATIVE_BAND
+from ...segment.runs import AT_REST, CONTRACTION_BAND, ISOBARIC, ISOMETRIC, ISOTONIC, RELATIVE_BAND, Run
 from .transient import MIN_STEP, PressureStep, find_motion, find_pressure_steps
 
 RowMask = npt.NDArray[np.bool_]
