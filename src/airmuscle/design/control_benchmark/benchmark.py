@@ -20,7 +20,7 @@ from .commissioning import Commissioning, alike, commission, run_loop
 from .contenders import Contender, complete
 from .joints import BenchmarkJoint
 from .signals import TrackingMetrics, task_loop, task_signals, track
-from .tasks import DEGREE, STANDARD_TASKS, TUNING_BEGIN, TUNING_TASKS, ControlTask
+from .tasks import DEGREE, STANDARD_TASKS, TUNING_BEGIN, ControlTask
 from .truths import BenchmarkTruth
 
 SETS_PER_GAIN, COMMISSIONING_RUNS = 300, 60
@@ -164,16 +164,10 @@ def spread(values: Array) -> Spread:
 
 
 def benchmark_controllers(
-    joint: BenchmarkJoint,
-    contenders: Sequence[Contender],
-    tasks: Sequence[ControlTask] = STANDARD_TASKS,
-    *,
-    seeds: Sequence[int] = (1,),
-    sets_per_gain: int = SETS_PER_GAIN,
-    commissioning_runs: int = COMMISSIONING_RUNS,
-    progress: Progress | None = None,
-    workers: Workers = 1,
-) -> BenchmarkResult:
+    joint: BenchmarkJoint, contenders: Sequence[Contender], tasks: Sequence[ControlTask] = STANDARD_TASKS, *,
+    seeds: Sequence[int] = (1,), sets_per_gain: int = SETS_PER_GAIN, commissioning_runs: int = COMMISSIONING_RUNS,
+    progress: Progress | None = None, workers: Workers = 1,
+) -> BenchmarkResult:  # fmt: skip
     """Tune every contender for the models of a joint, commission it on each truth, and run every task on the truths.
 
     joint               model, family, truths, sensors
@@ -236,7 +230,7 @@ def benchmark_contender(
         progress(f"{contender.name}: {truth.name}", i, len(joint.truths))
         laws = {Group.MODELS: law}
         if bounds and commissioning_runs:
-            found[truth.name] = commission(joint, truth, law, bounds, TUNING_TASKS, runs=commissioning_runs)
+            found[truth.name] = commission(joint, truth, law, bounds, joint.tuning_tasks, runs=commissioning_runs)
             laws[Group.COMMISSIONED] = with_gains(law, found[truth.name].gains)
         for group, each in laws.items():
             for task in tasks:
@@ -263,7 +257,7 @@ def tune_contender(
         return completed.law, None
     cases = list(_cases(joint, completed.law))
     tuning = tune(
-        cases, completed.bounds, duration=TUNING_TASKS[0].duration,
+        cases, completed.bounds, duration=joint.tuning_tasks[0].duration,
         index=RootMeanSquareError({"angle": DEGREE}, TUNING_BEGIN), objective=joint.objective,
         budget=sets_per_gain * len(completed.bounds) * len(cases), seed=seed,
         integrator=None if joint.switching else TUNING_INTEGRATOR,
@@ -274,7 +268,7 @@ def tune_contender(
 
 def _cases(joint: BenchmarkJoint, law: Controller) -> Iterator[LoopCase]:
     """The tuning tasks on all models."""
-    for task in TUNING_TASKS:
+    for task in joint.tuning_tasks:
         loop = task_loop(joint, law, task, joint.model, joint.drivers)
         for name, plant in joint.family.items():
             yield LoopCase(f"{task.name}, {name}", plant, loop, joint.start(plant))

@@ -113,12 +113,9 @@ class SensedController(Controller):
 
 
 def sensed(
-    controller: Controller,
-    actuation: ControlLaw,
-    ranges: Mapping[str, tuple[float, float]],
-    sensors: tuple[Any, ...],
+    controller: Controller, actuation: ControlLaw, ranges: Mapping[str, tuple[float, float]], sensors: tuple[Any, ...],
     seed: int,
-) -> SensedController:
+) -> SensedController:  # fmt: skip
     """A controller behind the sensors of the columns that it and the actuation measure."""
     columns = tuple(dict.fromkeys((*controller.measured_columns, *actuation.measured_columns)))
     known = {sensor.column: sensor for sensor in sensors}
@@ -128,8 +125,8 @@ def sensed(
 
 BAR = 1e5
 Bounds = Mapping[str, tuple[float, float]]
-PRESSURE_GAIN, ZONE = (1.0 / BAR, 60.0 / BAR), (0.005 * BAR, 0.2 * BAR)
-"""Ranges of the gain and of the dead zone of the inner pressure control (chosen)."""
+ZONE = (0.005 * BAR, 0.2 * BAR)
+"""Range of the dead zone of the inner pressure control (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -225,7 +222,7 @@ def _actuated(joint: BenchmarkJoint, law: ControlLaw, name: str) -> tuple[Contro
         start = (10.0 / BAR, 0.02 * BAR) if joint.switching else (2.0 / BAR, 0.0)
         inner = ProportionalFeedback(joint.pressures, valves, *start)
         law = Cascade(law, inner, (joint.min_pressure,) * 2, (joint.max_pressure,) * 2)
-        prefix, ranges = f"outer.{prefix}", {"inner.gain": PRESSURE_GAIN}
+        prefix, ranges = f"outer.{prefix}", {"inner.gain": joint.pressure_gains}
         if joint.switching:
             law = SigmaDelta(law)
             prefix, ranges = f"law.{prefix}", _within("law.", {**ranges, "inner.zone": ZONE})

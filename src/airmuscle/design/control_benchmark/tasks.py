@@ -189,25 +189,22 @@ STANDARD_TASKS: tuple[ControlTask, ...] = (
 )  # fmt: skip
 """The tasks of the benchmark; all amplitudes, times and disturbances are chosen."""
 
-TUNING_TASKS: tuple[ControlTask, ...] = (
-    ControlTask(
-        "tuning: motions",
-        SumOfMotions(
-            (
-                MinimumJerkMotion(10.0 * DEGREE, 0.1, 0.6),
-                MinimumJerkMotion(-14.0 * DEGREE, 1.0, 0.5),
-                SineMotion(8.0 * DEGREE, 0.8),
-                SineMotion(8.0 * DEGREE, 1.7),
-                SineMotion(2.0 * DEGREE, 3.7),
-            )
-        ),
-        3.0,
-        torque=((0.0, 0.0), (1.8, 0.0), (1.81, 1.0)),
-    ),
-    ControlTask("tuning: step", StepMotion(18.0 * DEGREE, 0.1), 3.0),
-)
-"""What all controllers are tuned for (chosen): smooth motions up to 3.7 Hz with a step of the torque, and a step of the
-angle that must have settled; none of the tasks that are judged. Their durations are equal."""
+
+def tuning_tasks(*fast: SineMotion) -> tuple[ControlTask, ControlTask]:
+    """What all controllers of a joint are tuned for (chosen), none of the tasks that are judged.
+
+    Smooth motions with sines of 0.8, 1.7 and 3.7 Hz, and the further ones, with a step of the torque; and a step of the
+    angle that must have settled. Their durations are equal.
+    """
+    rises = MinimumJerkMotion(10.0 * DEGREE, 0.1, 0.6), MinimumJerkMotion(-14.0 * DEGREE, 1.0, 0.5)
+    sines = (SineMotion(a * DEGREE, f) for a, f in ((8.0, 0.8), (8.0, 1.7), (2.0, 3.7)))
+    motions = SumOfMotions((*rises, *sines, *fast))
+    return (
+        ControlTask("tuning: motions", motions, 3.0, torque=((0.0, 0.0), (1.8, 0.0), (1.81, 1.0))),
+        ControlTask("tuning: step", StepMotion(18.0 * DEGREE, 0.1), 3.0),
+    )
+
+
 TUNING_BEGIN = 0.7
 """Time from which on errors count in tuning [s] (chosen): 0.6 s after the step."""
 
