@@ -14,10 +14,10 @@ import airmuscle as am
 from airmuscle.core import display as module
 from airmuscle.core.display import (
     CONFIG_FILE,
+    chosen_scale,
     contraction_text,
     current_units,
     heading_scale,
-    in_display_unit,
     level_text,
     quantity_text,
     scaled_numbers,
@@ -171,8 +171,7 @@ def test_headings_of_other_quantities_and_ratios_that_are_no_contraction_are_kep
 
 def test_declared_values_and_numbers_in_a_text_are_converted():
     display("mm")
-    assert in_display_unit(0.3, "m") == (pytest.approx(300.0), "mm")
-    assert in_display_unit(0.3, "1") == (0.3, "1")
+    assert chosen_scale("m", 1.0, "m") == (pytest.approx(1000.0), "mm")
     assert scaled_numbers("1 to 2.5", 0.01) == "0.01 to 0.025"
 
 
@@ -239,6 +238,6 @@ def test_a_configuration_in_a_folder_of_another_user_is_not_read(config, monkeyp
 
 def test_an_angular_speed_in_hertz_is_in_turns_per_second():
     with display("Hz"):
-        assert in_display_unit(2 * np.pi, "rad/s") == (pytest.approx(1.0), "Hz")
+        assert chosen_scale("rad/s", 1.0, "rad/s") == (pytest.approx(0.5 / np.pi), "Hz")
     with display("rpm"):
-        assert in_display_unit(2 * np.pi, "rad/s") == (pytest.approx(60.0), "rpm")
+        assert chosen_scale("rad/s", 1.0, "rad/s") == (pytest.approx(30.0 / np.pi), "rpm")
