@@ -45,10 +45,10 @@ def test_files_have_300_lines_at_most():
     assert {name for name, n in lengths.items() if n > 300} == set()
 
 
-def test_the_package_has_560_files_and_98_690_lines_at_most():
+def test_the_package_has_560_files_and_98_560_lines_at_most():
     """The limits fall with the package; what adds a file joins another one to the file that uses it."""
     assert len(FILES) <= 560
-    assert sum(len(path.read_text(encoding="utf-8").splitlines()) for path in FILES) <= 98_690
+    assert sum(len(path.read_text(encoding="utf-8").splitlines()) for path in FILES) <= 98_560
 
 
 def body_length(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
@@ -319,7 +319,7 @@ def test_all_exceptions_are_in_airmuscle_errors():
     assert all(name in (errors.__doc__ or "") for name in errors.__all__)
 
 
-def test_tests_import_inner_modules_120_times_at_most():
+def test_tests_import_inner_modules_119_times_at_most():
     """They import from the faces, so that a file can be moved; what they test within a room they import from its file.
 
     Names that a stub has for the other rooms alone count as well; the import of a module by its package does not.
@@ -332,4 +332,4 @@ def test_tests_import_inner_modules_120_times_at_most():
         if (face := face_of(node.module)) is None
         or any(not (alias.name in face or is_module(f"{node.module}.{alias.name}")) for alias in node.names)
     ]
-    assert len(inner) <= 120
+    assert len(inner) <= 119
