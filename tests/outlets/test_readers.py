@@ -509,6 +509,12 @@ def test_an_invalid_mapping_file(tmp_path: Path, content: str, kind, expected: s
         read_mapping(tmp_path / "none.toml")
 
 
+def test_the_force_in_the_name_of_a_file_may_be_a_load_in_grams(tmp_path: Path):
+    path = csv(tmp_path / "load_200g.csv", HEADINGS[:3], TABLE[:, :3])
+    recording = only(read(path, ColumnMapping(file_name="load_{force [g]}g")))
+    assert recording["force"] == pytest.approx(0.2 * 9.80665)
+
+
 def test_a_constant_column_states_the_resting_length(tmp_path: Path):
     path = csv(tmp_path / "a.csv", (*HEADINGS, "rest_length [cm]"), np.column_stack([TABLE, np.full(40, 31.0)]))
     recording = only(read(path))

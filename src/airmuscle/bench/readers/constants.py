@@ -127,12 +127,11 @@ def check_stated(origin: str, stated: Mapping[str, float | str]) -> None:
 
 def held_value(heading: Heading, stated: float | str, ambient: float, where: str) -> float:
     """The value of a held quantity in SI; a force may be stated as a load in g or kg, as in a column."""
-    value, target = stated, heading.target or "1"
-    if not isinstance(stated, str):
-        value = f"{stated!r} {heading.unit}" if heading.unit else stated
-    elif target == "N":
+    target = heading.target or "1"
+    value = f"{stated!r} {heading.unit}" if heading.unit and not isinstance(stated, str) else stated
+    if target == "N" and isinstance(value, str):
         with contextlib.suppress(UnitError):
-            return quantity(stated, "kg") * STANDARD_GRAVITY
+            return quantity(value, "kg") * STANDARD_GRAVITY
     return quantity(value, target, ambient=ambient, where=where)
 
 
