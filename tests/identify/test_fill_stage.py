@@ -6,10 +6,12 @@ records do not show or state is supposed, and said.
 from __future__ import annotations
 
 import dataclasses
+import json
 import math
 
 import numpy as np
 import pytest
+from command_line import airmuscle
 from widths import widened
 
 from airmuscle import load
@@ -22,6 +24,7 @@ from airmuscle.bench import (
     fit_dynamic,
     fit_tube,
     stated_ambient,
+    write,
 )
 from airmuscle.bench.identify.campaign import fit_fill_stage, fit_release_stage, stage_result, volume_change
 from airmuscle.engine import Rodas4, Schedule, simulate
@@ -93,6 +96,23 @@ def tube_record(contraction, segments, seed):
     columns = {"time": times, "pressure": pressure, "contraction": np.full(times.size, contraction)}
     constants = {"resting_length": 0.3, "ambient": STANDARD.pressure, "ambient_temperature": STANDARD.temperature}
     return Recording(columns, f"fill {contraction:g}", constants)
+
+
+def test_the_scenario_of_a_fill_through_a_tube_predicts_the_recorded_pressure(tmp_path):
+    """By the commands: the sensor is in the tube, and the records name its pressure `pressure`."""
+    files = [write(tube_record(c, 1, i), tmp_path / f"fill{i}.csv") for i, c in enumerate(CONTRACTIONS)]
+    braid = ("--braid", "radius=10 mm, angle=25 deg", "--resting-length", "300 mm")
+    done = airmuscle("campaign", *files, *braid, "--out", tmp_path / "out")
+    said = " ".join(done.stdout.split())
+    assert "Each fill is predicted from the others within 0.165 kPa" in said, done.output
+    assert (tmp_path / "out" / "figures" / "campaign-fills.png").exists()
+    scenario = tmp_path / "out" / "scenarios" / "fill0.toml"
+    done = airmuscle("predict", scenario, files[0], "--start-time", "200 ms", "--start-margin", "20 ms", "--json")
+    assert done.exit_code == 0, done.output
+    (row,) = json.loads(done.stdout)["prediction"]["predictions"]
+    assert row["quantity"] == "tube.pressure"
+    assert row["rms_error"] == pytest.approx(NOISE, rel=0.1)
+    assert row["rows_within_the_band"] >= 0.9
 
 
 @pytest.mark.parametrize("segments", widened([1, 3], lambda count: count == 3))

@@ -64,6 +64,7 @@ def test_fills_alone_give_their_scenarios_with_the_braid_and_say_why_there_is_no
         "muscle: not written, because it needs a static law: no record is a slow run with force and length; record"
         in said
     )
+    assert "A tube between" not in (tmp_path / "out" / "report.html").read_text(encoding="utf-8")  # the model errs
     assert not (tmp_path / "out" / "muscle.toml").exists()
     path = tmp_path / "out" / "scenarios" / "fill.toml"
     assert "because no force was measured" in path.read_text(encoding="utf-8").splitlines()[0]

@@ -538,10 +538,10 @@ def test_the_command_writes_an_fmu(tmp_path):
 def test_a_start_without_equilibrium_is_named_and_nothing_is_written(tmp_path):
     text = EXAMPLE.read_text().replace('"10 kg"', '"500 kg"').replace("dmsp-20-300", "chou-hannaford")
     (tmp_path / "heavy.toml").write_text(text)
-    done = airmuscle("export", tmp_path / "heavy.toml", "--to", "fmu", "--out", tmp_path / "heavy.fmu")
+    done = airmuscle("export", tmp_path / "heavy.toml", "--to", "fmu", "--out", tmp_path / "new" / "heavy.fmu")
     assert done.exit_code != 0
     assert "HangingMass has no stable equilibrium" in done.output
-    assert not (tmp_path / "heavy.fmu").exists()
+    assert [path.name for path in tmp_path.iterdir()] == ["heavy.toml"]
 
 
 @pytest.mark.parametrize(

@@ -215,7 +215,7 @@ def test_the_order_of_operations_is_kept(expression, language):
 
 MIDPOINT = """
 from .calls import invoke, pointer
-from .record import set_inputs
+from .evaluate import set_inputs
 
 def single_step(rhs, c, y, base, w, t, start, end, h, f0, u, x, yn):
     last = t + 1.000001 * h >= end

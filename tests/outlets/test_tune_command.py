@@ -150,7 +150,7 @@ def test_drawn_parameters_are_those_that_the_scenario_takes_from_the_muscle_file
     scenario.write_text(own, encoding="utf-8")
     family = load_scenario_loop(scenario).family(Perturbations(draws=3))
     assert not [case for case in family.cases if case.name.startswith("drawn")]
-    assert any("no muscle file states the uncertainty" in note for note in family.notes)
+    assert any("neither the scenario nor a muscle file states the uncertainty" in note for note in family.notes)
 
 
 def test_every_case_starts_at_the_pressure_of_the_scenario(scenario):

@@ -89,8 +89,11 @@ def _fill(campaign: Campaign, record: CampaignRecord, muscle: Muscle) -> tuple[s
     ideal = "" if campaign.law() is not None else f" {IDEAL}"
     points = {name: [list(point) for point in rows] for name, rows in stage.commands(record).items()}
     run = {"duration": float(record.recording["time"][-1]) - start, "initial_state": {"pressure": known["pressure"]}}
-    table = fit_uncertainty(stage.fit, [{"pressure": error} for error in stage.cross_rms])
-    fitted = {"uncertainty": _known_in(table, plant)}
+    sensor = stage.fit.problem.record_models[0].names[0]
+    table = fit_uncertainty(stage.fit, [{sensor: error} for error in stage.cross_rms])
+    fitted: dict[str, Any] = {"uncertainty": _known_in(table, plant)}
+    if sensor != "pressure":  # the sensor is in a tube
+        fitted["observed"] = {sensor: {"deviation": stage.fit.rms(sensor), "column": "pressure"}}
     return scenario_toml(record.origin, plant, points, run, f"{_note(record, start)}{ideal}", fitted), ""
 
 

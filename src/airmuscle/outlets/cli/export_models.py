@@ -25,7 +25,7 @@ def export_fmu(
     """
     suffix = ".ssp" if part == "ssp" else ".fmu"
     path = out if out.suffix == suffix else out / f"{name}{suffix}"
-    check_writable(path.parent, shared=True)
+    check_writable(path.parent, shared=path.parent.exists())  # several commands may write into one folder
     scenario = load_scenario(source)
     common: dict[str, Any] = {
         "fmi": fmi, "name": name, "title": scenario.title, "binary": binary, "platforms": platforms,

@@ -161,12 +161,12 @@ def fill_plot(stage: FillStage) -> Plot:
     )  # fmt: skip
     for column, i in enumerate(shown):
         upper, lower = panels[:, column]
-        recording, modelled = stage.experiments[i].recording, stage.fit.modelled(i)
-        time = recording["time"]
+        recording, sensor = stage.experiments[i].recording, stage.fit.problem.record_models[i].names[0]
+        time, modelled = recording["time"], stage.fit.modelled(i)[sensor]
         dots = {"linestyle": "none", "marker": ".", "markersize": 2.5, "color": BLUE}
         upper.plot(time, 1e-3 * recording["pressure"], label="measured", **dots)
-        upper.plot(time, 1e-3 * modelled["pressure"], color=RED, linewidth=1.0, label="joint fit")
-        lower.plot(time, 1e-3 * (modelled["pressure"] - recording["pressure"]), **dots)
+        upper.plot(time, 1e-3 * modelled, color=RED, linewidth=1.0, label="joint fit")
+        lower.plot(time, 1e-3 * (modelled - recording["pressure"]), **dots)
         lower.axhline(0.0, color=BLACK, linewidth=0.8)
         upper.set_title(f"contraction {_level_text('contraction', float(stage.contractions[i]))}", fontsize=8)
         lower.set_xlabel("time [s]")

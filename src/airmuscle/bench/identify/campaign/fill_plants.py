@@ -96,8 +96,14 @@ def tube_guess(plant: object) -> Tube:
     assert isinstance(plant, Plant)
     valve = valves_of(plant.circuit).fill
     assert isinstance(valve, Valve)
-    volume = min(max(0.1 * float(plant.muscles[0].geometry.volume(0.0)), 1e-9), 1e-2)
+    volume = min(max(0.1 * volume_at_rest(plant), 1e-9), 1e-2)
     return Tube(Valve(2.0 * valve.conductance, 0.3), volume)
+
+
+def volume_at_rest(plant: object) -> float:
+    """Volume of the first muscle of a plant at its resting length [m3]."""
+    assert isinstance(plant, Plant)
+    return float(plant.muscles[0].geometry.volume(0.0))
 
 
 def sensor_of(plant: object) -> str:

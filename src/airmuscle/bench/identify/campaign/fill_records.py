@@ -1,6 +1,7 @@
 """Fills and discharges of a campaign as experiments: valve commands, initial pressure, and the unknowns."""
 
 import dataclasses
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -138,6 +139,10 @@ def with_circuit(experiment: dynamic.Experiment, circuit: Circuit) -> dynamic.Ex
     return dataclasses.replace(experiment, recording=recording, plant=plant, initial_conditions=initial)
 
 
+TUBE_AREA = math.pi * 0.002**2
+"""Area of a tube of 4 mm of inner diameter [m2], which makes a volume comparable (chosen)."""
+
+
 def describe_tube(fit: dynamic.DynamicFit) -> str:
     """The tube between valves and muscle, as a sentence."""
     volume, conductance = fit[TUBE_VOLUME], fit[TUBE_CONDUCTANCE]
@@ -149,7 +154,8 @@ def describe_tube(fit: dynamic.DynamicFit) -> str:
     return (
         f"A tube between valves and muscle, with the pressure sensor at the valves, {along}: its volume of "
         f"{1e6 * volume.value:.3g} cm3 (standard error {1e6 * volume.stderr:.2g} cm3) and conductance of "
-        f"{conductance.value:.3g} m3/(s Pa) explain the records, which a muscle without a tube does not."
+        f"{conductance.value:.3g} m3/(s Pa) explain the records, which a muscle without a tube does not. Compare it "
+        f"with that of the rig (4 mm of inner diameter: {volume.value / TUBE_AREA:.2g} m), for other causes look alike."
     )
 
 

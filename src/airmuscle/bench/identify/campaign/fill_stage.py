@@ -32,6 +32,8 @@ MAX_FOLLOWED = 2.0
 """That ratio up to which it follows them; above it, a supply whose pressure sinks and a tube are tried (chosen)."""
 MAX_VOLUME_ERROR = 0.3
 """Maximum relative standard error of a volume before the valve (chosen)."""
+MAX_TUBE_VOLUME = 1.5
+"""Maximum volume of a tube in relation to that of the muscle at rest (chosen)."""
 MIN_MISFIT = 0.01
 """Minimum residual that is reported, as a fraction of the greatest change of the pressure (chosen)."""
 
@@ -246,7 +248,8 @@ def _with_supply(
 ) -> Supplied:  # fmt: skip
     """The fit with a constant supply; where it does not follow the records, with a volume before the valve or a tube.
 
-    A volume is used where the records determine it and the fit then follows them.
+    A volume is used where the records determine it and the fit then follows them; a tube that is too large in relation
+    to the muscle is not, because it stands for an error of the model.
     """
     constant = fitted(experiments, valves)
     limit = MAX_FOLLOWED * fills.pressure_deviation(records)
@@ -260,7 +263,8 @@ def _with_supply(
             continue
         estimate = next(each for each in fit.estimates if each.name.endswith(volume))
         determined = not estimate.on_bound and estimate.stderr <= MAX_VOLUME_ERROR * estimate.value
-        if determined and max(fills.record_rms(fit)) <= limit:
+        possible = change is _with_volume or estimate.value <= MAX_TUBE_VOLUME * plants.volume_at_rest(fit.plant())
+        if determined and possible and max(fills.record_rms(fit)) <= limit:
             return fit, changed, unknowns
     return constant, experiments, valves
 
