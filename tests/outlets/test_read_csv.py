@@ -60,6 +60,8 @@ FORMS = {
     "carriage returns": PLAIN.replace("\n", "\r\n"),
     "BOM": "\ufeff" + PLAIN,
     "UTF-16": PLAIN.encode("utf-16"),
+    "UTF-32": PLAIN.encode("utf-32"),
+    "UTF-32, big-endian": b"\0\0\xfe\xff" + PLAIN.encode("utf-32-be"),
     "comments and empty lines": "# rig 3\n% calibrated\n\n" + PLAIN.replace("\n0.1,", "\n\n# pause\n0.1,") + "\n\n",
     "heading in a comment": "# rig 3\n# " + PLAIN,
     "parentheses": PLAIN.replace("[", "(").replace("]", ")"),

@@ -20,7 +20,7 @@ _SIGNATURES = (
     (b"SQLite format 3", "an SQLite database"), (b"MATLAB 7.3", "a MATLAB file"), (b"MATLAB 5.0", "a MATLAB file"),
     (b"TDSm", "a TDMS file"), (b"MDF ", "an MDF file"), (b"PAR1", "a Parquet file"), (b"\x93NUMPY", "a NumPy file"),
 )  # fmt: skip
-_BYTE_ORDER_MARKS = (b"\xff\xfe", b"\xfe\xff")
+_BYTE_ORDER_MARKS = (b"\xff\xfe", b"\xfe\xff", b"\0\0\xfe\xff")
 _CONTROL = bytes(set(range(32)) - {*b"\t\n\v\f\r\x1a\x1b"})
 _KINDS = (
     (stat.S_ISDIR, "a folder"), (stat.S_ISFIFO, "a pipe"), (stat.S_ISCHR, "a device"), (stat.S_ISBLK, "a device"),
@@ -99,6 +99,6 @@ def _binary_kind(beginning: bytes) -> str:
     """Name of the binary format of a file that begins like this; empty for text."""
     known = next((kind for signature, kind in _SIGNATURES if beginning.startswith(signature)), "")
     control = len(beginning) - len(beginning.translate(None, _CONTROL))
-    if beginning[:2] in _BYTE_ORDER_MARKS or not control:
+    if beginning.startswith(_BYTE_ORDER_MARKS) or not control:
         return known if known == "a PDF document" else ""
     return known or "a binary file"

@@ -73,7 +73,9 @@ class TextHeader:
 
 
 def detect_encoding(content: bytes) -> str:
-    """The encoding of a file from its beginning: UTF-16 if it starts with a BOM, UTF-8 if valid, otherwise Latin-1."""
+    """The encoding of a file from its beginning: that of a byte order mark, UTF-8 if valid, otherwise Latin-1."""
+    if content[:4] in (b"\xff\xfe\0\0", b"\0\0\xfe\xff"):
+        return "utf-32"
     if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return "utf-16"
     try:
