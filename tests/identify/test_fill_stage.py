@@ -107,7 +107,8 @@ def test_the_scenario_of_a_fill_through_a_tube_predicts_the_recorded_pressure(tm
     assert "Each fill is predicted from the others within 0.165 kPa" in said, done.output
     assert (tmp_path / "out" / "figures" / "campaign-fills.png").exists()
     scenario = tmp_path / "out" / "scenarios" / "fill0.toml"
-    done = airmuscle("predict", scenario, files[0], "--start-time", "200 ms", "--start-margin", "20 ms", "--json")
+    start = ("--start-time", "200 ms", "--start-margin", "20 ms")
+    done = airmuscle("predict", scenario, files[0], *start, "--out", tmp_path / "prediction", "--json")
     assert done.exit_code == 0, done.output
     (row,) = json.loads(done.stdout)["prediction"]["predictions"]
     assert row["quantity"] == "tube.pressure"
