@@ -326,8 +326,8 @@ def test_plants_that_differ_in_their_circuit_alone_share_the_search_for_rest(mon
 @pytest.mark.parametrize(
     ("varied", "message"),
     [
-        ({"mass": [1.0]}, r"Plant has no parameter 'mass'. Did you mean 'mechanism.mass'\?"),
-        ({"mechanism.mas": [1.0]}, r"Plant has no parameter 'mechanism.mas'. Did you mean 'mechanism.mass'\?"),
+        ({"mass": [1.0]}, r"Plant has no parameter 'mass'; .* Did you mean 'mechanism.mass'\?"),
+        ({"mechanism.mas": [1.0]}, r"Plant has no parameter 'mechanism.mas'; .* Did you mean 'mechanism.mass'\?"),
         (
             {"mechanism.mass": [5.0, np.nan]},
             r"row 1: 'mechanism.mass' \(m, .*\) is nan kg; allowed range:",

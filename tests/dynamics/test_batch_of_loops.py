@@ -259,7 +259,7 @@ def test_bad_batches_of_loops():
     refused("control loops and signals", input=[loop, Schedule({"fill": ((0, 1.0),)})])
     other = ControlLoop(dataclasses.replace(PI, commanded="fill"), 0.0125, STEPS)
     refused("row 1: PID measures or commands other columns", input=[loop, other])
-    refused("no parameter 'gian'. Did you mean 'gain'", variations={"controller.gian": [1.0, 2.0]})
+    refused("no parameter 'gian'; .* Did you mean 'gain'", variations={"controller.gian": [1.0, 2.0]})
     refused("row 1: 'setpoint_weight'", variations={"controller.setpoint_weight": [0.5, 2.0]})
     refused("there is one loop for each plant", input=[loop, loop], variations={"controller.gain": [1.0, 2.0]})
     refused("one value per plant", variations={"controller.gain": [1e-6, 2e-6], "mechanism.mass": [1.0, 2.0, 3.0]})

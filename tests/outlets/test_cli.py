@@ -254,7 +254,9 @@ def test_another_value_of_a_parameter_is_set_by_its_path():
     refused = airmuscle("evaluate", *given, "--set", "characteristic.slope=2")
     assert refused.exit_code == 1
     error = refused.stderr.splitlines()[-1]
-    assert error.startswith("error: saga2007 has no parameter 'characteristic.slope'; allowed names: characteristic.")
+    assert error.startswith(
+        "error: saga2007 has no parameter 'characteristic.slope'; its parameters are characteristic."
+    )
     assert error.endswith("Did you mean 'characteristic.slope_factor'?")
     wrong = airmuscle("evaluate", MUSCLE, "--pressure=1 bar", "--contraction=.1", "--set", "geometry.radius=2 bar")
     assert "geometry.radius" in wrong.stderr.splitlines()[-1], wrong.stderr

@@ -8,9 +8,12 @@ from pathlib import Path
 import pytest
 
 from airmuscle.bench import read
+from airmuscle.core import leaves
+from airmuscle.engine import WithSensitivities
 from airmuscle.errors import ColumnError, FileError, ParameterError, UnknownNameError
 from airmuscle.files import load, load_scenario
 from airmuscle.files.library import read_toml
+from airmuscle.outlets import C99, write_program
 
 LIMIT = 5.0
 """Time [s of the processor] that no refusal takes."""
@@ -91,6 +94,29 @@ def test_a_message_lists_the_first_columns_of_a_wide_table(tmp_path: Path):
     with pytest.raises(ColumnError, match=r"channel number 1 .*…, and 498 more\)") as raised:
         read(tmp_path / "wide.csv")
     assert len(str(raised.value)) < 700
+
+
+def test_a_message_on_an_unknown_parameter_shows_the_first_of_hundreds_and_the_closest_one(tmp_path: Path):
+    scenario = load_scenario("joint-dmsp-20-matrix")
+    plant = scenario.plant
+    paths = [leaf.path for leaf in leaves(plant)]
+    assert len(", ".join(paths)) > 2000
+    wrong = f"{paths[-1]}e"
+    refused = (
+        lambda: WithSensitivities(plant, ((wrong,),), (1.0,)),
+        lambda: write_program(scenario.problem, tmp_path / "c", C99(), tunable=[wrong]),
+    )
+    for call in refused:
+        with pytest.raises(ParameterError, match=r"has no parameter .*, and \d+ more\. Did you mean ") as raised:
+            call()
+        assert len(str(raised.value)) < 700
+        assert str(raised.value).endswith(f"Did you mean '{paths[-1]}'?")
+
+
+def test_a_message_quotes_200_characters_of_a_long_path_with_spaces():
+    with pytest.raises(ParameterError, match=r"no parameter 'ab ab .*…") as raised:
+        WithSensitivities(load_scenario("joint-dmsp-20-matrix").plant, (("ab " * 2000,),), (1.0,))
+    assert len(str(raised.value)) < 900
 
 
 def test_a_text_of_a_page_is_not_proposed_as_the_code_of_a_missing_value(tmp_path: Path):

@@ -488,7 +488,7 @@ def test_a_mapping_that_does_not_match_the_file_is_an_error(tmp_path: Path, colu
 @pytest.mark.parametrize(
     ("content", "kind", "expected"),
     [
-        ("colums = 3", ParameterError, "unknown key 'colums'; allowed range: columns"),
+        ("colums = 3", ParameterError, "unknown key 'colums'; allowed are columns"),
         ("[columns]\np = 3", ParameterError, "column 'p' is mapped to 3; write 'pressure [bara]'"),
         ("columns = 3", ParameterError, "columns must be a table"),
         ("sheet = 3", ParameterError, "sheet = 3; it must be a quoted text"),

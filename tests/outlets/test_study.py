@@ -650,7 +650,7 @@ def test_the_command_names_its_report_last(folder: Path):
 # Invalid studies
 
 BAD = [
-    ("circuit.fill.conductance", "circuit.fil.conductance", "no parameter 'circuit.fil.conductance'. Did you mean 'circuit.fill.conductance'?"),
+    ("circuit.fill.conductance", "circuit.fil.conductance", "Did you mean 'circuit.fill.conductance'?"),
     ("mechanism.contraction", "run.stop", "the scenario has no parameter 'run.stop'"),
     ('low = "2 %"', "low = nan", "it must be finite"),
     ('low = "2 %"', "low = -inf", "it must be finite"),

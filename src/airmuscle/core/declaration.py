@@ -14,7 +14,7 @@ import numpy as np
 
 from .absolute_pressure import AbsolutePressure
 from .annotation import abridged, conforms, describe, one_line, type_hints
-from .errors import AirmuscleWarning, ParameterError, suggestion
+from .errors import AirmuscleWarning, ParameterError, alternatives
 from .short_repr import ShortRepr
 from .units import is_known_unit, quantity, usual_unit
 
@@ -238,6 +238,5 @@ def check_field(cls: type[Any], name: str) -> None:
     known = [f.name for f in dataclasses.fields(cls) if f.init]
     if name not in known:
         raise ParameterError(
-            f"{cls.__name__} has no parameter '{one_line(name)}'; its parameters are {', '.join(known)}."
-            f"{suggestion(name, known)}"
+            f"{cls.__name__} has no parameter '{one_line(name)}'{alternatives(name, known, 'its parameters are')}"
         )

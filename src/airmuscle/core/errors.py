@@ -31,7 +31,7 @@ MAX_LISTED, MAX_LISTED_NAME, MAX_LISTED_TEXT = 40, 60, 400
 """Number of names of a file that a message lists, and of characters of each and of all (chosen)."""
 MAX_WORD = 200
 """Maximum number of characters of an argument that a message quotes (chosen)."""
-_LONG_WORD = re.compile(rf"\S{{{MAX_WORD + 1},}}")
+_LONG_QUOTATION = re.compile(rf"\S{{{MAX_WORD + 1},}}|'[^'\n]{{{MAX_WORD + 1},}}'")
 
 
 @dataclasses.dataclass(frozen=True)
@@ -124,13 +124,13 @@ def printable(text: str) -> str:
 
 
 def quotable(text: str) -> str:
-    """The printable text, without the middle of words that are longer than any name, such as the contents of a file."""
-    return _LONG_WORD.sub(lambda word: f"{word[0][: MAX_WORD - 40]}…{word[0][-39:]}", printable(text))
+    """The printable text, without the middle of words and quotations that are longer than any name."""
+    return _LONG_QUOTATION.sub(lambda part: f"{part[0][: MAX_WORD - 40]}…{part[0][-39:]}", printable(text))
 
 
-def listed(names: Iterable[str], characters: int = MAX_LISTED_TEXT) -> str:
+def listed(names: Iterable[str], characters: int = MAX_LISTED_TEXT, longest: int = MAX_LISTED_NAME) -> str:
     """Names of a file, such as its headings, for a message: the first ones in so many characters, and how many more."""
-    all_names = [name if len(name) <= MAX_LISTED_NAME else f"{name[: MAX_LISTED_NAME - 1]}…" for name in names]
+    all_names = [name if len(name) <= longest else f"{name[: longest - 1]}…" for name in names]
     ends = itertools.accumulate(len(name) + 2 for name in all_names)
     count = min(MAX_LISTED, max(sum(end <= characters for end in ends), 1))
     rest = len(all_names) - count
@@ -260,6 +260,16 @@ class SimulationError(AirmuscleError):
     def recording(self) -> Any:
         """Recording of the partial results, or None."""
         return None if self.solution is None else self.solution.recording
+
+
+def alternatives(name: str, known: Iterable[str], introduction: str = "there are") -> str:
+    """What follows an unknown name in a message: the known names, abridged if there are many, and the closest one."""
+    names = list(known)
+    stems: dict[str, list[str]] = {}
+    for each in names:
+        stems.setdefault(re.sub(r"\[\d+\]", "[]", each), []).append(each)
+    shown = [group[0] if len(group) == 1 else f"{group[0]} to {group[-1]}" for group in stems.values()]
+    return f"; {introduction} {listed(shown, longest=MAX_WORD) or 'none'}.{suggestion(str(name), names)}"
 
 
 def suggestion(name: str, known: Iterable[str]) -> str:

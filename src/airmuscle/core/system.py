@@ -11,7 +11,7 @@ from .annotation import abridged, one_line
 from .arrays import Array
 from .declaration import as_float
 from .diagnostics import ColumnLimit, Columns, Diagnostic
-from .errors import ParameterError, suggestion
+from .errors import ParameterError, alternatives
 from .ops import Values
 
 T = TypeVar("T", "StateVariable", "Input")
@@ -216,9 +216,8 @@ def state_vector(system: System, state: Mapping[str, float]) -> Array:
 def _check_names(names: list[str], state: Mapping[str, float]) -> None:
     for name in state:
         if name not in names:
-            near = suggestion(str(name), names)
             raise ParameterError(
-                f"the plant has no state '{one_line(name)}'; there are {', '.join(names)}.{near} "
+                f"the plant has no state '{one_line(name)}'{alternatives(name, names)} "
                 "plant.state_at(pressure=...) gives the state with a pressure."
             )
     missing = [name for name in names if name not in state]

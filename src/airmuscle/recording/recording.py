@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..core import Array, Reference, check_field_types, conversion, one_line
-from ..core.errors import AirmuscleError, ColumnError, HintedText, ParameterError, listed, suggestion
+from ..core.errors import AirmuscleError, ColumnError, HintedText, ParameterError, alternatives, listed
 from .columns import ZERO_NOT_STATED, display_scale, quantity_of, split_unit
 from .notebook import Card, NotebookDisplay
 from .plot import plot_columns
@@ -101,7 +101,7 @@ class Recording(NotebookDisplay):
             remedy = f" Specify the resting length to convert the {moved} to a contraction."
         elif name == "contraction" and "position" in known:
             remedy = HintedText(" ", ZERO_NOT_STATED)
-        text = f"{self.origin}: no column '{name}'; the columns are {listed(known)}.{suggestion(name, known)}"
+        text = f"{self.origin}: no column '{name}'{alternatives(name, known, 'the columns are')}"
         raise ColumnError(HintedText(text, remedy))
 
     def __contains__(self, name: str) -> bool:

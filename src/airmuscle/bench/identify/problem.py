@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ...core import Array, Hint, IdentificationError, Leaf, ParameterError, as_slice, autodiff, suggestion, tree
+from ...core import Array, Hint, IdentificationError, Leaf, ParameterError, alternatives, as_slice, autodiff, tree
 from ...physics.muscle.characteristic import Characteristic, ContractionLaw, ForceLaw, PooledLengthLaw, PressureLaw
 from ...recording import Recording
 from ...recording.columns import QUANTITIES
@@ -251,8 +251,8 @@ def _check_known(law: Characteristic, leaves: Sequence[Leaf], fixed: Collection[
         if name not in known:
             fields = list(dict.fromkeys(leaf.path.partition("[")[0] for leaf in leaves))
             raise ParameterError(
-                f"{type(law).__name__} has no parameter '{name}' to be fixed; its parameters are {', '.join(fields)}."
-                f"{suggestion(name, known)}"
+                f"{type(law).__name__} has no parameter '{name}' to be fixed"
+                f"{alternatives(name, fields, 'its parameters are')}"
             )
 
 

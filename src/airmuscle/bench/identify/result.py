@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ...core import Array, ParameterError, contraction_text, quantity_text, suggestion
+from ...core import Array, ParameterError, alternatives, contraction_text, quantity_text
 from ...physics.muscle.characteristic import Characteristic, ValidityRange
 from ...recording import Recording
 from ...report.chapter import Chapter, NamedValue, Plot, Table
@@ -118,9 +118,7 @@ class Fit(Reported):
         for estimate in self.estimates:
             if estimate.name == name:
                 return estimate
-        raise ParameterError(
-            f"the fit has no parameter '{name}'; it has {', '.join(self.names)}.{suggestion(name, self.names)}"
-        )
+        raise ParameterError(f"the fit has no parameter '{name}'{alternatives(name, self.names, 'it has')}")
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -32,7 +32,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core import Array, ColumnError, FileError, quantity, suggestion
+from ...core import Array, ColumnError, FileError, alternatives, quantity
 from ..readers.file_kind import read_toml
 from .episode_formats import Arrays, find_episode_files, read_arrays
 from .episodes import Episode, Episodes, join, speed_of
@@ -115,9 +115,7 @@ def _check_keys(path: Path, prefix: str, table: Any, known: tuple[str, ...]) -> 
         raise FileError(f"{path}: {prefix.rstrip('.')} must be a table with the keys {', '.join(known)}.")
     for key in table:
         if key not in known:
-            raise FileError(
-                f"{path}: unknown key '{prefix}{key}'; there are {', '.join(known)}.{suggestion(key, known)}"
-            )
+            raise FileError(f"{path}: unknown key '{prefix}{key}'{alternatives(key, known)}")
 
 
 def _channels(path: Path, name: str, table: Any) -> Channels:
@@ -262,5 +260,5 @@ def _columns(name: str, arrays: Arrays, channels: Channels) -> Array:
 
 def _array(name: str, arrays: Arrays, column: str) -> Array:
     if column not in arrays:
-        raise ColumnError(f"{name}: no column '{column}'; there are {', '.join(arrays)}.{suggestion(column, arrays)}")
+        raise ColumnError(f"{name}: no column '{column}'{alternatives(column, arrays)}")
     return arrays[column]

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core import FileError, suggestion
+from ...core import FileError, alternatives
 from .channels import Channel, RawTable, merge_channels
 from .separate_process import import_lab_package, in_separate_process, run_reader
 from .time_base import Decimation, Downsampling, Reduction, check_reduced_lengths, read_reduced, with_reduction
@@ -67,8 +67,7 @@ def read_hdf5_tables_here(
             f"{path.name}: no dataset is a vector of numbers, a matrix with columns, or a table of records."
         )
     if group is not None and group not in contents:
-        names = ", ".join(contents)
-        raise FileError(f"{path.name}: no group '{group}'; the groups are {names}.{suggestion(group, contents)}")
+        raise FileError(f"{path.name}: no group '{group}'{alternatives(group, contents, 'the groups are')}")
     several, selected = len(contents) > 1, contents if group is None else {group: contents[group]}
     tables = []
     for name, each in selected.items():

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...core import ColumnError, FileError, abridged, suggestion
+from ...core import ColumnError, FileError, abridged, alternatives
 from .channels import Cells, Channel, RawTable, merge_channels
 from .raw_csv import parse_columns, read_csv_table, read_text
 from .text_format import NumberedLines, TextFormat, TextHeader, check_cell_sizes, has_content
@@ -44,9 +44,7 @@ def read_lvm_tables(path: Path, group: str | None, text_format: TextFormat) -> t
     places = zip(starts, ends[1:], [*starts[1:], len(lines)], strict=True)
     segments = {str(i): (lines[a : b + 1], lines[b + 1 : c]) for i, (a, b, c) in enumerate(places, 1)}
     if group is not None and group not in segments:
-        raise FileError(
-            f"{path.name}: no segment '{group}'; it has {', '.join(segments)}.{suggestion(group, segments)}"
-        )
+        raise FileError(f"{path.name}: no segment '{group}'{alternatives(group, segments, 'it has')}")
     file_tags = _tags(lines[: ends[0]], delimiter)
     decimal = next(iter(file_tags.get("Decimal_Separator", [])[1:]), None) or None
     form = dataclasses.replace(text_format, delimiter=delimiter, decimal=text_format.decimal or decimal)

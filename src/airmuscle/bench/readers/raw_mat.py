@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core import ColumnError, FileError, Hint, suggestion
+from ...core import ColumnError, FileError, Hint, alternatives
 from ...recording.columns import parse_heading
 from .channels import Channel, RawTable, merge_channels
 from .mat_contents import is_plain_hdf5, read_contents
@@ -51,10 +51,8 @@ def read_mat_tables_here(
     variables = {name: value for name, value in contents.variables.items() if name not in opaque} | tables
     groups = dict(_find_groups("", variables))
     if group is not None and group not in groups:
-        names = ", ".join(name or "(no struct)" for name in groups)
-        raise FileError(
-            f"{path.name}: no struct '{group}' with vectors; the structs are {names}.{suggestion(group, groups)}"
-        )
+        names = [name or "(no struct)" for name in groups]
+        raise FileError(f"{path.name}: no struct '{group}' with vectors{alternatives(group, names, 'the structs are')}")
     selected = groups if group is None else {group: groups[group]}
     if not selected:
         raise FileError(

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core import Array, FileError, listed, suggestion
+from ...core import Array, FileError, alternatives
 from .channels import Channel, RawTable, merge_channels
 from .separate_process import import_lab_package, in_separate_process, run_reader
 from .time_base import Decimation, Downsampling, read_reduced
@@ -33,9 +33,7 @@ def read_mdf_tables_here(
                 str(getattr(g.channel_group, "acq_name", "") or f"group {i}") for i, g in enumerate(file.groups, 1)
             ]
             if group is not None and group not in names:
-                raise FileError(
-                    f"{path.name}: no group '{group}'; the groups are {listed(names)}.{suggestion(group, names)}"
-                )
+                raise FileError(f"{path.name}: no group '{group}'{alternatives(group, names, 'the groups are')}")
             selected = [i for i, name in enumerate(names) if group in (None, name)]
             table = merge_channels(path.name, list(_channels(file, selected, downsampling)), {})
             notes = [note for i in selected for note in _notes(file.groups[i], names[i], downsampling)]
@@ -114,9 +112,7 @@ def _select_groups(path: Path, groups: dict[str, Any], name: str | None) -> list
     if name is None:
         return list(groups.values())
     if name not in groups:
-        raise FileError(
-            f"{path.name}: no group '{name}'; the groups are {', '.join(groups)}.{suggestion(name, groups)}"
-        )
+        raise FileError(f"{path.name}: no group '{name}'{alternatives(name, groups, 'the groups are')}")
     return [groups[name]]
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core import ColumnError, FileError, listed, suggestion
+from ...core import ColumnError, FileError, alternatives, listed
 from . import header
 from .channels import Cells, RawTable
 from .separate_process import import_lab_package, in_separate_process, run_reader
@@ -34,9 +34,7 @@ def read_workbook_tables_here(
         with calamine.CalamineWorkbook.from_path(str(path)) as book:
             names = [each.name for each in book.sheets_metadata if each.typ == calamine.SheetTypeEnum.WorkSheet]
             if sheet is not None and sheet not in names:
-                raise FileError(
-                    f"{path.name}: no sheet '{sheet}'; the sheets are {listed(names)}.{suggestion(sheet, names)}"
-                )
+                raise FileError(f"{path.name}: no sheet '{sheet}'{alternatives(sheet, names, 'the sheets are')}")
             return {name: _nonempty_rows(book.get_sheet_by_name(name)) for name in names if sheet in (None, name)}
 
     found = run_reader(path, "a workbook", read)

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
-from ...core import Array, ParameterError, suggestion
+from ...core import Array, ParameterError, alternatives
 from ...physics.analysis.linear_model import LinearModel
 from ...physics.analysis.sampled_model import held
 
@@ -16,9 +16,7 @@ def check_known(owner: str, argument: str, names: Iterable[str], known: Sequence
     """Raise ParameterError, with the nearest name, for a name that is not known."""
     for name in names:
         if name not in known:
-            raise ParameterError(
-                f"{owner}: {argument} names '{name}'; there are {', '.join(known)}.{suggestion(name, known)}"
-            )
+            raise ParameterError(f"{owner}: {argument} names '{name}'{alternatives(name, known)}")
 
 
 def check_numbers(

@@ -4,7 +4,7 @@ import itertools
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from ...core import Parameter, ParameterError, Reference, Value, leaves, model, ops, parameter, unflatten
+from ...core import Parameter, ParameterError, Reference, Value, alternatives, leaves, model, ops, parameter, unflatten
 from ...core.system import select_prefix, united, with_prefix
 from ...engine.loop import ControlLaw, EnclosingLaw, Measurement, Memory, Sampled, parameter_units
 from .pid import ASTROM_HAGGLUND1995
@@ -202,8 +202,8 @@ class GainSchedule(EnclosingLaw):
         known = {leaf.path: leaf for leaf in leaves(self.law)}
         if self.scheduled not in known:
             raise ParameterError(
-                f"GainSchedule: {type(self.law).__name__} has no parameter '{self.scheduled}'; there are "
-                f"{', '.join(known)}."
+                f"GainSchedule: {type(self.law).__name__} has no parameter '{self.scheduled}'"
+                f"{alternatives(self.scheduled, known)}"
             )
         low, high = known[self.scheduled].declared.bounds
         for value in self.scheduled_values:

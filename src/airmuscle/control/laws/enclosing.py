@@ -2,7 +2,7 @@
 
 from typing import ClassVar
 
-from ...core import ParameterError, Reference, Value, model, ops, parameter, select_prefix, suggestion, with_prefix
+from ...core import ParameterError, Reference, Value, alternatives, model, ops, parameter, select_prefix, with_prefix
 from ...engine.loop import LECUYER1999, STATE, ControlLaw, EnclosingLaw, Measurement, Memory, Sampled, drawn, seeded
 from .pid import ASTROM_HAGGLUND1995
 from .state_feedback import FRANKLIN1998
@@ -244,8 +244,8 @@ class WithStuckValve(EnclosingLaw):
     def check(self) -> None:
         if self.stuck_input not in self.law.inputs:
             raise ParameterError(
-                f"WithStuckValve: the law does not command '{self.stuck_input}'; it commands "
-                f"{', '.join(self.law.inputs)}.{suggestion(self.stuck_input, self.law.inputs)}"
+                f"WithStuckValve: the law does not command '{self.stuck_input}'"
+                f"{alternatives(self.stuck_input, self.law.inputs, 'it commands')}"
             )
 
     @property

@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ...core import Array, Reference, Value, model, ops, parameter, select_prefix, with_prefix
-from ...core.errors import ParameterError, suggestion
+from ...core.errors import ParameterError, alternatives
 from ...engine.loop import ControlLaw, EnclosingLaw, Measurement, Memory, Sampled
 from ...physics.muscle.friction.prandtl_ishlinskii import KUHNEN2003
 
@@ -175,8 +175,8 @@ class HysteresisCompensation(EnclosingLaw):
     def check(self) -> None:
         if self.commanded not in self.law.inputs:
             raise ParameterError(
-                f"HysteresisCompensation: the law does not command '{self.commanded}'; it commands "
-                f"{', '.join(self.law.inputs)}.{suggestion(self.commanded, self.law.inputs)}"
+                f"HysteresisCompensation: the law does not command '{self.commanded}'"
+                f"{alternatives(self.commanded, self.law.inputs, 'it commands')}"
             )
 
     @property

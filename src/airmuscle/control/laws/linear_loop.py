@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ...core import Array, ParameterError, System, suggestion
+from ...core import Array, ParameterError, System, alternatives
 from ...engine.loop import ControlLaw, ControlLoop, ControlLoopState, designed_loop
 from ...physics.analysis import LinearModel, linearise
 from ...physics.analysis.sampled_model import SampledModel, bode_figure, checked_frequencies, nyquist_figure, sampled
@@ -158,8 +158,7 @@ class LinearLoop:
         name = known[0] if column is None else column
         if name not in known:
             raise ParameterError(
-                f"open_loop: the law does not measure '{name}'; it measures {', '.join(known)}."
-                f"{suggestion(name, known)}"
+                f"open_loop: the law does not measure '{name}'{alternatives(name, known, 'it measures')}"
             )
         return self._model(known.index(name))
 
@@ -210,10 +209,7 @@ class LinearLoop:
         """`time` [s] and the deviations (K,) of all measured columns at the samples after a step of a set point."""
         known = self.law.setpoints
         if setpoint not in known:
-            raise ParameterError(
-                f"step_response: the law has no set point '{setpoint}'; there are {', '.join(known)}."
-                f"{suggestion(setpoint, known)}"
-            )
+            raise ParameterError(f"step_response: the law has no set point '{setpoint}'{alternatives(setpoint, known)}")
         time = self.sample_time * np.arange(max(round(duration / self.sample_time), 1) + 1)
         steps = np.zeros((time.size, len(known)))
         steps[:, known.index(setpoint)] = size

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from ...control.laws.angle_and_stiffness import AntagonisticInverse
 from ...control.laws.enclosing import WithStuckValve
 from ...control.laws.static_inverse import static_force
-from ...core import Array, ParameterError, Reference, suggestion
+from ...core import Array, ParameterError, Reference, alternatives
 from ...engine.loop import ControlLaw, Controller, ControlLoop, Driver, SampledSignal
 from ...physics.plant.plant import Plant
 from ...physics.pneumatics import REFERENCE_DENSITY, FillDischarge, WithTubes, absolute_pressure
@@ -49,9 +49,7 @@ class TaskSignals(NamedTuple):
         points = {}
         for name in names:
             if name not in known:
-                raise ParameterError(
-                    f"a task has no set point '{name}'; there are {', '.join(known)}.{suggestion(name, known)}"
-                )
+                raise ParameterError(f"a task has no set point '{name}'{alternatives(name, known)}")
             points[name] = tuple(zip(self.time.tolist(), known[name].tolist(), strict=True))
         return SampledSignal(points)
 

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ...core import Array, ParameterError, check_field_types, suggestion
+from ...core import Array, ParameterError, alternatives, check_field_types
 
 
 @dataclasses.dataclass(frozen=True)
@@ -214,5 +214,5 @@ def find_tasks(names: tuple[str, ...]) -> tuple[ControlTask, ...]:
     known = {task.name: task for task in STANDARD_TASKS}
     for name in names:
         if name not in known:
-            raise ParameterError(f"there is no task '{name}'; there are {', '.join(known)}.{suggestion(name, known)}")
+            raise ParameterError(f"there is no task '{name}'{alternatives(name, known)}")
     return tuple(known[name] for name in dict.fromkeys(names)) or STANDARD_TASKS

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core import ABSOLUTE, Array, ParameterError, abridged, parameters, quantity, suggestion
+from ...core import ABSOLUTE, Array, ParameterError, abridged, alternatives, parameters, quantity
 from ...core.absolute_pressure import AbsolutePressure, ambient_pressure
 from ...core.tree import absolute_pressures, flatten, leaves, with_parameters
 from ...engine.loop.control_loop import ControlLoop
@@ -67,8 +67,9 @@ class ScenarioTemplate:
         """The parameter with a path. Raises ParameterError with the closest path."""
         known = self.parameters()
         if path not in known:
-            near = suggestion(path, known) or f" The parameters are {', '.join(known)}."
-            raise ParameterError(f"{where}: the scenario has no parameter '{path}'.{near}")
+            raise ParameterError(
+                f"{where}: the scenario has no parameter '{path}'{alternatives(path, known, 'its parameters are')}"
+            )
         return known[path]
 
     def initial_states(self, varied: Sequence[ScenarioParameter], values: Array) -> list[dict[str, float] | None]:

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ...core import Array, ColumnError, ShortRepr, suggestion
+from ...core import Array, ColumnError, ShortRepr, alternatives
 from ...report.chapter import BY_ROW, Table, TableColumn
 from .design import Saltelli
 from .study import Study
@@ -115,9 +115,7 @@ class StudyResult(ShortRepr):
         names = list(self.study.scalars)
         if name not in names:
             known = [*names, *self.time_series]
-            raise ColumnError(
-                f"study: no metric '{name}'; the metrics are {', '.join(known)}.{suggestion(name, known)}"
-            )
+            raise ColumnError(f"study: no metric '{name}'{alternatives(name, known, 'the metrics are')}")
         return self.scalars[:, names.index(name)]
 
     @property

@@ -25,7 +25,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ...core import ParameterError, ShortRepr, abridged, ambient_pressure, suggestion
+from ...core import ParameterError, ShortRepr, abridged, alternatives, ambient_pressure, suggestion
 from ...core.tree import fingerprint
 from ...files.library import Location, TableReader, check_keys, located_errors, read_text, read_toml
 from ...files.scenario.scenario import Scenario, build_scenario, load_scenario, run_column_units
@@ -226,8 +226,9 @@ def _read_metrics(tables: Mapping[str, Any], scenario: Scenario, location: Locat
         inner = location.inside(name)
         column = table.get("column") if isinstance(table, Mapping) else None
         if isinstance(column, str) and column not in known:
-            near = suggestion(column, known)
-            raise ParameterError(f"{inner}: a run has no column '{column}'; its columns are {', '.join(known)}.{near}")
+            raise ParameterError(
+                f"{inner}: a run has no column '{column}'{alternatives(column, known, 'its columns are')}"
+            )
         metric = TableReader(classes=METRICS, known=known.get(str(column), "1") or "1").build(table, inner)
         with located_errors(inner):
             metric.check_range(scenario.problem.start_time, scenario.problem.duration)

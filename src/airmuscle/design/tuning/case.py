@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...core import Array, Leaf, ShortRepr, abridged, leaves, structure, with_parameters
-from ...core.errors import ParameterError, PhysicsError, suggestion
+from ...core.errors import ParameterError, PhysicsError, alternatives
 from ...engine.loop import Controller, ControlLoop
 from ...physics.equilibrium import find_equilibrium
 from ...physics.plant.plant import Plant
@@ -58,8 +58,7 @@ def gain_ranges(controller: Controller, bounds: Any) -> tuple[GainRange, ...]:
     for path in bounds:
         if path not in known:
             raise ParameterError(
-                f"bounds: {type(controller).__name__} has no parameter '{path}'; there are {', '.join(known)}."
-                f"{suggestion(str(path), known)}"
+                f"bounds: {type(controller).__name__} has no parameter '{path}'{alternatives(str(path), known)}"
             )
     return tuple(_range(known[path], pair) for path, pair in bounds.items())
 

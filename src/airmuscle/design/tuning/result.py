@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 import numpy.typing as npt
 
-from ...core import Array, ColumnError, ParameterError, Reference, ShortRepr, check_field_types, cite, suggestion
+from ...core import Array, ColumnError, ParameterError, Reference, ShortRepr, alternatives, check_field_types, cite
 from ...engine.loop.control_loop import ControlLoop
 from .case import GainRange, LoopCase, loop_with_gains
 from .tracking import TrackingIndex
@@ -111,9 +111,7 @@ class TuningHistory(ShortRepr):
         """The mean (E,) of a metric over the cases: `index`, `air` or `travel`."""
         names = ("index", "air", "travel")
         if metric not in names:
-            raise ColumnError(
-                f"history: no metric '{metric}'; there are {', '.join(names)}.{suggestion(metric, names)}"
-            )
+            raise ColumnError(f"history: no metric '{metric}'{alternatives(metric, names)}")
         return np.asarray(getattr(self.metrics, metric).mean(axis=1))
 
     def pareto(self, metric: str) -> npt.NDArray[np.intp]:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ...core import Leaf, ShortRepr, conversion, leaves, quantity
-from ...core.errors import AirmuscleWarning, FileError, ParameterError, suggestion
+from ...core.errors import AirmuscleWarning, FileError, ParameterError, alternatives
 from ...engine.loop import ControlLoop, parameter_units
 from ...files.library import Location, ParameterUncertainty, load_law, located_errors, write_text
 from ...files.library.files import is_path, list_plants, read_toml
@@ -111,8 +111,8 @@ class ScenarioLoop(ShortRepr):
         path = path.strip()
         if path not in known:
             raise ParameterError(
-                f"bounds '{text}': {type(self.loop.controller).__name__} has no parameter '{path}'; there are "
-                f"{', '.join(known)}.{suggestion(path, known)}"
+                f"bounds '{text}': {type(self.loop.controller).__name__} has no parameter '{path}'"
+                f"{alternatives(path, known)}"
             )
         unit = self.unit(known[path])
         first, second = (_read_bound(value, unit, self.ambient, f"bounds '{text}'") for value in (low, high))

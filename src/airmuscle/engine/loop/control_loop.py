@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core import ParameterError, ShortRepr, System, Value, abridged, describe_model, quantity, suggestion
+from ...core import ParameterError, ShortRepr, System, Value, abridged, alternatives, describe_model, quantity
 from ...core.tree import Structure, structure, with_ambient
 from ...recording.recording import Recording
 from .control_law import ControlLaw, EnclosingLaw, Memory, Sampled, rebuilt
@@ -182,8 +182,8 @@ def check_present(controller: Controller, columns: Sequence[str], inputs: Sequen
     for name in controller.measured_columns:
         if name not in columns:
             raise ParameterError(
-                f"{type(controller).__name__} measures '{name}', which the plant does not have; there are "
-                f"{', '.join(columns)}.{suggestion(name, columns)}"
+                f"{type(controller).__name__} measures '{name}', which the plant does not have"
+                f"{alternatives(name, columns)}"
             )
     check_input_names(controller.inputs, inputs)
 

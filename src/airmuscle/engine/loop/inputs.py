@@ -10,7 +10,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ...core import FEW, Array, ParameterError, ShortRepr, abridged, all_finite, as_float, one_line, suggestion
+from ...core import FEW, Array, ParameterError, ShortRepr, abridged, all_finite, alternatives, as_float, one_line
 
 FEW_SEGMENTS = 16
 """Segments up to which they are gone through one by one, which is faster (measured)."""
@@ -170,8 +170,7 @@ def check_input_names(given: Iterable[str], inputs: Sequence[str], prefix: str =
     """Raise ParameterError, with the nearest name, for a name that is no input of the plant."""
     for name in given:
         if name not in inputs:
-            known = ", ".join(inputs) or "none"
-            raise ParameterError(f"{prefix} '{name}'; there are {known}.{suggestion(name, inputs)}")
+            raise ParameterError(f"{prefix} '{name}'{alternatives(name, inputs)}")
 
 
 def check_mapping(kind: str, given: object, example: str = "((5, 1), (15, 0))") -> None:

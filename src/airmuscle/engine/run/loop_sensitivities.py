@@ -8,7 +8,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from ...core import Array, ParameterError, System, Value, autodiff, model, ops, suggestion, tree
+from ...core import Array, ParameterError, System, Value, alternatives, autodiff, model, ops, suggestion, tree
 from ...recording.recording import Recording
 from ..loop import SETPOINT, ControlLaw, ControlLoop, Measurement, Memory, Sampled
 from .compiled_law import TracedSample, trace_sample
@@ -137,10 +137,7 @@ class LawWithSensitivities(ControlLaw):
         known = [leaf.path for leaf in tree.leaves(self.law)]
         for path in (path for group in self.columns for path in group):
             if path not in known:
-                raise ParameterError(
-                    f"{type(self.law).__name__} has no parameter '{path}'; there are {', '.join(known)}."
-                    f"{suggestion(path, known)}"
-                )
+                raise ParameterError(f"{type(self.law).__name__} has no parameter '{path}'{alternatives(path, known)}")
 
     def _with_derivatives(self, names: tuple[str, ...]) -> tuple[str, ...]:
         return (*names, *(sensitivity(name, k) for name in names for k in range(len(self.columns))))

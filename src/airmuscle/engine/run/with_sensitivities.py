@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
-from ...core import ParameterError, Value, autodiff, model, ops, parameter, suggestion, tree
+from ...core import ParameterError, Value, alternatives, autodiff, model, ops, parameter, tree
 from ...core.system import Input, SensitivitySystem, StateVariable, System
 
 TOLERANCE_FACTOR = 10.0
@@ -47,21 +47,18 @@ class WithSensitivities(SensitivitySystem):
         for path in (path for group in self.columns for path in group):
             if path not in known:
                 raise ParameterError(
-                    f"{type(self.inner).__name__} has no parameter '{path}'; there are {', '.join(known)}."
-                    f"{suggestion(path, known)}"
+                    f"{type(self.inner).__name__} has no parameter '{path}'{alternatives(path, known)}"
                 )
         for name in self.dependent_inputs:
             if name not in self.inner.inputs:
                 raise ParameterError(
-                    f"{type(self.inner).__name__} has no input '{name}'; there are {', '.join(self.inner.inputs)}."
-                    f"{suggestion(name, self.inner.inputs)}"
+                    f"{type(self.inner).__name__} has no input '{name}'{alternatives(name, self.inner.inputs)}"
                 )
         values = _Symbols(self.inner).call("outputs") if self.observed else {}
         for name in self.observed:
             if name not in values:
                 raise ParameterError(
-                    f"{type(self.inner).__name__} has no state or output '{name}'; there are {', '.join(values)}."
-                    f"{suggestion(name, values)}"
+                    f"{type(self.inner).__name__} has no state or output '{name}'{alternatives(name, values)}"
                 )
 
     @property

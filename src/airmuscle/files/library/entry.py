@@ -18,7 +18,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any, ClassVar
 
 from ...core import ABSOLUTE, Reference, check_field_types, model, one_line, parameter
-from ...core.errors import AirmuscleWarning, ParameterError, UnknownNameError, suggestion
+from ...core.errors import AirmuscleWarning, ParameterError, UnknownNameError, alternatives, suggestion
 from ...physics.muscle import CreepElements, Damper, Muscle, Ratings, SeriesElement, Spring, Stop, Wall
 from ...physics.muscle.characteristic import Characteristic, ForceLaw, ValidityRange
 from ...physics.muscle.friction.base import Friction
@@ -99,8 +99,7 @@ def _conditions_of(quantity: Any) -> tuple[str, tuple[str, ...]]:
     """The unit of a checked quantity, and the quantities on which it depends. Raises ParameterError."""
     if quantity not in tuple(CONDITIONS):
         raise ParameterError(
-            f"quantity '{one_line(quantity)}' cannot be checked; there are {', '.join(CONDITIONS)}."
-            f"{suggestion(str(quantity), CONDITIONS)}"
+            f"quantity '{one_line(quantity)}' cannot be checked{alternatives(str(quantity), CONDITIONS)}"
         )
     return CONDITIONS[quantity]
 

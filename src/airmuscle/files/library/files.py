@@ -8,7 +8,17 @@ from pathlib import Path
 from typing import Any
 
 from ...bench.readers.file_kind import read_toml as read_toml_file
-from ...core import AirmuscleError, FileError, ParameterError, UnknownNameError, abridged, one_line, suggestion, units
+from ...core import (
+    AirmuscleError,
+    FileError,
+    ParameterError,
+    UnknownNameError,
+    abridged,
+    alternatives,
+    one_line,
+    suggestion,
+    units,
+)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -53,9 +63,7 @@ def check_keys(table: Mapping[str, Any], known: Sequence[str], location: Locatio
     """Raise ParameterError for an unknown key, with the most similar known key."""
     for key in table:
         if key not in known:
-            raise ParameterError(
-                f"{location}: unknown key '{one_line(key)}'; there are {', '.join(known)}.{suggestion(key, known)}"
-            )
+            raise ParameterError(f"{location}: unknown key '{one_line(key)}'{alternatives(key, known)}")
 
 
 def read_number(value: Any, unit: str, where: object, about: str = "") -> float:

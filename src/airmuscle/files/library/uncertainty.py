@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core import Array, ParameterError, check_field_types, parameter, suggestion
+from ...core import Array, ParameterError, alternatives, check_field_types, parameter
 from ...recording.columns import QUANTITIES
 
 PREDICTED = ("force", "contraction", "pressure")
@@ -45,8 +45,7 @@ class StatedBand:
         check_field_types(self)
         if self.quantity not in PREDICTED:
             raise ParameterError(
-                f"StatedBand: quantity is '{self.quantity}'; allowed are {', '.join(PREDICTED)}."
-                f"{suggestion(self.quantity, PREDICTED)}"
+                f"StatedBand: quantity is '{self.quantity}'{alternatives(self.quantity, PREDICTED, 'allowed are')}"
             )
         for name in WIDTHS:
             value = getattr(self, name)

@@ -29,7 +29,7 @@ from types import MappingProxyType
 from typing import Any
 
 from ...bench.identify.prediction import PlantUncertainty
-from ...core import FileError, ParameterError, ShortRepr, ambient_pressure, suggestion
+from ...core import FileError, ParameterError, ShortRepr, alternatives, ambient_pressure
 from ...engine.loop import ControlLoop, InputSignal
 from ...engine.run import Integrator, Problem, solve
 from ...physics.plant.plant import Plant
@@ -216,6 +216,4 @@ def check_columns(columns: Sequence[str], known: Sequence[str], location: Locati
     """Raise ParameterError for a column that a run does not have."""
     for name in columns:
         if name not in known:
-            raise ParameterError(
-                f"{location}: the run has no column '{name}'; there are {', '.join(known)}.{suggestion(name, known)}"
-            )
+            raise ParameterError(f"{location}: the run has no column '{name}'{alternatives(name, known)}")

@@ -10,7 +10,7 @@ from typing import Any
 
 from ...bench.identify.dynamic import InitialValue, StartTime
 from ...bench.identify.dynamic.experiment import ParameterPaths, RecordUnknown
-from ...core import ParameterError, abridged, suggestion, tree
+from ...core import ParameterError, abridged, alternatives, tree
 from ...engine.run import Integrator
 from ...physics.plant.plant import Plant
 from ...recording.columns import quantity_of
@@ -128,8 +128,9 @@ def read_paths(value: Any, plant: Plant, where: Location) -> tuple[ParameterPath
             )
         for path in paths:
             if path not in known:
-                near = suggestion(path, known) or f" The parameters are {', '.join(known)}."
-                raise ParameterError(f"{where}: the plant has no parameter '{path}'.{near}")
+                raise ParameterError(
+                    f"{where}: the plant has no parameter '{path}'{alternatives(path, known, 'its parameters are')}"
+                )
     return tuple(tuple(item) if isinstance(item, list) else item for item in value)
 
 

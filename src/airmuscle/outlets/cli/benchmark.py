@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from ...core import InputError, SimulationError, suggestion
+from ...core import InputError, SimulationError, alternatives
 from ...design.control_benchmark import Contender, LearningCurve, learn, scenario_contender, standard_contenders
 from ...design.control_benchmark.benchmark import COMMISSIONING_RUNS, BenchmarkResult, benchmark_controllers
 from ...design.control_benchmark.chapter import benchmark_chapter
@@ -93,7 +93,7 @@ def _contenders(joint: BenchmarkJoint, names: Sequence[str]) -> tuple[Contender,
         if name not in known and is_path(name):
             known[name] = scenario_contender(joint, name)
         if name not in known:
-            raise InputError(f"there is no controller '{name}'; there are {', '.join(known)}.{suggestion(name, known)}")
+            raise InputError(f"there is no controller '{name}'{alternatives(name, known)}")
     return tuple(known[name] for name in dict.fromkeys(names)) or tuple(known.values())
 
 

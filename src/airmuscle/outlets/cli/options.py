@@ -11,7 +11,7 @@ from typing import Annotated, Any, TypeVar, get_type_hints
 
 import typer
 
-from ...core import suggestion
+from ...core import alternatives
 from ...files.library.files import list_data, list_laws, list_library, list_plants
 from ..requests.declaration import Option, RequestError, build, options_of
 from .terminal import echo
@@ -58,9 +58,7 @@ def print_completion_script(shell: str | None) -> None:
     if shell is None:
         return
     if shell not in SHELLS:
-        raise typer.BadParameter(
-            f"'{shell}' is not supported; allowed are {', '.join(SHELLS)}.{suggestion(shell, SHELLS)}"
-        )
+        raise typer.BadParameter(f"'{shell}' is not supported{alternatives(shell, SHELLS, 'allowed are')}")
     from typer._completion_shared import get_completion_script
 
     echo(get_completion_script(prog_name=PROGRAM, complete_var=REQUEST, shell=shell))

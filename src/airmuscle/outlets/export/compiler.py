@@ -11,7 +11,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from ...core import FileError, ParameterError, suggestion, temporary_folder
+from ...core import FileError, ParameterError, alternatives, temporary_folder
 from .identifiers import template
 
 COMPILERS = ("gcc", "clang", "cc")
@@ -212,9 +212,7 @@ PLATFORMS = {
 def find_platform(name: str) -> Platform:
     """The platform of a name. Raises ParameterError, with the nearest name."""
     if name not in PLATFORMS:
-        raise ParameterError(
-            f"there is no platform '{name}'; there are {', '.join(PLATFORMS)}.{suggestion(name, PLATFORMS)}"
-        )
+        raise ParameterError(f"there is no platform '{name}'{alternatives(name, PLATFORMS)}")
     return PLATFORMS[name]
 
 

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core import Array, Leaf, ParameterError, leaves, printable, suggestion
+from ...core import Array, Leaf, ParameterError, alternatives, leaves, printable
 from ...engine.compile.functions import ArraySizes, Extension, TracedSystem, implicit_module, rates_module
 from ...engine.compile.ir.emission import TargetLanguage
 from ...engine.compile.program import CompiledSystem
@@ -145,11 +145,10 @@ def find_leaf(model: Any, known: Sequence[Leaf], path: str) -> int:
     if _is_structure(model, path):
         raise ParameterError(
             f"'{path}' is fixed when a program is printed, because it determines the equations and is not a number in "
-            f"them; tunable parameters are {', '.join(paths)}. Change it in the model, and export again."
+            f"them{alternatives('', paths, 'tunable parameters are')} Change it in the model, and export again."
         )
     raise ParameterError(
-        f"{type(model).__name__} has no parameter '{path}'; tunable parameters are {', '.join(paths)}."
-        f"{suggestion(path, paths)}"
+        f"{type(model).__name__} has no parameter '{path}'{alternatives(path, paths, 'tunable parameters are')}"
     )
 
 

@@ -1,10 +1,10 @@
 """Request of a variant of a library entry: another size, and other values of its parameters."""
 
 import dataclasses
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
-from ...core import ParameterError, leaves, quantity, suggestion, with_parameters
+from ...core import ParameterError, alternatives, leaves, quantity, with_parameters
 from ...files.library import PARTS, Entry, load_law, scale_entry
 from .declaration import option, request
 from .reading import read_pair
@@ -46,8 +46,7 @@ def with_values(entry: Any, changes: Mapping[str, float | str]) -> Any:
     for path in changes:
         if path not in known:
             raise ParameterError(
-                f"{entry.name} has no parameter '{path}'; allowed names: {', '.join(_shown(known))}."
-                f"{suggestion(path, known)}"
+                f"{entry.name} has no parameter '{path}'{alternatives(path, known, 'its parameters are')}"
             )
     values = {path: quantity(value, known[path].declared.unit, where=path) for path, value in changes.items()}
     changed = {
@@ -69,11 +68,3 @@ def with_values(entry: Any, changes: Mapping[str, float | str]) -> Any:
         entry, **changed, title=f"{entry.title}, parameters changed", provenance="chosen", uncertainty=None, checks=(),
         error_band=None, note=f"Changed (SI): {stated}. {entry.note}".strip(),
     )  # fmt: skip
-
-
-def _shown(paths: Iterable[str]) -> list[str]:
-    """The paths, of a long list such as `coefficients[0]` to `coefficients[20]` the first and the last one."""
-    stems: dict[str, list[str]] = {}
-    for path in paths:
-        stems.setdefault(path.partition("[")[0], []).append(path)
-    return [group[0] if len(group) == 1 else f"{group[0]} to {group[-1]}" for group in stems.values()]

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ...core import Array, ParameterError, System, suggestion
+from ...core import Array, ParameterError, System, alternatives
 from ...core.system import check_system, state_vector
 from ...engine.compile.function import derivatives
 from ...engine.compile.program import CompiledSystem, compile_system
@@ -236,5 +236,5 @@ def _places(kind: str, wanted: Sequence[str] | None, known: tuple[str, ...]) -> 
         return list(range(len(known)))
     for name in wanted:
         if name not in known:
-            raise ParameterError(f"no {kind} '{name}'; there are {', '.join(known)}.{suggestion(name, known)}")
+            raise ParameterError(f"no {kind} '{name}'{alternatives(name, known)}")
     return [known.index(name) for name in wanted]

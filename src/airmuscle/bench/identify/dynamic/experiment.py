@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ....core import Hint, ParameterError, ShortRepr, check_field_types, suggestion, tree
+from ....core import Hint, ParameterError, ShortRepr, alternatives, check_field_types, tree
 from ....engine.compile import System
 from ....engine.loop.inputs import InputSignal, Schedule, check_input_signal
 from ....physics.pneumatics import Ambient
@@ -170,10 +170,8 @@ def _plant_unknown(
     leaves = {leaf.path: leaf for leaf in tree.leaves(plant)}
     for path in paths:
         if path not in leaves:
-            known = [p for p in leaves if "[" not in p]
             raise ParameterError(
-                f"{type(plant).__name__} has no parameter '{path}'; its parameters are {', '.join(known)}."
-                f"{suggestion(path, leaves)}"
+                f"{type(plant).__name__} has no parameter '{path}'{alternatives(path, leaves, 'its parameters are')}"
             )
     leaf = leaves[paths[0]]
     low, high = bounds.get(paths[0], leaf.declared.bounds)
@@ -194,8 +192,8 @@ def _record_unknown(experiment: Experiment, target: StartTime | InitialValue, re
         known = experiment.initial_conditions.known
         if target.name not in known:
             raise ParameterError(
-                f"the initial conditions of record {record + 1} have no known value '{target.name}'; known are "
-                f"{', '.join(known)}."
+                f"the initial conditions of record {record + 1} have no known value '{target.name}'"
+                f"{alternatives(target.name, known, 'known are')}"
             )
         value, symbol = known[target.name], f"{target.name}_0"
         unit = column_heading(target.name).partition("[")[2].rstrip("]") or "SI"

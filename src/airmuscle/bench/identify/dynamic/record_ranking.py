@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ....core import AirmuscleError, Array, IdentificationError, ParameterError, suggestion, tree
+from ....core import AirmuscleError, Array, IdentificationError, ParameterError, alternatives, tree
 from ....report.chapter import Chapter, Table, TableColumn
 from ...reported import Reported
 from .candidate_records import CandidateRecord, candidate_records
@@ -240,7 +240,7 @@ def _check_pair(pair: tuple[str, str], names: Sequence[str], fit: DynamicFit) ->
         if name not in names:
             bound = any(e.name == name and e.on_bound for e in fit.estimates)
             reason = "is on a bound" if bound else "is no common unknown of the fit"
-            raise ParameterError(f"'{name}' {reason}; allowed are {', '.join(names)}.{suggestion(name, names)}")
+            raise ParameterError(f"'{name}' {reason}{alternatives(name, names, 'allowed are')}")
     if pair[0] == pair[1]:
         raise ParameterError(f"'{pair[0]}' is named twice; a pair has two different parameters.")
     return pair

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ....core import Array, IdentificationError, ParameterError, suggestion, tree
+from ....core import Array, IdentificationError, ParameterError, alternatives, tree
 from ....core.plotting import BLACK, RED, given_axes, legend_outside, new_figure
 from ....engine.compile import System
 from ....recording import Recording
@@ -72,7 +72,7 @@ class DynamicFit(Reported):
             if estimate.name == name:
                 return estimate
         names = [e.name for e in self.estimates]
-        raise ParameterError(f"the fit has no unknown '{name}'; it has {', '.join(names)}.{suggestion(name, names)}")
+        raise ParameterError(f"the fit has no unknown '{name}'{alternatives(name, names, 'it has')}")
 
     @property
     def values(self) -> Array:

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from ....core import Array, ParameterError, Status, System, as_float, one_line, suggestion
+from ....core import Array, ParameterError, Status, System, alternatives, as_float, one_line
 from ....core.system import check_system
 from ...compile.program import CompiledSystem, compile_system
 from ...loop import ControlLoop, InputSignal, PiecewiseLinear
@@ -202,7 +202,7 @@ def _job(
 def _kept(keep: Sequence[str], names: Sequence[str]) -> tuple[str, ...]:
     for name in [keep] if isinstance(keep, str) else keep:
         if name not in names:
-            raise ParameterError(f"keep: no column '{name}'; there are {', '.join(names)}.{suggestion(name, names)}")
+            raise ParameterError(f"keep: no column '{name}'{alternatives(name, names)}")
     return (keep,) if isinstance(keep, str) else tuple(dict.fromkeys(keep))
 
 

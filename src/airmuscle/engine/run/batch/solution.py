@@ -13,7 +13,18 @@ from urllib.parse import quote
 import numpy as np
 import numpy.typing as npt
 
-from ....core import Array, ColumnError, Columns, FileError, ParameterError, Reference, Status, System, cite, suggestion
+from ....core import (
+    Array,
+    ColumnError,
+    Columns,
+    FileError,
+    ParameterError,
+    Reference,
+    Status,
+    System,
+    alternatives,
+    cite,
+)
 from ....recording import Recording
 from ..integrators import Integrator
 from .variations import Variations
@@ -49,8 +60,8 @@ class BatchSolution:
         if name == "time" and name not in self.columns:
             return self.time
         if name not in self.columns:
-            known = ", ".join(self.columns) or "none; name them in keep"
-            raise ColumnError(f"batch: no column '{name}'; kept are {known}.{suggestion(name, self.columns)}")
+            advice = "" if self.columns else " Name the columns in keep."
+            raise ColumnError(f"batch: no column '{name}'{alternatives(name, self.columns, 'kept are')}{advice}")
         return self.columns[name]
 
     @property

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ....core import AirmuscleError, Array, ParameterError, PhysicsError, System, one_line, suggestion, tree
+from ....core import AirmuscleError, Array, ParameterError, PhysicsError, System, alternatives, one_line, tree
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -143,10 +143,8 @@ def variations_of(system: Any, given: Mapping[str, npt.ArrayLike], count: int | 
     columns = []
     for path, values in given.items():
         if path not in leaves:
-            near = suggestion(str(path), leaves)
             raise ParameterError(
-                f"variations: {type(system).__name__} has no parameter '{path}'.{near} "
-                "Its paths are those of airmuscle.core.tree.leaves(plant)."
+                f"variations: {type(system).__name__} has no parameter '{path}'{alternatives(path, leaves)}"
             )
         columns.append(_column(leaves[path][1], values))
     follow = tree.absolute_pressures(system, dict(zip(given, columns, strict=True)))
@@ -212,9 +210,7 @@ def given_states(system: System, given: Mapping[str, npt.ArrayLike], count: int)
     names = [s.name for s in system.states]
     for name in given:
         if name not in names:
-            raise ParameterError(
-                f"the plant has no state '{name}'; there are {', '.join(names)}.{suggestion(name, names)}"
-            )
+            raise ParameterError(f"the plant has no state '{name}'{alternatives(name, names)}")
     missing = [name for name in names if name not in given]
     if missing:
         raise ParameterError(f"initial_states lack {', '.join(missing)}; give a number for all, or a column (N,).")
