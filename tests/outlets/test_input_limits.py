@@ -119,6 +119,15 @@ def test_a_message_quotes_200_characters_of_a_long_path_with_spaces():
     assert len(str(raised.value)) < 900
 
 
+@pytest.mark.parametrize("name", ["x", "x ", "a b"])
+def test_what_stands_between_two_quotations_is_not_cut(name: str):
+    between = "; there are " + ", ".join(["sixteen letters."] * 15)
+    assert (
+        str(ParameterError(f"no key '{name}'{between}. Did you mean 'y'?"))
+        == f"no key '{name}'{between}. Did you mean 'y'?"
+    )
+
+
 def test_a_text_of_a_page_is_not_proposed_as_the_code_of_a_missing_value(tmp_path: Path):
     (tmp_path / "a.csv").write_text("force [N],pressure [kPa]\n" + f"{'a' * 3000},1\n" * 3, encoding="utf-8")
     with pytest.raises(ColumnError, match="3 cells in 3 of 3 lines are no finite numbers") as raised:

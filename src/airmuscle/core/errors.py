@@ -31,7 +31,7 @@ MAX_LISTED, MAX_LISTED_NAME, MAX_LISTED_TEXT = 40, 60, 400
 """Number of names of a file that a message lists, and of characters of each and of all (chosen)."""
 MAX_WORD = 200
 """Maximum number of characters of an argument that a message quotes (chosen)."""
-_LONG_QUOTATION = re.compile(rf"\S{{{MAX_WORD + 1},}}|'[^'\n]{{{MAX_WORD + 1},}}'")
+_LONG_QUOTATION = re.compile(rf"\S{{{MAX_WORD + 1},}}|(?<![^\s(\[])'(?=[^\s;,.:)])[^'\n]{{{MAX_WORD + 1},}}'")
 
 
 @dataclasses.dataclass(frozen=True)
