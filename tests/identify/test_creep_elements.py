@@ -56,6 +56,12 @@ def made(amplitudes: tuple[float, ...], times: tuple[float, ...], unit: str = ""
     return CreepFit(Creep(0.1, amplitudes, times), 1e-6, (1e-3, 1e-6, 1e-6), (1e-9, 1e-9), 40.0, unit)
 
 
+def test_the_stiffnesses_of_a_relaxation_are_its_amplitudes_by_the_step():
+    found = creep_elements(made((30.0, 12.0), (0.5, 6.0), "N"), step=0.004)
+    assert found.stiffnesses == pytest.approx((7500.0, 3000.0), rel=1e-12)
+    assert found.relaxation_times == (0.5, 6.0)
+
+
 def test_no_creep_gives_no_elements():
     assert creep_elements(made((), ()), step=0.01) == CreepElements()
 

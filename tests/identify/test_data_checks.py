@@ -138,6 +138,8 @@ def test_force_maps_of_two_muscles_without_time_and_without_a_common_point_contr
     assert "Rows contradict each other: apart from a smooth dependence on both quantities" in notes
     one = one_file(force_map(MUSCLE, (0.0, 0.0)), force_map(MUSCLE, shift))
     assert notes_of(tmp_path / "one", one) == ""
+    repeated = {"both": {name: np.concatenate([column[:8], column]) for name, column in two["both"].items()}}
+    assert "apart from a smooth dependence" in notes_of(tmp_path / "repeated", repeated), "points that agree"
 
 
 def test_a_column_that_names_the_specimen_divides_the_file(tmp_path):
@@ -243,6 +245,46 @@ def test_the_delay_of_a_sensor_is_not_called_friction(tmp_path):
     (note,) = [note for note in result.notes if "delay between the sensors" in note]
     assert "follows the pressure by 39.9 ms" in note or "follows the pressure by 40" in note
     assert not any("To identify the friction" in note for note in result.notes)
+
+
+def test_a_pressure_that_is_read_late_is_not_called_friction(tmp_path):
+    tables = ramps(dataclasses.replace(MUSCLE, friction=2.0), duration=1.0, sample_time=0.005)
+    for table in tables.values():
+        time = table["time [s]"]
+        table[PRESSURE] = np.interp(time - 0.04, time, table[PRESSURE])
+    notes = notes_of(tmp_path, tables)
+    assert "the pressure follows the force by 3" in notes or "the pressure follows the force by 4" in notes
+    assert "shift the pressure by this time" in notes
+
+
+@pytest.mark.parametrize("offset", [-50.0, 50.0])
+def test_the_zero_of_the_force_is_read_where_an_isobar_is_slack(tmp_path, offset):
+    """At 60 and 80 kPa the muscle is slack from 15 % on; no reading without pressure and no line of the force shows it."""
+    time = 0.05 * np.arange(181)
+    contraction = 0.24 * (1.0 - np.abs(1.0 - time / 4.5))
+    runs = {
+        f"isobar_{p / 1e3:.0f}": measured(time, np.full(181, p), contraction, -np.sign(np.gradient(contraction)), i)
+        for i, p in enumerate((60e3, 80e3, 5e5, 6e5))
+    }
+    assert notes_of(tmp_path / "right", runs) == ""
+    notes = notes_of(tmp_path / "wrong", changed(runs, FORCE, lambda force: force + offset))
+    assert f"the force is {offset:.0f} N over a range of contractions at constant pressure" in notes
+
+
+def test_a_pressure_sensor_at_its_limit_is_named(tmp_path):
+    tables = ramps()
+    assert notes_of(tmp_path / "right", tables) == ""
+    notes = notes_of(tmp_path / "wrong", changed(tables, PRESSURE, lambda pressure: np.minimum(pressure, 480.0)))
+    assert "The pressure sensor saturates at 480 kPa" in notes
+    assert "where the force still changes" in notes
+
+
+def test_a_gauge_pressure_below_zero_is_named_and_a_vacuum_is_not(tmp_path):
+    notes = notes_of(tmp_path / "zero", changed(ramps(), PRESSURE, lambda pressure: pressure - 12.0))
+    assert re.search(r"the gauge pressure is down to -(9|1\d)", notes)
+    assert "Unless the rig draws a vacuum" in notes
+    vacuum = changed(ramps(), PRESSURE, lambda pressure: np.maximum(pressure, 2.0) - 60.0)
+    assert "vacuum" not in notes_of(tmp_path / "vacuum", vacuum)
 
 
 def test_the_command_hysteresis_states_a_delay(tmp_path):

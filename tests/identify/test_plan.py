@@ -15,7 +15,7 @@ from airmuscle.bench import BenchLimits, fit, read_csv
 from airmuscle.bench.identify import candidate_runs, optimal_design
 from airmuscle.bench.identify.experiment_design import _exchange, _log_determinant, _select_greedily
 from airmuscle.errors import IdentificationError, ParameterError
-from airmuscle.physics import Braid, TonduLopez2000, ValidityRange
+from airmuscle.physics import Braid, ContractileSurface, TonduLopez2000, ValidityRange
 from airmuscle.recording import Recording
 
 BENCH = BenchLimits(ValidityRange(50e3, 500e3, 0.0, 0.25), 400.0)
@@ -125,3 +125,12 @@ def test_no_point_is_proposed_where_nothing_pulls():
     forces = np.concatenate([run.force for run in runs])
     assert min(float(run.pressure.min()) for run in runs) >= 10e3
     assert float(forces.min()) >= 0.01 * float(forces.max())
+
+
+def test_no_point_is_proposed_beyond_the_place_where_the_pull_of_a_surface_ends():
+    """A polynomial that is slack from 83 to 217 kPa rises to 50 N below; the muscle stays slack there."""
+    surface = ContractileSurface((50.0, 0.0, 0.0, 250.0, 0.0, 250.0), 0.0, 600e3, 0.0, 0.2, degree=2)
+    assert surface.force(0.0, 0.1) == pytest.approx(50.0)
+    assert surface.force(150e3, 0.1) == 0.0
+    runs = candidate_runs(surface, BenchLimits(ValidityRange(0.0, 600e3, 0.0, 0.2), 600.0), 12)
+    assert 217e3 < min(run.pressure.min() for run in runs) < 240e3

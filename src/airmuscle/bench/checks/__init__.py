@@ -19,6 +19,7 @@ CHECKS: tuple[BenchCheck, ...] = (
     pressures.check_lowest_pressures,
     pressures.check_mixed_pressures,
     pressures.check_absolute_isobars,
+    pressures.check_pressure_zero,
     pressures.check_force_signs,
     pressures.check_force_zero,
     contractions.check_contraction_signs,

@@ -18,6 +18,11 @@ MAX_ELONGATION = 0.005
 """Elongation and contraction that count as the resting length (chosen); a stretched muscle pulls without pressure."""
 MIN_ROWS = 6
 """Minimum number of rows of a level (chosen)."""
+CONSTANT_PRESSURE = 0.06
+"""Range of the pressure of an isobar, as a fraction of its pressure (chosen)."""
+STEP, MIN_STEPS, FLAT = 0.01, 3, 0.1
+"""Steps of the contraction in which the force of an isobar is averaged, the minimum number of successive ones without a
+change of the force, and the change that counts as none, as a fraction of the mean one of a step (chosen)."""
 LEVELS = 8
 """Number of intervals of the contraction, with equal numbers of rows, in which force is taken as linear in pressure."""
 
@@ -93,6 +98,25 @@ def _not_saturated(recordings: Sequence[Recording]) -> npt.NDArray[np.bool_]:
     sensor = estimate_sensors([Recording({"force": each["force"]}, each.origin) for each in recordings])["force"]
     limit = sensor.upper_limit - 0.25 * sensor.resolution
     return np.concatenate([each["force"] < limit for each in recordings])
+
+
+def slack_plateaus(recordings: Sequence[Recording]) -> BenchRows:
+    """The rows of isobars at which the muscle is slack: the force does not change with the contraction, up to the
+    shortest length. Drift and friction of a run, which returns, are in the mean of each step of the contraction."""
+    rows = [_plateau(BenchRows.of([run])) for run in recordings_with(recordings, *BenchRows._fields)]
+    return BenchRows(*(np.concatenate([np.zeros(0), *columns]) for columns in zip(*rows, strict=True)))
+
+
+def _plateau(run: BenchRows) -> BenchRows:
+    """The slack rows of one recording; none if its pressure is not constant."""
+    if run.force.size < MIN_ROWS or np.ptp(run.pressure) > CONSTANT_PRESSURE * np.max(run.pressure):
+        return run.at(run.force > np.inf)
+    step = ((np.max(run.contraction) - run.contraction) / STEP).astype(int)
+    counts = np.bincount(step)
+    means = np.bincount(step, run.force) / np.maximum(counts, 1)
+    change = FLAT * np.subtract(*limits(run.force)[::-1]) / max(counts.size - 1, 1)
+    flat = np.logical_and.accumulate((counts > 0) & (np.abs(means - means[0]) < change))
+    return run.at((step < np.count_nonzero(flat)) & (np.count_nonzero(flat) >= MIN_STEPS))
 
 
 class PressureLine(NamedTuple):

@@ -6,7 +6,7 @@ import numpy as np
 
 from ...core import AMBIENT_PRESSURE, Hint, HintedText, UnitError, conversion
 from ...recording.recording import Recording
-from .bench_rows import BenchRows, PressureLine, file_list, limits, pressure_lines, recordings_with
+from .bench_rows import BenchRows, PressureLine, file_list, limits, pressure_lines, recordings_with, slack_plateaus
 
 ATMOSPHERE = (95e3, 106e3)
 """Range of the lowest pressure that may be the atmosphere [Pa] (chosen)."""
@@ -23,10 +23,13 @@ NEAR_REST = 0.02
 MAX_PRESSURE = 1e6
 """Highest pressure of pneumatic muscles [Pa] (chosen: makers permit 0.6 to 0.8 MPa)."""
 MIN_LEVELS, MIN_RANGE = 3, 0.05
-"""Minimum number of contractions at which isobars show the zero, and their minimum range (chosen)."""
+"""Minimum number of contractions whose lines of force over pressure show a zero, and their minimum range (chosen)."""
 ZERO_FORCE_PRESSURES, SMALL_CONTRACTIONS = (93e3, 130e3), 0.4
 """Range of the pressures of zero force of isobars that are absolute [Pa], at contractions below this fraction of the
 greatest (chosen): from the atmosphere to what the wall adds. Gauge pressures of zero force begin near 0 and rise."""
+MAX_ZERO, MAX_ZERO_ERROR = 0.012, -30e3
+"""Maximum reading of a slack muscle or without pressure, as a fraction of the maximum force or pressure; gauge pressure
+[Pa] below which a rig draws a vacuum (chosen: the atmosphere at 3000 m)."""
 _STATE = Hint("To state the unit", "units", {"pressure": ...}, "ColumnMapping")
 
 
@@ -82,6 +85,19 @@ def check_absolute_isobars(recordings: Sequence[Recording]) -> Iterator[HintedTe
             f"or more at every contraction, {max(small) / 1e3:.3g} kPa or less at small ones, near the pressure of the "
             f"atmosphere ({AMBIENT_PRESSURE / 1e3:.4g} kPa). The pressures are probably absolute, but read as gauge.",
             _STATE,
+        )
+
+
+def check_pressure_zero(recordings: Sequence[Recording]) -> Iterator[HintedText]:
+    """A lowest pressure, but for two glitches, below that of the atmosphere, by less than the vacuum of a rig."""
+    given = [each for each in recordings_with(recordings, "pressure") if len(each) > 2]
+    lowest, origin = min(((float(np.sort(each["pressure"])[2]), each.origin) for each in given), default=(0.0, ""))
+    if MAX_ZERO_ERROR < lowest < -MAX_ZERO * max((float(np.nanmax(each["pressure"])) for each in given), default=0.0):
+        yield HintedText(
+            f"{origin}: the gauge pressure is down to {lowest / 1e3:.3g} kPa. Unless the rig draws a vacuum, the zero "
+            "of the pressure sensor is wrong, and all pressures by the same amount, or the ambient pressure of "
+            "absolute readings.",
+            Hint("To state the ambient pressure", "ambient", ..., "ColumnMapping"),
         )
 
 
@@ -186,20 +202,16 @@ def check_force_area(recordings: Sequence[Recording]) -> Iterator[str]:
         )
 
 
-MAX_ZERO = 0.012
-"""Maximum reading of the slack muscle, as a fraction of the maximum force (chosen)."""
 MAX_EXTRAPOLATED = 0.015
 """Maximum force extrapolated to zero pressure, as a fraction of the maximum force (chosen)."""
 MIN_ROWS = 3
 """Minimum number of rows without pressure (chosen)."""
-MIN_LEVELS, MIN_RANGE = 3, 0.05
-"""Minimum number of contractions whose lines show the zero, and their minimum range (chosen)."""
-_REMEDY = "Subtract the reading of the slack muscle at zero pressure from the column, or measure it."
+_REMEDY = "Subtract the reading of the slack muscle from the column, or measure it."
 
 
 def check_force_zero(recordings: Sequence[Recording]) -> Iterator[str]:
-    """A sensor that reads a force at zero pressure, measured there or extrapolated to it, or the same negative force at
-    several lengths of the slack muscle.
+    """A sensor that reads a force where a muscle is slack, or the same negative force at several lengths of it: at zero
+    pressure, measured there or extrapolated to it, and where the force of an isobar does not change with the length.
 
     The force at zero gauge pressure is at most 0 at each contraction: the wall resists contraction and does not pull
     (Chou and Hannaford, IEEE Trans. Robot. Autom. 12 (1996), with elastic wall: Tondu and Lopez 2000).
@@ -208,16 +220,21 @@ def check_force_zero(recordings: Sequence[Recording]) -> Iterator[str]:
     rows = BenchRows.of(given)
     if not rows.force.size or not rows.greatest > 0:
         return
-    slack = rows.slack
-    if slack.force.size >= MIN_ROWS:
-        reading = float(np.median(slack.force))
+    places = (
+        ("at zero pressure and shortened length", rows.slack),
+        ("over a range of contractions at constant pressure", slack_plateaus(given)),
+    )
+    for place, slack in places:
+        reading = float(np.median(slack.force)) if slack.force.size >= MIN_ROWS else 0.0
         low = -MAX_OFFSET * rows.greatest <= reading < -MAX_ZERO * rows.greatest and _is_constant(slack)
         if reading > MAX_ZERO * rows.greatest or low:
             yield (
-                f"{file_list([each.origin for each in given])}: the force is {reading:.3g} N at zero pressure and "
-                "shortened length, where a muscle is slack: the zero of the force sensor is wrong, and all forces by "
-                f"the same amount. {_REMEDY}"
+                f"{file_list([each.origin for each in given])}: the force is {reading:.3g} N {place}, where a muscle "
+                "is slack: the zero of the force sensor is wrong, and all forces by the same amount. "
+                f"{_REMEDY}"
             )
+            return
+    if rows.slack.force.size >= MIN_ROWS:
         return
     offset = extrapolated_offset(pressure_lines(rows))
     if offset > MAX_EXTRAPOLATED * rows.greatest:

@@ -1,8 +1,9 @@
 """Loops of the force that a static law does not describe: branches that the residuals follow, a delay of the sensor.
 
 A force that is read later by tau opens a loop whose width is 2 tau dF/dt, proportional to the speed, and its maximum
-follows that of the pressure by tau. The loop of friction is independent of the speed, and its maximum is that of the
-pressure. A delay is found where the loop and the turning point give the same tau.
+follows that of the pressure by tau; a pressure that is read later gives the same with a negative tau. The loop of
+friction is independent of the speed, and its maximum is that of the pressure. A delay is found where the loop and the
+turning point give the same tau.
 """
 
 import dataclasses
@@ -36,7 +37,8 @@ DWELL_ROWS = 4
 
 @dataclasses.dataclass(frozen=True)
 class SensorDelay:
-    """The delay of the force after the pressure [s], from the loops and from their turning points."""
+    """The delay of the force after the pressure [s], from the loops and from their turning points; negative where the
+    pressure is later."""
 
     loop: float
     turning_point: float
@@ -58,7 +60,8 @@ def find_delay(recordings: Sequence[Recording]) -> SensorDelay | None:
     if len(turns) < MIN_LOOPS:
         return None
     loop, peak, width, sample_time = (float(v) for v in np.median(np.array(turns), axis=0))
-    if min(loop, peak) < MIN_SAMPLES * sample_time or abs(peak - loop) > AGREEMENT * loop + sample_time:
+    least = min(abs(loop), np.sign(loop) * peak)
+    if least < MIN_SAMPLES * sample_time or abs(peak - loop) > AGREEMENT * abs(loop) + sample_time:
         return None
     return SensorDelay(loop, peak, width, len(turns))
 
@@ -67,11 +70,13 @@ def delay_notes(delay: SensorDelay | None) -> list[str]:
     """The remark that loops are those of a delay; empty without one."""
     if delay is None:
         return []
+    later, earlier = ("force", "pressure") if delay.loop > 0 else ("pressure", "force")
+    times = [f"{1e3 * abs(each):.3g} ms" for each in (delay.loop, delay.turning_point)]
     return [
-        f"The loops of the ramps, {delay.width:.3g} N wide, are those of a delay between the sensors: the force "
-        f"follows the pressure by {1e3 * delay.loop:.3g} ms, and so do its maxima ({1e3 * delay.turning_point:.3g} ms, "
-        f"{delay.loops} turning points), while friction has no delay there. Do not take them for friction: shift the "
-        "force by this time, or ramp the pressure more slowly."
+        f"The loops of the ramps, {abs(delay.width):.3g} N wide, are those of a delay between the sensors: the {later} "
+        f"follows the {earlier} by {times[0]}, and so do its maxima ({times[1]}, {delay.loops} turning points), while "
+        f"friction has no delay there. Do not take them for friction: shift the {later} by this time, or ramp the "
+        "pressure more slowly."
     ]
 
 

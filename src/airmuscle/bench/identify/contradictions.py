@@ -108,7 +108,8 @@ def repeatability(matches: Matches) -> float | None:
 
 def contradiction_notes(matches: Matches) -> list[str]:
     """The remark that runs contradict each other, with its cause; empty if they do not."""
-    contradicting = [each for each in matches.runs if abs(each.typical) > _limit(each, matches.greatest)]
+    found = [each for each in matches.runs if abs(each.typical) > _limit(each, matches.greatest)]
+    contradicting = [each for each in found if each.are_near] or found
     if not contradicting:
         return []
     rms = np.sqrt(np.mean([np.mean(each.differences**2) for each in matches.runs]))

@@ -13,6 +13,7 @@ from ...core import Hint, HintedText
 from ...recording import Recording
 from ...report.chapter import NamedValue
 from ..checks import find_suspicious
+from ..checks.bench_rows import file_list
 from ..checks.contractions import without_missing_codes
 from ..segment import Outlier, estimate_noise, estimate_sensors, find_outliers, remembered
 from .branch_residuals import SensorDelay, delay_notes, find_delay
@@ -85,6 +86,8 @@ MIN_SHARE = 0.002
 """Minimum share of rows with such outliers that a fit reports (chosen)."""
 MIN_RMS = 0.005
 """Minimum share of such outliers in the rms error that a fit reports, as a fraction of the maximum force (chosen)."""
+HELD = 0.005
+"""Range of the contraction at a held length (chosen)."""
 HUBER = 3.0
 """Threshold of the proposed Huber loss, in standard deviations of the sensor."""
 
@@ -122,6 +125,27 @@ def _describe_outlier(run: Recording, outlier: Outlier) -> str:
     return f"{run.origin}, row {outlier.row + 1} ({outlier.value:.4g} N, neighbours {outlier.expected:.4g} N)"
 
 
+def saturation_notes(recordings: Sequence[Recording]) -> list[str]:
+    """The remark on a pressure sensor at its upper limit, while the force at constant length still changes."""
+    runs = [run for run in recordings if all(name in run for name in ("time", "pressure", "contraction", "force"))]
+    if not runs:
+        return []
+    limit = estimate_sensors([Recording({"pressure": run["pressure"]}, run.origin) for run in runs])["pressure"]
+    least = MIN_DISTANCE * float(np.nanquantile(np.concatenate([run["force"] for run in runs]), 0.99))
+    found = []
+    for run in runs:
+        rows = run["pressure"] >= limit.upper_limit - 0.25 * limit.resolution
+        if rows.any() and np.ptp(run["contraction"][rows]) < HELD and np.ptp(run["force"][rows]) > least:
+            found.append((run.origin, int(np.count_nonzero(rows))))
+    if not found:
+        return []
+    return [
+        f"The pressure sensor saturates at {limit.upper_limit / 1e3:.4g} kPa, in {sum(n for _, n in found)} rows of "
+        f"{file_list([name for name, _ in found])}, where the force still changes: the pressure is greater there, and "
+        "the law takes the limit for it. Leave these rows out, or use a sensor of a greater range."
+    ]
+
+
 @dataclasses.dataclass(frozen=True)
 class DataChecks:
     """What the recordings of a bench show without a law.
@@ -148,5 +172,5 @@ def _check(recordings: Sequence[Recording]) -> DataChecks:
     contradictions = contradiction_notes(matches)
     if not any(" tells the contradicting rows apart" in note for note in contradictions):
         contradictions += two_muscle_notes(match_rows(measured, by_branch=True))
-    found = (*contradictions, *outlier_notes(measured), *delay_notes(delay))
+    found = (*contradictions, *outlier_notes(measured), *saturation_notes(measured), *delay_notes(delay))
     return DataChecks((*find_suspicious(recordings), *found), Scatter.of(measured, repeatability(matches)), delay)

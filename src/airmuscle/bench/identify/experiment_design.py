@@ -12,7 +12,6 @@ from collections.abc import Collection, Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from ...core import Array, IdentificationError, ParameterError, check_field_types
 from ...physics.muscle.characteristic import Characteristic, ValidityRange
@@ -187,13 +186,14 @@ def optimal_design(
 def candidate_runs(characteristic: Characteristic, bench: BenchLimits, points: int) -> list[PlannedRun]:
     """Isobaric and isometric runs on evenly spaced levels, each limited to points at which the muscle pulls, up to the
     maximum force."""
-    bench = _pulling(characteristic, bench)
+    bench, pull = _pulling(characteristic, bench)
     limits = {"pressure": bench.validity_range.pressure, "contraction": bench.validity_range.contraction}
     runs = []
     for constant, swept in (("pressure", "contraction"), ("contraction", "pressure")):
         (low, high), (first, last) = limits[constant], limits[swept]
         for level in np.linspace(low, high, LEVEL_COUNT):
-            runs += _feasible_run(characteristic, bench, constant, float(level), np.linspace(first, last, 201), points)
+            sweep = np.linspace(first, last, 201)
+            runs += _feasible_run(characteristic, bench, pull, constant, float(level), sweep, points)
     if not runs:
         raise IdentificationError(
             f"no run is feasible: {type(characteristic).__name__} gives no force between 0 and {bench.max_force:g} N "
@@ -202,37 +202,35 @@ def candidate_runs(characteristic: Characteristic, bench: BenchLimits, points: i
     return runs
 
 
-def _pulling(law: Characteristic, bench: BenchLimits) -> BenchLimits:
-    """The limits without the pressures and forces at which nothing pulls."""
+def _pulling(law: Characteristic, bench: BenchLimits) -> tuple[BenchLimits, tuple[Array, Array]]:
+    """The limits without the pressures and forces at which nothing pulls, and over the contraction the least pressure
+    above which the law gives a force throughout: that of a polynomial that rises again below is no pull of a muscle."""
     (low, high), contractions = bench.validity_range.pressure, bench.validity_range.contraction
     low = max(low, min(MIN_PRESSURE_SHARE * high, high))
-    grid = np.meshgrid(np.linspace(low, high, LEVEL_COUNT), np.linspace(*contractions, LEVEL_COUNT))
-    forces = np.asarray(law.force(*(each.ravel() for each in grid)), dtype=float)
+    pressure, contraction = np.linspace(low, high, 8 * LEVEL_COUNT), np.linspace(*contractions, 4 * LEVEL_COUNT)
+    grid = np.meshgrid(pressure, contraction)
+    forces = np.asarray(law.force(*(each.ravel() for each in grid)), dtype=float).reshape(grid[0].shape)
     reached = forces[np.isfinite(forces) & (forces > 0) & (forces <= bench.max_force)]
-    least = MIN_FORCE_SHARE * float(reached.max()) if reached.size else 0.0
-    pressures = ValidityRange(low, high, *contractions)
-    return dataclasses.replace(bench, validity_range=pressures, min_force=max(bench.min_force, least))
+    least = max(bench.min_force, MIN_FORCE_SHARE * float(reached.max()) if reached.size else 0.0)
+    slack = (forces <= 0) | (forces < least)
+    limits = dataclasses.replace(bench, validity_range=ValidityRange(low, high, *contractions), min_force=least)
+    return limits, (contraction, np.max(np.where(slack, pressure, low), axis=1))
 
 
 def _feasible_run(
-    law: Characteristic, bench: BenchLimits, constant: str, level: float, sweep: Array, points: int
-) -> list[PlannedRun]:
-    feasible = sweep[_is_feasible(law, bench, constant, level, sweep)]
-    if feasible.size < MIN_POINTS:
-        return []
-    values = np.linspace(feasible[0], feasible[-1], points)
-    values = values[_is_feasible(law, bench, constant, level, values)]
-    if values.size < MIN_POINTS:
-        return []
-    pressure, contraction = _coordinates(constant, level, values)
-    return [PlannedRun(constant, pressure, contraction, np.asarray(law.force(pressure, contraction), dtype=float))]
-
-
-def _is_feasible(
-    law: Characteristic, bench: BenchLimits, constant: str, level: float, values: Array
-) -> npt.NDArray[np.bool_]:
-    force = np.asarray(law.force(*_coordinates(constant, level, values)), dtype=float)
-    return np.asarray(np.isfinite(force) & (force > 0) & (force >= bench.min_force) & (force <= bench.max_force))
+    law: Characteristic, bench: BenchLimits, pull: tuple[Array, Array], constant: str, level: float, sweep: Array,
+    points: int,
+) -> list[PlannedRun]:  # fmt: skip
+    for _ in range(2):  # the points of the sweep, then those of the run between the first and the last of these
+        pressure, contraction = _coordinates(constant, level, sweep)
+        force = np.asarray(law.force(pressure, contraction), dtype=float)
+        feasible = np.isfinite(force) & (force > 0) & (force >= bench.min_force) & (force <= bench.max_force)
+        feasible &= pressure >= np.interp(contraction, *pull)
+        if np.count_nonzero(feasible) < MIN_POINTS:
+            return []
+        used = sweep[feasible]
+        sweep = np.linspace(used[0], used[-1], points)
+    return [PlannedRun(constant, *_coordinates(constant, level, used), force[feasible])]
 
 
 def _coordinates(constant: str, level: float, values: Array) -> tuple[Array, Array]:

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from ...core import Array, IdentificationError, cite
 from ...physics.muscle.characteristic.base import Characteristic, ForceLaw
 from ...recording import Recording
-from ..segment import ISOBARIC, ISOMETRIC, RELATIVE_BAND, find_runs
+from ..segment import ISOBARIC, ISOMETRIC, RELATIVE_BAND, find_runs, level_intervals
 from .contradictions import RepeatedRows, find_repeated_rows
 from .cross_validation import specimen_name
 from .data_checks import DataChecks
@@ -173,8 +173,8 @@ def _merged_levels(levels: Array) -> Array:
     """The levels (N,) of runs, those within the band of a constant quantity replaced by the lowest of them."""
     distinct, member = np.unique(levels, return_inverse=True)
     band, merged = RELATIVE_BAND * float(np.max(np.abs(distinct), initial=0.0)), distinct.copy()
-    for i in range(1, merged.size):
-        merged[i] = merged[i - 1] if distinct[i] - merged[i - 1] <= band else distinct[i]
+    for interval in level_intervals(distinct, band):
+        merged[interval.rows] = distinct[interval.start]
     return np.asarray(merged[member])
 
 

@@ -69,6 +69,12 @@ class MatchedRuns:
     and the polynomial accounts for their distance."""
 
     @property
+    def forces(self) -> tuple[Array, Array]:
+        """The forces of the matched rows in the first and in the second block [N], shape (M,) each."""
+        (i, j), (a, b) = self.pairs.T, (self.first, self.second)
+        return a.recording["force"][a.rows[i]], b.recording["force"][b.rows[j]]
+
+    @property
     def is_unordered(self) -> bool:
         """Whether the rows are of one block without time, so that the direction of the motion is not known."""
         return self.first is self.second
@@ -181,7 +187,7 @@ def _matched_runs(blocks: Sequence[Block], recordings: Sequence[Recording]) -> l
             if len(pairs) >= MIN_MATCHES:
                 both = blocks[i].residuals[pairs[:, 0]] - blocks[j].residuals[pairs[:, 1]]
                 matched.append(MatchedRuns(blocks[i], blocks[j], pairs, both))
-    return matched or list(_spread(blocks))
+    return [*matched, *_spread(blocks)]
 
 
 def _unordered(block: Block, points: Array) -> Iterator[MatchedRuns]:

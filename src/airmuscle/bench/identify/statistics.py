@@ -10,7 +10,7 @@ import numpy.typing as npt
 from ...core import Array, Hint, IdentificationError
 from ...physics.muscle.characteristic import ContractileSurface
 from ...recording import Recording
-from ..segment.runs import RELATIVE_BAND
+from ..segment import RELATIVE_BAND, level_intervals
 from .identifiability import singular_vectors
 from .parameter_covariance import ParameterCovariance, Runs, estimate_covariance
 from .problem import FitProblem
@@ -261,11 +261,5 @@ def _degree_remedy(problem: FitProblem, degree: int) -> tuple[str, Hint | None]:
 
 def count_levels(values: Array) -> int:
     """The number of levels: of groups of values that differ by at most the band of a constant quantity."""
-    if not values.size:
-        return 0
-    ordered = np.sort(values)
-    band, count, start = RELATIVE_BAND * float(np.max(np.abs(ordered))), 1, float(ordered[0])
-    for value in ordered.tolist():
-        if value - start > band:
-            count, start = count + 1, value
-    return count
+    band = RELATIVE_BAND * float(np.max(np.abs(values), initial=0.0))
+    return sum(1 for _ in level_intervals(np.sort(values), band))

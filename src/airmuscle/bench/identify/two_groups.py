@@ -60,8 +60,7 @@ def _two_groups(runs: Sequence[MatchedRuns], least: float) -> TwoGroups | None:
     number = {id(block): i for i, block in enumerate(blocks)}
     matrix, ratios = np.zeros((len(runs), len(blocks))), np.zeros(len(runs))
     for i, each in enumerate(runs):
-        sides = zip((each.first, each.second), each.pairs.T, strict=True)
-        ratios[i] = 2.0 * np.median(each.differences / sum(b.recording["force"][b.rows[k]] for b, k in sides))
+        ratios[i] = 2.0 * np.median(each.differences / sum(each.forces))
         matrix[i, [number[id(each.first)], number[id(each.second)]]] = 1.0, -1.0
     levels = np.linalg.lstsq(matrix, ratios, rcond=1e-10)[0]
     order = np.argsort(levels)

@@ -9,6 +9,7 @@ import warnings
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
+import numpy.typing as npt
 
 from ...core import STANDARD_GRAVITY, AirmuscleWarning, Array, ColumnError, Hint, HintedText, UnitError, conversion
 from ...recording.columns import Heading, quantity_of
@@ -32,28 +33,51 @@ def check_plausible(
 ) -> None:
     """Raise ColumnError, with row and value, at the first value that cannot be a measurement."""
     for name, values in columns.items():
-        _check_magnitude(table, name, values)
+        limit = f"no measurement exceeds {MAX_MAGNITUDE:g}. Correct the value, or delete the row."
+        _refuse(table, values, np.abs(values) > MAX_MAGNITUDE, f"{name} is {{}} in SI units; {limit}")
         quantity = name.rpartition(".")[2]
         if quantity == "time" and ordered:
             _check_ordered(table, values)
         elif quantity == "pressure":
-            _check_above_vacuum(table, values, ambient)
+            text = (
+                f"a gauge pressure of {{}} kPa is not above absolute vacuum ({-ambient / 1e3:.4g} kPa gauge). Check "
+                "the unit, and whether the pressure is gauge or absolute."
+            )
+            _refuse(table, values, ~(values + ambient > 0), text, unit=1e3)
         elif quantity == "contraction":
             remedy = "For values in percent, rename the column header to 'contraction [%]'."
             _check_contraction(table, values, "contraction", remedy)
         elif quantity == "length":
-            _check_length(table, values, resting_length)
+            _refuse(table, values, ~(values > 0), "length is {} m; it must be positive.")
+            if resting_length is not None:
+                label = f"with a resting length of {resting_length:.4g} m, the contraction"
+                remedy = "Check the units of the length and of the resting length."
+                _check_contraction(table, (resting_length - values) / resting_length, label, remedy)
 
 
-def _check_magnitude(table: RawTable, name: str, values: Array) -> None:
-    excessive = np.abs(values) > MAX_MAGNITUDE
-    if excessive.any():
-        row = int(np.argmax(excessive))
-        raise ColumnError(
-            f"{table.location(row)}: {name} is {values[row]:.4g} in SI units; no measurement exceeds "
-            f"{MAX_MAGNITUDE:g}. Correct the value, or delete the row.",
-            hint=_code_hint(values[row]),
-        )
+def _check_contraction(table: RawTable, contraction: Array, label: str, remedy: str) -> None:
+    low, high = CONTRACTION_RANGE
+    outside = ~((contraction > low) & (contraction < high))
+    text = f"{label} {{}} is outside the plausible range {low:g} to {high:g}. {remedy}"
+    _refuse(table, contraction, outside, text, may_be_code=False)
+
+
+def _refuse(
+    table: RawTable,
+    values: Array,
+    wrong: npt.NDArray[np.bool_],
+    text: str,
+    *,
+    unit: float = 1.0,
+    may_be_code: bool = True,
+) -> None:
+    """Raise ColumnError at the first wrong value, which stands for `{}` in the text, in this unit."""
+    if wrong.any():
+        row = int(np.argmax(wrong))
+        code = code_of(float(values[row])) if may_be_code else None
+        remedy = DropMissing(() if code is None else (code,))
+        hint = None if code is None else Hint(CODE_PURPOSE.format(code), "missing", remedy, "ColumnMapping")
+        raise ColumnError(f"{table.location(row)}: {text.replace('{}', f'{values[row] / unit:.4g}')}", hint=hint)
 
 
 def _check_ordered(table: RawTable, time: Array) -> None:
@@ -67,49 +91,6 @@ def _check_ordered(table: RawTable, time: Array) -> None:
             f"Time must increase: sort the rows, delete the repeated one, or write two runs to two files."
         )
         raise ColumnError(HintedText(message, *hints))
-
-
-def _check_above_vacuum(table: RawTable, pressure: Array, ambient: float) -> None:
-    below = ~(pressure + ambient > 0)
-    if below.any():
-        row = int(np.argmax(below))
-        raise ColumnError(
-            f"{table.location(row)}: a gauge pressure of {pressure[row] / 1e3:.4g} kPa is not above absolute vacuum "
-            f"({-ambient / 1e3:.4g} kPa gauge). Check the unit, and whether the pressure is gauge or absolute.",
-            hint=_code_hint(pressure[row]),
-        )
-
-
-def _code_hint(value: float) -> Hint | None:
-    """The remedy where an impossible value is a code for a missing value."""
-    code = code_of(float(value))
-    return None if code is None else Hint(CODE_PURPOSE.format(code), "missing", DropMissing((code,)), "ColumnMapping")
-
-
-def _check_contraction(table: RawTable, contraction: Array, label: str, remedy: str) -> None:
-    low, high = CONTRACTION_RANGE
-    outside = ~((contraction > low) & (contraction < high))
-    if outside.any():
-        row = int(np.argmax(outside))
-        raise ColumnError(
-            f"{table.location(row)}: {label} {contraction[row]:.4g} is outside the plausible range {low:g} to "
-            f"{high:g}. {remedy}"
-        )
-
-
-def _check_length(table: RawTable, length: Array, resting_length: float | None) -> None:
-    if not (length > 0).all():
-        row = int(np.argmin(length > 0))
-        raise ColumnError(
-            f"{table.location(row)}: length is {length[row]:.4g} m; it must be positive.", hint=_code_hint(length[row])
-        )
-    if resting_length is not None:
-        _check_contraction(
-            table,
-            (resting_length - length) / resting_length,
-            f"with a resting length of {resting_length:.4g} m, the contraction",
-            "Check the units of the length and of the resting length.",
-        )
 
 
 SAME_MAGNITUDE = 1.5

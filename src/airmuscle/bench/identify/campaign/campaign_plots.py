@@ -7,6 +7,7 @@ import numpy as np
 
 from ....core import BLACK, BLUE, DASHES, LINES, RED, AirmuscleError, legend_below, new_figure
 from ....report.chapter import Plot
+from ...segment import level_intervals
 from . import Campaign, CampaignRecord, CreepStage, FillStage, RecordKind, StaticStage
 
 MAX_LOOPS, MAX_PANELS = 6, 6
@@ -50,15 +51,13 @@ def characteristic_plot(campaign: Campaign) -> Plot | None:
 
 
 def _isobaric_levels(campaign: Campaign, length: float | None) -> list[float]:
-    levels = [
+    levels = sorted(
         record.level[1]
         for record in campaign.records
         if record.kind is RecordKind.ISOBARIC and record.level and record.resting_length in (length, None)
-    ]
-    distinct: list[float] = []
-    for level in sorted(levels):
-        if not distinct or level - distinct[-1] > LEVEL_TOLERANCE * max(levels):
-            distinct.append(level)
+    )
+    band = LEVEL_TOLERANCE * max(levels, default=0.0)
+    distinct = [levels[interval.start] for interval in level_intervals(np.array(levels), band)]
     return distinct[:: max(1, -(-len(distinct) // 7))]
 
 

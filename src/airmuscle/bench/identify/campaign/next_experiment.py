@@ -1,30 +1,27 @@
 """Records of a campaign as a whole: check that they are of one rig, and the next experiments."""
 
 import dataclasses
-import itertools
 from collections.abc import Sequence
 
 import numpy as np
 
 from ....core import AirmuscleError, IdentificationError, ShortRepr
 from ....physics.muscle.characteristic.validity_range import ValidityRange
+from ....recording import Recording
 from ..dynamic import rank_records
 from ..dynamic.record_ranking import MIN_GAIN
 from ..experiment_design import BenchLimits, ExperimentPlan, PlannedRun, optimal_design
+from ..matched_rows import match_rows
 from .creep_stage import CreepStage
 from .fill_stage import FillStage
 from .record import CampaignRecord, RecordKind
 from .static_stage import StaticStage
 from .transient import LeftOutStage
 
-LEVEL_TOLERANCE = 0.03
-"""Maximum relative difference of two pressures that are one level (chosen)."""
 MAX_RATIO = 1.5
 """Maximum ratio of the forces of two records at the same pressure, contraction and length (chosen)."""
 MAX_SCALE = 10.0
 """Maximum ratio of the maximum forces by pressure of two isobaric records of one length (chosen)."""
-MIN_FORCE = 0.1
-"""Minimum force of the compared rows, as a fraction of the maximum force (chosen)."""
 REMEDY = "Give the files of one muscle and one rig in a folder of their own"
 
 
@@ -43,8 +40,7 @@ def check_one_rig(records: Sequence[CampaignRecord]) -> None:
             )
         isobaric = [record for record in own if record.kind is RecordKind.ISOBARIC]
         _check_scale(isobaric)
-        for one, other in itertools.combinations(isobaric, 2):
-            _check_forces(one, other)
+        _check_forces([record.recording for record in isobaric])
 
 
 def _check_scale(records: Sequence[CampaignRecord]) -> None:
@@ -69,38 +65,18 @@ def _units(record: CampaignRecord) -> str:
     return ", ".join(f"{name} in {units[name]}" for name in ("pressure", "force") if name in units)
 
 
-def _check_forces(one: CampaignRecord, other: CampaignRecord) -> None:
-    if one.level is None or other.level is None:
-        return
-    pressures = one.level[1], other.level[1]
-    if abs(pressures[0] - pressures[1]) > LEVEL_TOLERANCE * max(map(abs, pressures)):
-        return
-    forces = _forces_at_common_contractions(one, other)
-    if forces is None:
-        return
-    ratio = forces[0] / forces[1]
-    if max(ratio, 1.0 / ratio) > MAX_RATIO:
-        raise IdentificationError(
-            f"{one.origin} and {other.origin} contradict each other: at {pressures[0] / 1e3:.4g} kPa and the same "
-            f"contractions their forces are {forces[0]:.4g} and {forces[1]:.4g} N. They are of different muscles or "
-            f"rigs, or a unit is wrong. {REMEDY}, or correct the units."
-        )
-
-
-def _forces_at_common_contractions(one: CampaignRecord, other: CampaignRecord) -> tuple[float, float] | None:
-    """The mean forces [N] of two records in the range of contraction that both have; None without a common range."""
-    columns = [(r.recording["contraction"], r.recording["force"]) for r in (one, other)]
-    low = max(float(np.quantile(c, 0.02)) for c, _ in columns)
-    high = min(float(np.quantile(c, 0.98)) for c, _ in columns)
-    means = []
-    for contraction, force in columns:
-        rows = (contraction >= low) & (contraction <= high) & (force > MIN_FORCE * force.max())
-        if np.count_nonzero(rows) < 5:
-            return None
-        order = np.argsort(contraction[rows], kind="stable")
-        grid = np.linspace(low, high, 40)
-        means.append(float(np.mean(np.interp(grid, contraction[rows][order], force[rows][order]))))
-    return means[0], means[1]
+def _check_forces(recordings: Sequence[Recording]) -> None:
+    """Raise IdentificationError where forces at equal pressure and contraction differ by a factor."""
+    for each in match_rows(recordings).runs:
+        names = [block.recording.origin for block in (each.first, each.second)]
+        first, second = (float(np.mean(force)) for force in each.forces)
+        if max(first, second) > MAX_RATIO * min(first, second):
+            pressure = float(np.median(each.first.recording["pressure"][each.first.rows]))
+            raise IdentificationError(
+                f"{' and '.join(names)} contradict each other: at {pressure / 1e3:.3g} kPa and the same contractions "
+                f"their forces are {first:.4g} and {second:.4g} N. They are of different muscles or rigs, or a unit is "
+                f"wrong. {REMEDY}, or correct the units."
+            )
 
 
 PLANNED_RUNS, PLANNED_POINTS = 4, 15

@@ -123,16 +123,13 @@ def _inner(values: Sequence[tuple[str, float] | None]) -> list[tuple[str, int] |
     """The number of the level of each value, counted by quantity; None for the lowest, the highest and no level."""
     labels: list[tuple[str, int] | None] = [None] * len(values)
     for name in {value[0] for value in values if value is not None}:
-        own = [(value[1], i) for i, value in enumerate(values) if value is not None and value[0] == name]
-        ordered = sorted(own)
-        scale = max(abs(value) for value, _ in ordered) or 1.0
-        number, numbers, last = 0, {}, ordered[0][0]
-        for value, i in ordered:
-            number += value - last > LEVEL_TOLERANCE * scale
-            numbers[i], last = number, value
-        if number + 1 >= MIN_GROUPS:
-            for i, k in numbers.items():
-                labels[i] = (name, k) if 0 < k < number else None
+        own = sorted((value[1], i) for i, value in enumerate(values) if value is not None and value[0] == name)
+        levels, places = zip(*own, strict=True)
+        gaps = np.diff(levels, prepend=levels[0]) > LEVEL_TOLERANCE * (np.max(np.abs(levels)) or 1.0)
+        numbers = np.cumsum(gaps).tolist()
+        if numbers[-1] + 1 >= MIN_GROUPS:
+            for i, k in zip(places, numbers, strict=True):
+                labels[i] = (name, k) if 0 < k < numbers[-1] else None
     return labels
 
 

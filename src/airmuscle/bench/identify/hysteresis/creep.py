@@ -8,6 +8,7 @@ Reference: Tschoegl, N. W., The Phenomenological Theory of Linear Viscoelastic B
 """
 
 import dataclasses
+import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -159,7 +160,7 @@ def fit_creep(recording: Recording, quantity: str) -> CreepFit:
             f"{time.size} rows."
         )
     time = time - time[0]
-    fits = [_fit_constant(values), _fit_elements(time, values, 1), _fit_elements(time, values, 2)]
+    fits = [Creep(float(np.mean(values))), _fit_elements(time, values, 1), _fit_elements(time, values, 2)]
     squares = [float(np.mean((creep.value_at(time) - values) ** 2)) for creep in fits]
     sample_size = effective_sample_size(fits[-1].value_at(time) - values)
     p_values = tuple(f_test_p_value(squares[i], squares[i + 1], sample_size, 3 + 2 * i, 2) for i in (0, 1))
@@ -169,10 +170,6 @@ def fit_creep(recording: Recording, quantity: str) -> CreepFit:
     rmse_by_order = tuple(float(np.sqrt(square)) for square in squares)
     unit = "N" if quantity == "force" else ""
     return CreepFit(fits[count], rmse_by_order[count], rmse_by_order, p_values, float(time[-1]), unit)
-
-
-def _fit_constant(values: Array) -> Creep:
-    return Creep(float(np.mean(values)))
 
 
 def _fit_elements(time: Array, values: Array, count: int) -> Creep:
@@ -247,20 +244,13 @@ def _retardation(creep: np.ndarray, times: np.ndarray, step: float, stiffness: f
     instantaneous, compliances = step / load, creep / load
     # D(s) prod(1 + s lambda_i) as a polynomial in s; its zeros are -1/tau_i
     factors = [np.poly1d([constant, 1.0]) for constant in times]
-    numerator = _product(factors) * instantaneous
+    numerator = math.prod(factors) * instantaneous
     for i, compliance in enumerate(compliances):
-        numerator = numerator + _product([f for j, f in enumerate(factors) if j != i]) * compliance
+        numerator = numerator + math.prod(factors[:i] + factors[i + 1 :], start=np.poly1d([1.0])) * compliance
     zeros = np.sort(np.real(numerator.roots))
     slopes = [-float(np.sum(compliances * times / (1.0 + zero * times) ** 2)) for zero in zeros]
     stiffnesses = [1.0 / (slope * zero) for slope, zero in zip(slopes, zeros, strict=True)]
     return CreepElements(tuple(map(float, stiffnesses)), tuple(float(-1.0 / zero) for zero in zeros))
-
-
-def _product(factors: list[np.poly1d]) -> np.poly1d:
-    result = np.poly1d([1.0])
-    for factor in factors:
-        result = result * factor
-    return result
 
 
 def _check_passive(ratios: np.ndarray) -> None:
