@@ -128,6 +128,12 @@ def test_what_stands_between_two_quotations_is_not_cut(name: str):
     )
 
 
+def test_a_message_quotes_little_of_a_path_of_thousands_of_characters(tmp_path: Path):
+    with pytest.raises(FileError, match=r"….*: cannot be written to: File name too long") as raised:
+        write_program(load_scenario("joint-dmsp-20-matrix").problem, tmp_path / ("a b " * 1500), C99())
+    assert len(str(raised.value)) < 400
+
+
 def test_a_text_of_a_page_is_not_proposed_as_the_code_of_a_missing_value(tmp_path: Path):
     (tmp_path / "a.csv").write_text("force [N],pressure [kPa]\n" + f"{'a' * 3000},1\n" * 3, encoding="utf-8")
     with pytest.raises(ColumnError, match="3 cells in 3 of 3 lines are no finite numbers") as raised:

@@ -31,7 +31,11 @@ MAX_LISTED, MAX_LISTED_NAME, MAX_LISTED_TEXT = 40, 60, 400
 """Number of names of a file that a message lists, and of characters of each and of all (chosen)."""
 MAX_WORD = 200
 """Maximum number of characters of an argument that a message quotes (chosen)."""
-_LONG_QUOTATION = re.compile(rf"\S{{{MAX_WORD + 1},}}|(?<![^\s(\[])'(?=[^\s;,.:)])[^'\n]{{{MAX_WORD + 1},}}'")
+MAX_PLACE = 600
+"""Maximum number of characters before the first colon, where the path of a file stands (chosen)."""
+_LONG_QUOTATION = re.compile(
+    rf"\A[^:\n]{{{MAX_PLACE + 1},}}(?=:)|\S{{{MAX_WORD + 1},}}|(?<![^\s(\[])'(?=[^\s;,.:)])[^'\n]{{{MAX_WORD + 1},}}'"
+)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -124,7 +128,7 @@ def printable(text: str) -> str:
 
 
 def quotable(text: str) -> str:
-    """The printable text, without the middle of words and quotations that are longer than any name."""
+    """The printable text, without the middle of words, quotations and paths that are too long."""
     return _LONG_QUOTATION.sub(lambda part: f"{part[0][: MAX_WORD - 40]}…{part[0][-39:]}", printable(text))
 
 
