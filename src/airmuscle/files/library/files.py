@@ -15,6 +15,7 @@ from ...core import (
     UnknownNameError,
     abridged,
     alternatives,
+    listed,
     one_line,
     suggestion,
     units,
@@ -173,7 +174,7 @@ def complete_name(name: str, known: Iterable[str], kind: str) -> str:
         raise UnknownNameError(f"'{one_line(name)}' is ambiguous: {', '.join(matches)}. Write more of the name.")
     if not matches:
         hint = _file_in_folder(name) or suggestion(folded, known) or _names_with(folded, known)
-        raise UnknownNameError(f"no {kind} '{one_line(name)}'; there are {', '.join(known)}.{hint}")
+        raise UnknownNameError(f"no {kind} '{one_line(name)}'; there are {listed(known)}.{hint}")
     return matches[0]
 
 
