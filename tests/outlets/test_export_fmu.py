@@ -286,12 +286,20 @@ def test_the_reference_results_are_met_with_the_inputs_beside_them(fmi, fmus, tm
         file.extractall(tmp_path)
     manifest = ElementTree.parse(tmp_path / extra / "fmi-ls-manifest.xml").getroot()
     assert manifest.get("{http://fmi-standard.org/fmi-ls-manifest}fmi-ls-name") == "org.fmi-standard.fmi-ls-ref"
-    assert {e.get("role"): e.get("source") for e in manifest} == {"testcase": "inputs.csv", "result": "results.csv"}
-    inputs, results = (np.genfromtxt(tmp_path / extra / f"{name}.csv", delimiter=",", names=True, deletechars="")
-                       for name in ("inputs", "results"))  # fmt: skip
+    sources = {e.get("role"): e.get("source") for e in manifest}
+    assert sources == {"experiment": "run.exp", "testcase": "inputs.csv", "result": "results.csv"}
+    (experiment,) = ElementTree.parse(tmp_path / extra / "run.exp").getroot()
+    span, *tables = experiment
+    assert [e.tag for e in experiment] == ["TransientSimulation", "Stimuli", "References"]
+    inputs, results = (np.genfromtxt(tmp_path / extra / e.get("source"), delimiter=",", names=True, deletechars="")
+                       for e in tables)  # fmt: skip
     columns = [name for name in results.dtype.names if name != "time"]
-    run = fmpy.simulate_fmu(str(path), fmi_type="CoSimulation", stop_time=0.5, output_interval=0.01, input=inputs,
-                            output=columns, record_events=True)  # fmt: skip
+    assert float(experiment.get("tolerance")) == 1e-9
+    run = fmpy.simulate_fmu(
+        str(path), fmi_type="CoSimulation", start_time=float(span.get("startTime")),
+        stop_time=float(span.get("stopTime")), relative_tolerance=float(experiment.get("tolerance")),
+        output_interval=0.01, input=inputs, output=columns, record_events=True,
+    )  # fmt: skip
     rows = [np.flatnonzero(np.abs(run["time"] - t) < 1e-9)[-1] for t in results["time"]]
     clear = ~np.isin(np.round(results["time"], 6), [t for t, _ in JUMPS])
     for column in columns:

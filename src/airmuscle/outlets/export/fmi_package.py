@@ -49,7 +49,7 @@ class FmuPackage:
     provenance  lines of the comment at the beginning of each file
     sources     C sources and headers by name, without those of the standard
     adjoint     whether the instance has adjoint derivatives
-    related     inputs.csv and results.csv, reference data that the manifest of FMI-LS-REF lists; or none
+    related     inputs.csv and results.csv, reference data of run.exp and the manifest of FMI-LS-REF; or none
     """
 
     about: FmuDescription
@@ -77,7 +77,9 @@ class FmuPackage:
         if fmi == 3:  # FMI 2.0 has no terminals
             files["terminalsAndIcons/terminalsAndIcons.xml"] = self.about.terminals()
         if self.related:
-            texts = {**self.related, "fmi-ls-manifest.xml": template("fmi-ls-manifest.xml")}
+            span = {key: repr(value) for key, value in dataclasses.asdict(self.about.experiment).items()}
+            run = filled("run.exp", {**span, "title": html.escape(self.about.title)}, name)
+            texts = {**self.related, "run.exp": run, "fmi-ls-manifest.xml": template("fmi-ls-manifest.xml")}
             files |= {f"{REFERENCES}/{file}": text for file, text in texts.items()}
         return {file: text.encode("utf-8", "replace") for file, text in files.items()}
 
