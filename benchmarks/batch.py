@@ -295,6 +295,8 @@ def _bars(times: dict[str, Times], numpy: Times) -> tuple[Target, ...]:
     if "simulate_batch, 2 cores" in times:
         ratio = ours.ratio_to(times["simulate_batch, 2 cores"])
         targets.append(Target("simulate_batch, 1 core / 2 cores", ratio, 1.9, "x", at_least=True, reason=BUSY_REASON))
+    ratio = ours.ratio_to(times["simulate_batch, single precision"])
+    targets.append(Target("simulate_batch, double / single precision", ratio, 1.7, "x", at_least=True))
     return tuple(targets)
 
 
