@@ -63,6 +63,7 @@ def test_two_processes_with_one_command_share_a_study(folder: Path):
     assert len(results(folder)) == 12
     assert (folder / "out" / "results.csv").read_bytes() == (folder / "alone" / "results.csv").read_bytes()
     assert not list((folder / "shared").glob("*.claim*"))
+    assert not (folder / "out" / "chunks").exists()  # the results are saved once
     assert "Tasks of the shared folder: " in (folder / "out" / "report.html").read_text(encoding="utf-8")
 
 

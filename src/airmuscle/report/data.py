@@ -11,6 +11,7 @@ in data/ alone.
 
 import csv
 import dataclasses
+import functools
 import io
 import json
 import math
@@ -23,7 +24,7 @@ import numpy as np
 from ..core import printable
 from .chapter import Chapter, Table
 from .formula import to_plain
-from .shown import rows_of, shown_columns, value_text
+from .shown import shown_columns, value_text
 
 
 def as_data(chapters: Sequence[Chapter]) -> dict[str, Any]:
@@ -125,16 +126,17 @@ def csv_text(table: Table) -> str:
     writer = csv.writer(file, lineterminator="\n")
     columns = shown_columns(table, chosen=False)
     writer.writerow([to_plain(each.heading) for each in columns])
-    writer.writerows([_csv_value(value) for value in row] for row in rows_of(columns))
+    text = functools.cache(lambda cell: printable(to_plain(cell)))  # of many runs the same
+    writer.writerows(zip(*([_csv_value(cell, text) for cell in each.cells] for each in columns), strict=True))
     return file.getvalue()
 
 
-def _csv_value(value: Any) -> Any:
+def _csv_value(value: Any, text: Callable[[str], str]) -> Any:
     """A cell of a CSV file; both ends of a range with `to` between them."""
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, str):
+        return text(value)
     if isinstance(value, tuple):
         return " to ".join(map(str, dict.fromkeys(value)))
-    if isinstance(value, bool):
-        return int(value)
-    if isinstance(value, str):
-        return printable(to_plain(value))
-    return None if isinstance(value, float) and not math.isfinite(value) else value
+    return int(value) if isinstance(value, bool) else value

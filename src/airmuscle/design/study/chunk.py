@@ -169,10 +169,11 @@ Progress = Callable[[int, int], None]
 
 
 def run_study(
-    study: Study, folder: Path | str, executor: Executor | None = None, progress: Progress | None = None
+    study: Study, folder: Path | str | None, executor: Executor | None = None, progress: Progress | None = None
 ) -> StudyResult:
     """Compute the runs that are not yet saved in `folder`/chunks, and return the result of all runs.
 
+    folder    None: nothing is saved, for an executor that keeps all results, as that of a shared folder does
     executor  any executor of concurrent.futures; by default this process itself
     progress  called with the number of completed runs and the total number of runs
 
@@ -180,30 +181,34 @@ def run_study(
     the next call resumes it. A failed run is recorded with its reason. Raises FileError if the folder cannot be written
     to, SimulationError if a worker process dies.
     """
-    chunk_folder = Path(folder) / CHUNK_FOLDER
-    check_writable(folder)
-    try:
-        chunk_folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise FileError(
-            f"{chunk_folder}: cannot be created ({error.strerror or error}). Choose a folder with write permission."
-        ) from None
+    files = _chunk_files(study, Path(folder) / CHUNK_FOLDER) if folder is not None else []
     nominal = _nominal_values(study)  # before the workers start, so that kernels are compiled only once
-    files = [chunk_folder / name for name in chunk_file_names(study)]
     chunks = {index: chunk for index, file in enumerate(files) if (chunk := read_chunk(file))}
     missing = [index for index in study.chunks if index not in chunks]
     done = len(study) - sum(len(study.chunk_runs(index)) for index in missing)
     report = progress or (lambda done, total: None)
     report(done, len(study))
-    for index, chunk in _compute_missing(study, missing, executor):
-        chunks[index] = chunk
-        if read_chunk(files[index]) is None:  # else a process that shares both folders has written it
+    study_file = str(study.path.resolve()), register_study(study)
+    for place, chunk in DistributedCalls(executor, run_chunk, study_file).completed(missing):
+        chunks[index := missing[place]] = chunk
+        if files:
             write_chunk(chunk, files[index])
         done += len(study.chunk_runs(index))
         report(done, len(study))
-    for leftover in chunk_folder.glob(".*.part"):  # of studies that were killed
-        leftover.unlink(missing_ok=True)
     return _combine(study, [chunks[index] for index in study.chunks], nominal)
+
+
+def _chunk_files(study: Study, folder: Path) -> list[Path]:
+    """The files of all chunks in a folder, which is created, without what a study that was killed has left there."""
+    check_writable(folder.parent)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        reason = error.strerror or error
+        raise FileError(f"{folder}: cannot be created ({reason}). Choose a folder with write permission.") from None
+    for leftover in folder.glob(".*.part"):
+        leftover.unlink(missing_ok=True)
+    return [folder / name for name in chunk_file_names(study)]
 
 
 def count_finished_runs(study: Study, folder: Path | str) -> int:
@@ -211,13 +216,6 @@ def count_finished_runs(study: Study, folder: Path | str) -> int:
     chunk_folder = Path(folder) / CHUNK_FOLDER
     files = enumerate(chunk_file_names(study))
     return sum(len(study.chunk_runs(index)) for index, name in files if read_chunk(chunk_folder / name) is not None)
-
-
-def _compute_missing(study: Study, missing: Sequence[int], executor: Executor | None) -> Iterator[tuple[int, Chunk]]:
-    """The missing chunks with their indices, in the order of completion."""
-    study_file = str(study.path.resolve()), register_study(study)
-    for place, chunk in DistributedCalls(executor, run_chunk, study_file).completed(missing):
-        yield missing[place], chunk
 
 
 def _nominal_values(study: Study) -> dict[str, float]:

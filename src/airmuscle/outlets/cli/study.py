@@ -1,13 +1,11 @@
 """`airmuscle study`: parameter study of a scenario."""
 
-import contextlib
-from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from ...core import AirmuscleError, SimulationError, temporary_folder
+from ...core import AirmuscleError, SimulationError, new_figure
 from ...design.study import Study, StudyResult, load_study, run_study
 from ...design.study.chapter import RESULTS_FILE, study_chapter, write_study
 from ...design.study.chunk import count_finished_runs
@@ -33,8 +31,8 @@ def study(
 
     \b
     The parameters vary on a grid or randomly. Writes DIR/results.csv (one row per run), DIR/report.html, DIR/figures/
-    and DIR/data/. Completed runs are saved in DIR/chunks: after an interruption the same command resumes the study,
-    with bit-identical results. If a run fails, results.csv states the reason.
+    and DIR/data/. Completed runs are saved in DIR/chunks, or in the folder of --join: after an interruption the same
+    command resumes the study, with bit-identical results. If a run fails, results.csv states the reason.
 
     \b
     Examples:
@@ -44,8 +42,9 @@ def study(
       airmuscle study study.toml --join /shared/study    (on each machine)
     """
     loaded, writes = load_study(file), execution.writes(out)
-    with contextlib.nullcontext(out) if writes else temporary_folder() as folder:
-        result, shares = _run(loaded, folder, execution)
+    if writes and execution.join is not None:
+        new_figure()  # imports Matplotlib while the other processes compute, which draw no figures
+    result, shares = _run(loaded, out if execution.join is None else None, execution)
     writes = writes or execution.takes_over(out)
     if writes or json:
         chapter = study_chapter(result, execution=shares)
@@ -55,33 +54,28 @@ def study(
         raise SimulationError(f"all {len(result.study)} runs failed; reason of the first: {result.failure_reasons[0]}")
 
 
-def _run(study: Study, out: Path, execution: Execution) -> tuple[StudyResult, str]:
+def _run(study: Study, folder: Path | None, execution: Execution) -> tuple[StudyResult, str]:
     """The result of the study, and a sentence on the processes that share it.
 
-    If it is aborted, a message states how many runs were saved.
+    A message states how many runs an earlier command has saved in the folder, and at an abort how many are saved.
     """
+    first = iter([True])
+
+    def show(done: int, total: int) -> None:
+        draw("runs", done, total)
+        if next(first, False) and done:
+            echo(f"resuming: {done} of {total} runs are already saved", err=True)
+
     try:
-        with _progress() as show, execution.executor(len(study.chunks)) as workers, process_pool(workers) as executor:
-            result = run_study(study, out, executor, show)
+        with (
+            counted_progress("runs") as draw,
+            execution.executor(len(study.chunks)) as workers,
+            process_pool(workers) as executor,
+        ):
+            result = run_study(study, folder, executor, show)
         return result, f"{contributions(workers)}." if isinstance(workers, SharedFolder) else ""
     except (AirmuscleError, KeyboardInterrupt):
-        if done := count_finished_runs(study, out):  # counted on disk: a run may have been completed during the abort
-            saved = f"{done} of {len(study)} runs are saved in {out / 'chunks'}"
+        if folder and (done := count_finished_runs(study, folder)):  # one may have been completed during the abort
+            saved = f"{done} of {len(study)} runs are saved in {folder / 'chunks'}"
             echo(f"{saved}; the same command resumes from there", err=True)
         raise
-
-
-@contextlib.contextmanager
-def _progress() -> Iterator[Callable[[int, int], None]]:
-    """Yield a callback (runs done, runs in total) that draws a bar, and states what an earlier command has saved."""
-    with counted_progress("runs") as show:
-        first = True
-
-        def show_runs(done: int, total: int) -> None:
-            nonlocal first
-            show("runs", done, total)
-            if done and first:
-                echo(f"resuming: {done} of {total} runs are already saved", err=True)
-            first = False
-
-        yield show_runs
