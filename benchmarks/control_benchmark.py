@@ -4,9 +4,9 @@
                                            [--results FOLDER] [--out PAGE]
 
 Each controller is tuned by three searches, commissioned on every truth and judged there; the sealed truth is one of
-them, so that it is run for the page alone. A search with its runs is a file in the folder of the results: an
-interrupted run goes on where it was, and one with more searches adds them, as long as the program and the other
-settings are the same. `--quick` is a smaller form with one search on two truths of development, for a look at a change.
+them, so that it is run for the page alone. A controller with its searches and runs is a file in the folder of the
+results: an interrupted run goes on where it was, as long as the program and the settings are the same. `--quick` is a
+smaller form with one search on two truths of development, for a look at a change.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ from airmuscle.design import (
     proportional_joint,
     standard_contenders,
 )
-from airmuscle.design.control_benchmark.benchmark import COMMISSIONING_RUNS, SETS_PER_GAIN
+from airmuscle.design.control_benchmark.commissioning import COMMISSIONING_RUNS, SETS_PER_GAIN
 
 JOINTS = {"proportional": proportional_joint, "on/off": on_off_joint}
 ON_OFF = ("PID", "feed-forward + PID", "feed-forward + sliding mode")
@@ -63,7 +63,7 @@ QUICK = Settings((1, 2), (1,), 12, 30, slow=False)
 
 @dataclasses.dataclass(frozen=True)
 class Part:
-    """The contenders of one search, one after the other, with the CPU time [s]."""
+    """The contenders that share their searches, one after the other, with the CPU time [s]."""
 
     kind: str
     results: tuple[ContenderResult, ...]
@@ -84,41 +84,34 @@ def searches(joint: BenchmarkJoint, kind: str, settings: Settings) -> list[tuple
 def measure(settings: Settings, folder: Path, processes: int, switched: int) -> list[Part]:
     """All parts, from their files where these exist; `switched` is the number of searches for on/off valves."""
     folder.mkdir(parents=True, exist_ok=True)
-    key = fingerprint(settings)
-    jobs = [
-        (
-            kind,
-            names,
-            seed,
-            settings,
-            folder / f"{kind.replace('/', '-')}-{names[0].replace(' ', '-')}-{seed}-{key}.pickle",
-        )
-        for seed in settings.seeds
-        for kind, joint in JOINTS.items()
-        for names in searches(joint(settings.truths[:1]), kind, settings)
-        if kind == "proportional" or seed in settings.seeds[:switched]
-    ]
+    jobs = []
+    for kind, joint in JOINTS.items():
+        count = switched if kind == "on/off" else len(settings.seeds)
+        own = dataclasses.replace(settings, seeds=settings.seeds[:count])
+        for names in searches(joint(settings.truths[:1]), kind, own):
+            name = f"{kind}-{names[0]}-{fingerprint(own)}.pickle".replace("/", "-").replace(" ", "-")
+            jobs.append((kind, names, own, folder / name))
     waiting = [job for job in jobs if not job[-1].exists()]
     with concurrent.futures.ProcessPoolExecutor(processes) as pool:
         pending = [pool.submit(measure_part, *job) for job in waiting]
         for done, each in enumerate(concurrent.futures.as_completed(pending), 1):
             each.result()
             if sys.stderr.isatty():
-                print(f"\rsearches: {done} of {len(waiting)}".ljust(78), end="", file=sys.stderr, flush=True)
+                print(f"\rcontrollers: {done} of {len(waiting)}".ljust(78), end="", file=sys.stderr, flush=True)
     return [pickle.loads(job[-1].read_bytes()) for job in jobs]
 
 
-def measure_part(kind: str, names: tuple[str, ...], seed: int, settings: Settings, path: Path) -> None:
-    """Write the results of one search, complete or not at all."""
+def measure_part(kind: str, names: tuple[str, ...], settings: Settings, path: Path) -> None:
+    """Write the results of contenders that share their searches, complete or not at all."""
     started, joint = time.process_time(), JOINTS[kind](settings.truths)
     contenders = [each for each in standard_contenders(joint) if each.name in names]
     found = benchmark_controllers(
-        joint, contenders, STANDARD_TASKS, seeds=(seed,), sets_per_gain=settings.sets_per_gain,
+        joint, contenders, STANDARD_TASKS, seeds=settings.seeds, sets_per_gain=settings.sets_per_gain,
         commissioning_runs=settings.commissioning_runs,
     ).results  # fmt: skip
     curve = None
-    if (kind, names[0], seed) == ("proportional", LEARNED, settings.seeds[0]):
-        curve = learn(joint, found[0], find_tasks(("sine 2 Hz",))[0], trials=31, seed=seed)
+    if (kind, names[0]) == ("proportional", LEARNED):
+        curve = learn(joint, found[0], find_tasks(("sine 2 Hz",))[0], trials=31, seed=settings.seeds[0])
     kept = tuple(map(without_recordings, found))
     staging = path.with_suffix(f".{os.getpid()}.part")
     staging.write_bytes(pickle.dumps(Part(kind, kept, curve, time.process_time() - started)))
@@ -133,9 +126,8 @@ def without_recordings(result: ContenderResult) -> ContenderResult:
 
 
 def fingerprint(settings: Settings) -> str:
-    """A text that changes with the settings other than the seeds, and with the program."""
-    alone = repr(dataclasses.replace(settings, seeds=()))
-    digest, source = hashlib.sha256(alone.encode()), Path(airmuscle.__file__).parent
+    """A text that changes with the settings and with the program."""
+    digest, source = hashlib.sha256(repr(settings).encode()), Path(airmuscle.__file__).parent
     for package in PACKAGES:
         for path in sorted((source / package).rglob("*.py")):
             digest.update(path.read_bytes())

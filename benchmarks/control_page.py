@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from airmuscle.design import SEALED_SEED, BenchmarkResult, Group, LearningCurve
-from airmuscle.design.control_benchmark.benchmark import SEARCH_SPREAD
 from airmuscle.design.control_benchmark.chapter import (
     error_table,
     order_table,
@@ -21,6 +20,7 @@ from airmuscle.design.control_benchmark.chapter import (
     search_table,
     truth_table,
 )
+from airmuscle.design.control_benchmark.commissioning import SEARCH_SPREAD
 from airmuscle.report import Table, shown_columns
 
 SINES = {0.5: 0.25, 1.0: 0.45, 2.0: 0.9, 3.0: 1.3}

@@ -17,6 +17,7 @@ ARGUMENTS = {
     "accelerations": "acceleration of each coordinate by its name [rad/s^2]",
     "axis": "axis of a joint in its frame",
     "column": "name of a column of a recording or of a plant",
+    "commands": "commands of a control law by the names of the inputs",
     "controlled": "columns that a controller leads to their set points",
     "declared": "declaration of a parameter",
     "delay": "delay of a sensor [samples]",

@@ -23,7 +23,7 @@ from airmuscle.design import (
     commission,
     standard_contenders,
 )
-from airmuscle.design.control_benchmark import Readings, alike, complete, tracking_errors
+from airmuscle.design.control_benchmark import PassedSignals, alike, complete, tracking_errors
 from airmuscle.design.tuning import with_gains
 from airmuscle.engine import Measurement
 from airmuscle.errors import ParameterError
@@ -46,9 +46,9 @@ def test_a_controller_that_is_called_meets_the_same_sensors_and_the_same_actuati
     ):
         replace(called, bounds={"gain": (1e5, 5e5)})
     with pytest.raises(ParameterError, match="commands angle; allowed are 'difference'"):
-        complete(JOINT, Contender("wrong", Called(Readings(("angle",)))))
+        complete(JOINT, Contender("wrong", Called(PassedSignals(("angle",)))))
     with pytest.raises(ParameterError, match=r"measures 'left\.force'; the joint has sensors of"):
-        complete(JOINT, Contender("wrong", Called(Readings(("left.force",)))))
+        complete(JOINT, Contender("wrong", Called(PassedSignals(("left.force",)))))
 
 
 @pytest.mark.parametrize(("late", "samples"), [(3.0, 3), (3.2, 4), (3.5, 4)])

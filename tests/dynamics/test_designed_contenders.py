@@ -32,7 +32,8 @@ from airmuscle.design.control_benchmark import (
     line_style,
     marker_style,
     run_task,
-    tune_contender,
+    search_gains,
+    tuned_law,
 )
 from airmuscle.design.tuning import with_gains
 from airmuscle.engine import ControlLoop, Measurement, Schedule, simulate
@@ -140,7 +141,8 @@ def test_the_tuning_covers_the_frequencies_that_are_judged_and_no_judged_motion(
 @pytest.mark.parametrize("name", [LQG, MPC, ADRC])
 def test_the_weights_of_a_design_are_tuned_like_gains(name: str):
     alone = dataclasses.replace(JOINT, family={"nominal": JOINT.model})
-    law, tuning = tune_contender(alone, CONTENDERS[name], seed=1, sets_per_gain=3, progress=lambda *_: None)
+    ((tuning, _),) = search_gains(alone, CONTENDERS[name].tuned_as or CONTENDERS[name], (1,), 3, lambda *_: None)
+    law = tuned_law(alone, CONTENDERS[name], 1, tuning)
     assert tuning.objective < tuning.present_objective
     (path,) = (path for path in tuning.gains if path.endswith(("permitted_angle", ".bandwidth")))
     name = path.rpartition(".")[2]

@@ -14,18 +14,21 @@ from airmuscle.control import (
     PID,
     AngleAndStiffness,
     Cascade,
+    CoContraction,
     LinearLaw,
     LinearLoop,
     Multirate,
+    ProportionalFeedback,
     RepetitiveControl,
     SmithPredictor,
     WithCommandDelay,
     WithFilter,
     WithManual,
     WithRateLimit,
+    design_adrc,
 )
 from airmuscle.design import UltimatePoint, tyreus_luyben, ziegler_nichols
-from airmuscle.engine import ControlLoop, Measurement, Rodas4, Schedule, simulate
+from airmuscle.engine import ControlLoop, Measurement, Rodas4, Schedule, SplitRange, simulate
 from airmuscle.errors import ParameterError, UnitError
 from airmuscle.physics import LinearModel
 
@@ -151,6 +154,45 @@ def test_without_saturation_tracking_changes_nothing():
         law = Cascade(outer, PID("pressure", SPLIT, 2e-6), (0.0,), (5e5,), tracking)
         runs.append(simulate(LIFT, ControlLoop(law, 5e-3, motion), duration=0.5, initial_state=state)["position"])
     assert runs[0].tolist() == runs[1].tolist()
+
+
+def test_pressures_and_their_difference_that_are_attained_while_valves_are_open():
+    """K = 2/bar opens a valve fully at 0.5 bar: from 1 bar the left pressure attains 1.5, the right one all of its."""
+    names = ("left.pressure", "right.pressure")
+    inner = ProportionalFeedback(names, tuple(SplitRange(f"{n}.fill", f"{n}.vent") for n in ("left", "right")), 2e-5)
+    wanted, measured = dict(zip(names, (3e5, 1.2e5), strict=True)), dict.fromkeys(names, 1e5)
+    given = Measurement(measured, wanted, dict.fromkeys(inner.inputs, (0.0, 1.0)))
+    attained = inner.attained(given, inner.step({}, given, H)[0])
+    assert attained == pytest.approx({"left.pressure": 1.5e5, "right.pressure": 1.2e5})
+    pair = CoContraction(names, 2.1e5)
+    both = Measurement({}, {"difference": 0.9e5}, {name: (value, value) for name, value in attained.items()})
+    commands = pair.command(both.setpoints)
+    assert commands == pytest.approx(wanted)
+    assert pair.attained(both, commands)["difference"] == pytest.approx(0.5 * (1.5e5 - 1.2e5))
+
+
+def test_an_observer_behind_a_pressure_control_predicts_with_the_attained_difference():
+    """Its memory is that of the law which could command no more; without tracking it is that of the whole command."""
+    names, law = (
+        ("left.pressure", "right.pressure"),
+        design_adrc("angle", "difference", H, order=2, gain=2e-3, bandwidth=20.0, observer_bandwidth=60.0),
+    )
+    inner = ProportionalFeedback(names, tuple(SplitRange(f"{n}.fill", f"{n}.vent") for n in ("left", "right")), 2e-5)
+    columns, wanted = {"angle": 0.0, **dict.fromkeys(names, 2e5)}, {"angle": 0.35}
+    memories = []
+    for tracking in (True, False):
+        outer = Cascade(law, CoContraction(names, 2e5), (-2e5,), (2e5,), tracking)
+        whole = Cascade(outer, inner, (0.0, 0.0), (5e5, 5e5), tracking)
+        given = Measurement(columns, wanted, dict.fromkeys(whole.inputs, (0.0, 1.0)))
+        commands, memory = whole.step(whole.init(), given, H)
+        assert commands["left.fill"] == commands["right.vent"] == 1.0
+        memories.append([value for name, value in memory.items() if name.startswith("outer.outer.")])
+    free, limited = (
+        list(law.step(law.init(), Measurement(columns, wanted, {"difference": (-end, end)}), H)[1].values())
+        for end in (2e5, 0.5e5)
+    )
+    assert memories == [pytest.approx(limited), pytest.approx(free)]
+    assert free != pytest.approx(limited, rel=1e-3)
 
 
 def test_the_integral_of_angle_and_stiffness_stops_where_the_pressures_end():

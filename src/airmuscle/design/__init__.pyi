@@ -35,7 +35,6 @@ from .control_benchmark import random_truth as random_truth
 from .control_benchmark import run_plot as run_plot
 from .control_benchmark import scenario_contender as scenario_contender
 from .control_benchmark import standard_contenders as standard_contenders
-from .control_benchmark import write_benchmark as write_benchmark
 from .sizing import SORT_KEYS as SORT_KEYS
 from .sizing import EndPoint as EndPoint
 from .sizing import JointRequirement as JointRequirement

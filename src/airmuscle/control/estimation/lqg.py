@@ -10,9 +10,8 @@ from ...physics.analysis.linear_model import LinearModel
 from ...physics.analysis.sampled_model import held
 from ..laws.state_feedback import StateFeedback
 from .riccati import (
-    DISTURBANCE,
-    check_known,
     check_numbers,
+    checked_scale,
     disturbance_observer,
     place_observer,
     regulator,
@@ -63,10 +62,11 @@ def design_lqg(
     References: Franklin, Powell and Workman (1998), chapters 8 and 9; Rawlings, Mayne and Diehl (2017), chapter 1, for
     the disturbances.
     """
-    extra = tuple(f"{name}{DISTURBANCE}" for name in disturbed)
-    _check(model, measured, controlled, permitted, permitted_integral, disturbed)
-    _check_noise(model, measured, extra, process_noise, measurement_noise)
-    scale = _scales(model, permitted, process_noise)
+    names, scale = checked_scale(
+        "design_lqg", model, {"measured": measured, "controlled": controlled}, disturbed, permitted,
+        (process_noise, measurement_noise),
+    )  # fmt: skip
+    _check_integral(controlled, permitted_integral, disturbed)
     n = len(model.states)
     a, b, by_disturbance = sampled_plant(model, sample_time, scale, np.ones(len(model.inputs)), disturbed)
     c = model.select(outputs=list(measured)).C * scale
@@ -83,14 +83,14 @@ def design_lqg(
         from_disturbance, from_setpoint = steady_target("design_lqg", a, b, by_disturbance, z)
         setpoint = from_setpoint[n:] + by_state @ from_setpoint[:n]
         by_state = np.hstack([by_state, -(from_disturbance[n:] + by_state @ from_disturbance[:n])])
-    sizes = np.concatenate([scale, np.ones(len(extra))])
-    noise = [(process_noise.get(i, 0.0) / s) ** 2 for i, s in zip((*model.states, *extra), sizes, strict=True)]
+    sizes = np.concatenate([scale, np.ones(len(disturbed))])
+    noise = [(process_noise.get(i, 0.0) / s) ** 2 for i, s in zip(names, sizes, strict=True)]
     deviations = np.array([measurement_noise[name] for name in measured])
     a, b, c, observer = disturbance_observer(
         "design_lqg", (a, b, by_disturbance, c), np.diag(noise) * sample_time, deviations
     )
     return StateFeedback(
-        tuple(measured), tuple(controlled), model.inputs, (*model.states, *extra),
+        tuple(measured), tuple(controlled), model.inputs, names,
         _flat(a * sizes[:, None] / sizes), _flat(b * sizes[:, None]), _flat(c / sizes),
         _flat(observer * sizes[:, None]), _flat(by_state / sizes), _flat(by_integral),
         tuple(model.output_values[name] for name in measured), tuple(model.input_values[name] for name in model.inputs),
@@ -148,13 +148,10 @@ def design_adrc(
     )  # fmt: skip
 
 
-def _check(
-    model: LinearModel, measured: Sequence[str], controlled: Sequence[str], permitted: Mapping[str, float],
-    permitted_integral: Mapping[str, float] | None, disturbed: Sequence[str],
-) -> None:  # fmt: skip
-    """Raise ParameterError for names or numbers that make no design."""
-    check_numbers("design_lqg", "permitted", permitted, (*model.states, *model.inputs), model.inputs)
-    check_known("design_lqg", "disturbed", disturbed, model.states)
+def _check_integral(
+    controlled: Sequence[str], permitted_integral: Mapping[str, float] | None, disturbed: Sequence[str]
+) -> None:
+    """Raise ParameterError for both or none of integral action and disturbances, or numbers that are missing."""
     if bool(permitted_integral) == bool(disturbed):
         raise ParameterError(
             "design_lqg: give either permitted_integral, for integral action, or disturbed, for an observer of "
@@ -163,25 +160,6 @@ def _check(
     check_numbers(
         "design_lqg", "permitted_integral", permitted_integral or {}, controlled, () if disturbed else controlled
     )
-    for name, row in zip(measured, model.select(outputs=list(measured)).D, strict=True):
-        if row.any():
-            raise ParameterError(
-                f"design_lqg: '{name}' depends on the inputs at once; measure states, or outputs of states."
-            )
-
-
-def _check_noise(
-    model: LinearModel, measured: Sequence[str], extra: Sequence[str], process: Mapping[str, float],
-    measurement: Mapping[str, float],
-) -> None:  # fmt: skip
-    """Raise ParameterError for noise of unknown names, or numbers that are missing or not positive."""
-    check_numbers("design_lqg", "process_noise", process, (*model.states, *extra), extra)
-    check_numbers("design_lqg", "measurement_noise", measurement, measured, measured)
-
-
-def _scales(model: LinearModel, permitted: Mapping[str, float], noise: Mapping[str, float]) -> Array:
-    """Magnitude of each state, by which the equations are scaled."""
-    return np.array([permitted.get(name, noise.get(name, max(abs(model.state[name]), 1.0))) for name in model.states])
 
 
 def _flat(matrix: Array) -> tuple[float, ...]:

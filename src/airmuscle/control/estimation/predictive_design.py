@@ -8,9 +8,8 @@ from ...core import Array, ParameterError
 from ...physics.analysis.linear_model import LinearModel
 from ..laws.linear_model_predictive import CondensedProblem, LinearModelPredictive, ObserverModel, TargetMap
 from .riccati import (
-    DISTURBANCE,
-    check_known,
     check_numbers,
+    checked_scale,
     disturbance_observer,
     regulator,
     sampled_plant,
@@ -54,16 +53,15 @@ def design_predictive(
     bounded disturbances that leave no room within a limit.
     References: Rawlings, Mayne and Diehl (2017), chapters 1, 2 and 8; Chisci, Rossiter and Zappa (2001).
     """
-    states, limits, blocks = model.states, limits or {}, tuple(blocks) or (1,) * horizon
-    names = (*states, *(f"{name}{DISTURBANCE}" for name in disturbed))
-    where, max_rate, bounded = "design_predictive", max_rate or {}, bounded or {}
-    _check(model, measured, controlled, disturbed, limits, blocks, slack_weight)
-    check_numbers(where, "permitted", permitted, (*states, *model.inputs), model.inputs)
-    check_numbers(where, "process_noise", process_noise, names, names[len(states) :])
-    check_numbers(where, "measurement_noise", measurement_noise, measured, measured)
+    where, limits, max_rate, bounded = "design_predictive", limits or {}, max_rate or {}, bounded or {}
+    states, blocks = model.states, tuple(blocks) or (1,) * horizon
+    _check(measured, disturbed, limits, blocks, slack_weight)
+    names, scale = checked_scale(
+        where, model, {"measured": measured, "controlled": controlled, "limits": tuple(limits)}, disturbed, permitted,
+        (process_noise, measurement_noise),
+    )  # fmt: skip
     check_numbers(where, "max_rate", max_rate, model.inputs, ())
     check_numbers(where, "bounded", bounded, states, ())
-    scale = np.array([permitted.get(s, process_noise.get(s, max(abs(model.state[s]), 1.0))) for s in states])
     sizes = np.array([permitted[name] for name in model.inputs])
     a, b, by_disturbance = sampled_plant(model, sample_time, scale, sizes, disturbed)
     c, z, limited = (model.select(outputs=list(part)).C * scale for part in (measured, controlled, limits))
@@ -89,20 +87,10 @@ def design_predictive(
 
 
 def _check(
-    model: LinearModel, measured: Sequence[str], controlled: Sequence[str], disturbed: Sequence[str],
-    limits: Mapping[str, tuple[float, float]], blocks: Sequence[int], slack_weight: float,
+    measured: Sequence[str], disturbed: Sequence[str], limits: Mapping[str, tuple[float, float]],
+    blocks: Sequence[int], slack_weight: float,
 ) -> None:  # fmt: skip
-    """Raise ParameterError for names, limits or numbers that make no problem."""
-    for argument, names, known in (
-        ("measured", measured, model.outputs), ("controlled", controlled, tuple(measured)),
-        ("disturbed", disturbed, model.states), ("limits", limits, model.outputs),
-    ):  # fmt: skip
-        check_known("design_predictive", argument, names, known)
-    for name, row in zip((*measured, *limits), model.select(outputs=[*measured, *limits]).D, strict=True):
-        if row.any():
-            raise ParameterError(
-                f"design_predictive: '{name}' depends on the inputs at once; use states, or outputs of states."
-            )
+    """Raise ParameterError for limits or numbers that make no problem."""
     for name, (low, high) in limits.items():
         if not -np.inf < low < high < np.inf:
             raise ParameterError(

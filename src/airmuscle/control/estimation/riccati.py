@@ -32,6 +32,33 @@ def check_numbers(
             raise ParameterError(f"{owner}: {argument} has no number for '{name}'; give one.")
 
 
+def checked_scale(
+    owner: str, model: LinearModel, columns: Mapping[str, Sequence[str]], disturbed: Sequence[str],
+    permitted: Mapping[str, float], noise: tuple[Mapping[str, float], Mapping[str, float]],
+) -> tuple[tuple[str, ...], Array]:  # fmt: skip
+    """The names of states and disturbances, and the magnitude (n,) of each state, by which equations are scaled.
+
+    columns  names by argument: `measured`, `controlled`, which are measured, and others
+    noise    standard deviations of states and disturbances after 1 s, and of measured columns
+
+    Raises ParameterError for unknown names, numbers that are missing or not positive, and direct feedthrough.
+    """
+    names = (*model.states, *(f"{name}{DISTURBANCE}" for name in disturbed))
+    check_known(owner, "disturbed", disturbed, model.states)
+    for argument, chosen in columns.items():
+        check_known(owner, argument, chosen, tuple(columns["measured"]) if argument == "controlled" else model.outputs)
+        for name, row in zip(chosen, model.select(outputs=list(chosen)).D, strict=True):
+            if row.any():
+                raise ParameterError(
+                    f"{owner}: '{name}' depends on the inputs at once; use states, or outputs of states."
+                )
+    check_numbers(owner, "permitted", permitted, (*model.states, *model.inputs), model.inputs)
+    check_numbers(owner, "process_noise", noise[0], names, names[len(model.states) :])
+    check_numbers(owner, "measurement_noise", noise[1], columns["measured"], columns["measured"])
+    sizes = [permitted.get(i, noise[0].get(i, max(abs(model.state[i]), 1.0))) for i in model.states]
+    return names, np.array(sizes)
+
+
 def check_sample_time(owner: str, sample_time: float, of_estimator: float) -> None:
     """Raise ParameterError where the sample time of the loop [s] is not that of the estimator [s]."""
     if abs(sample_time - of_estimator) > 1e-9 * sample_time:

@@ -15,7 +15,7 @@ from ...engine.compile.program import CompiledSystem, compile_system
 from ...engine.loop.control_loop import COMMAND
 from ...recording.recording import Recording
 from .estimates import BoundFilter, FilterArrays, Innovation, MeasuredRows, Pass, StateEstimate
-from .riccati import DISTURBANCE, check_known
+from .riccati import DISTURBANCE, check_known, check_numbers
 
 UNKNOWN = 1e30
 """Factor of the variance of a missing measurement."""
@@ -63,14 +63,10 @@ class StateEstimator(ShortRepr, abc.ABC):
             ("disturbances", self.disturbances, states),
         ):  # fmt: skip
             check_known(owner, argument, names, known)
-        check_known(owner, "process_noise", self.process_noise, self.states)
-        check_known(owner, "measurement_noise", self.measurement_noise, self.measured)
-        for name in self.measured:
-            if name not in self.measurement_noise:
-                raise ParameterError(f"{owner}: measurement_noise has no number for '{name}'; give one.")
-        for name, value in {**self.process_noise, **self.measurement_noise, "sample_time": self.sample_time}.items():
-            if not 0 < value < float("inf"):
-                raise ParameterError(f"{owner}: '{name}' is {value!r}; it must be positive and finite.")
+        check_numbers(owner, "process_noise", self.process_noise, self.states, ())
+        check_numbers(owner, "measurement_noise", self.measurement_noise, self.measured, self.measured)
+        if not 0 < self.sample_time < float("inf"):
+            raise ParameterError(f"{owner}: 'sample_time' is {self.sample_time!r}; it must be positive and finite.")
         if not 0.0 < self.gate <= 1.0:
             raise ParameterError(f"{owner}: gate is {self.gate!r}; allowed range: above 0, 1 (no gate) at most.")
         seen = [columns.index(name) for name in self.measured]

@@ -175,10 +175,6 @@ class AngleAndStiffness(ControlLaw):
         acceleration = {self.acceleration_setpoint: "rad/s2"} if self.acceleration_setpoint else {}
         return {"stiffness": "N m/rad", **acceleration}
 
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        return self.commanded
-
     def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
         wanted, angle = measurement.setpoints, self.inverse.coordinate
         error = wanted[angle] - measurement.columns[angle]

@@ -2,7 +2,7 @@
 
 import itertools
 from collections.abc import Mapping
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from ...core import Parameter, ParameterError, Reference, Value, alternatives, leaves, model, ops, parameter, unflatten
 from ...core.system import select_prefix, united, with_prefix
@@ -17,8 +17,9 @@ class Cascade(ControlLaw):
     `Cascade(PID("position", "pressure", ...), PID("pressure", SplitRange("fill", "discharge"), ...), (0.0,), (5e5,))`
     controls the position by the pressure. `minimum` and `maximum` are the ranges of the outer commands, in the order
     of `outer.inputs` and in SI units; the outer law sees them as the ranges of its inputs, so that it does not wind up.
-    With `tracking`, the saturation of the inner law reaches the outer one, too: while an inner command is at the end of
-    its range, the outer law sees the measured column as the end of the range of its command, and its anti-windup acts.
+    With `tracking`, the saturation of the inner law reaches the outer one, too: while the inner law cannot attain its
+    set point, because a command is at the end of its range, the outer law goes on as if it had commanded what is
+    attained, so that its anti-windup acts, or its observer predicts with it.
     Both laws are sampled at the same instants, the outer one first.
     Reference: Åström and Hägglund (1995), chapter 7.
     """
@@ -82,29 +83,12 @@ class Cascade(ControlLaw):
             select_prefix("inner.", memory), measurement._replace(setpoints=setpoints), dt
         )
         if self.tracking:
-            first = self._tracked(memory, measurement, dt, (ranges, setpoints, commands, first))
+            reached = self.inner.attained(measurement._replace(setpoints=setpoints), commands)
+            only = {name: (reached[name], reached[name]) for name in ranges}
+            _, tracked = self.outer.step(select_prefix("outer.", memory), measurement._replace(ranges=only), dt)
+            missed = sum((ops.absolute_value(reached[name] - setpoints[name]) for name in ranges), 0.0)
+            first = {name: ops.where(missed > 0.0, tracked[name], value) for name, value in first.items()}
         return dict(commands), {**with_prefix("outer.", first), **with_prefix("inner.", second)}
-
-    def _tracked(
-        self, memory: Mapping[str, Value], measurement: Measurement, dt: Value, sample: tuple[Any, Any, Any, Any]
-    ) -> dict[str, Value]:
-        """The memory of the outer law where the inner one is saturated: that of the range that it reaches."""
-        ranges, wanted, commands, first = sample
-        at_end = 0.0 > 1.0
-        for name in self.inner.inputs:
-            low, high = measurement.ranges[name]
-            at_end = ops.either(at_end, commands[name] >= high)
-            if len(self.inner.inputs) == 1:  # of several, such as those in split range, zero is rest
-                at_end = ops.either(at_end, commands[name] <= low)
-        reached = {}
-        for name in self.outer.inputs:
-            low, high = ranges[name]
-            here = ops.clip(measurement.columns[name], low, high) if name in measurement.columns else wanted[name]
-            reached[name] = (
-                ops.where(wanted[name] < here, here, low), ops.where(wanted[name] > here, here, high)
-            )  # fmt: skip
-        _, tracked = self.outer.step(select_prefix("outer.", memory), measurement._replace(ranges=reached), dt)
-        return {name: ops.where(at_end, tracked[name], value) for name, value in first.items()}
 
 
 @model
@@ -145,12 +129,8 @@ class WithFeedForward(ControlLaw):
     @property
     def initial_memory(self) -> dict[str, float]:
         """The values of both laws, with the prefixes `feed_forward.` and `feedback.`."""
-        parts = ("feed_forward", self.feed_forward), ("feedback", self.feedback)
-        return {
-            name: value
-            for prefix, law in parts
-            for name, value in with_prefix(f"{prefix}.", law.initial_memory).items()
-        }
+        first, second = self.feed_forward.initial_memory, self.feedback.initial_memory
+        return {**with_prefix("feed_forward.", first), **with_prefix("feedback.", second)}
 
     def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
         ahead, first = self.feed_forward.step(select_prefix("feed_forward.", memory), measurement, dt)

@@ -13,8 +13,8 @@ from ...engine.compile.cache.kernel import Kernel
 from ...engine.loop.controller import Measurement, MultivariableController, failure_notes
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class CondensedProblem:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class CondensedProblem(ShortRepr):
     """min 1/2 z^T H z + (f e)^T z  with limits of z_0 + z, of A z + A_e e and of the changes of z.
 
     z = (v_1, ..., v_B, s): deviations of the inputs from their target, each held over a block of samples, and one slack
@@ -44,9 +44,6 @@ class CondensedProblem:
     upper: npt.NDArray[np.bool_]
     narrowed: tuple[Array, Array]
     max_change: Array
-
-    def __repr__(self) -> str:
-        return f"CondensedProblem({self.horizon} samples, {self.inputs} inputs, {len(self.rows)} limits of columns)"
 
 
 RAWLINGS2017 = Reference(
@@ -97,8 +94,8 @@ class PredictiveMemory(NamedTuple):
         return int(self.counts[1])
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class ObserverModel:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class ObserverModel(ShortRepr):
     """Model x_(k+1) = A x_k + B u_k of states and disturbances (n + d,), y = C x, and the gain of its observer.
 
     Deviations from an operating point, where the measured columns are `measured` (p,) and the inputs `inputs` (m,);
@@ -113,12 +110,9 @@ class ObserverModel:
     inputs: Array
     input_sizes: Array
 
-    def __repr__(self) -> str:
-        return f"ObserverModel({len(self.transition)} states)"
 
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class TargetMap:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class TargetMap(ShortRepr):
     """Linear maps (n + m, d) and (n + m, q) from disturbances and set points to the steady state and its inputs.
 
     The set points are deviations from `controlled` (q,); `columns` (l, n) are the limited columns, with their limits
@@ -131,9 +125,6 @@ class TargetMap:
     columns: Array
     lower: Array
     upper: Array
-
-    def __repr__(self) -> str:
-        return f"TargetMap({len(self.controlled)} set points, {len(self.columns)} limited columns)"
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)

@@ -47,10 +47,6 @@ class SetpointCommand(OpenLoopLaw):
     def setpoints(self) -> tuple[str, ...]:
         return self.setpoint_names or self.commanded
 
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        return self.commanded
-
     def command(self, setpoints: Mapping[str, Value]) -> dict[str, Value]:
         names = zip(self.commanded, self.setpoints, strict=True)
         return {name: setpoints[setpoint] for name, setpoint in names}
@@ -77,10 +73,6 @@ class SetpointLead(OpenLoopLaw):
     @property
     def setpoints(self) -> tuple[str, ...]:
         return (self.signal, self.rate)
-
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        return (self.commanded,)
 
     def command(self, setpoints: Mapping[str, Value]) -> dict[str, Value]:
         return {self.commanded: self.share * (setpoints[self.signal] + self.lead_time * setpoints[self.rate])}
@@ -109,10 +101,6 @@ class MotionFeedForward(OpenLoopLaw):
     @property
     def setpoints(self) -> tuple[str, ...]:
         return (self.speed, self.acceleration, *((self.position,) if self.position else ()))
-
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        return (self.commanded,)
 
     def command(self, setpoints: Mapping[str, Value]) -> dict[str, Value]:
         motion = self.speed_gain * setpoints[self.speed] + self.acceleration_gain * setpoints[self.acceleration]
@@ -158,10 +146,6 @@ class FrictionFeedForward(OpenLoopLaw):
     @property
     def setpoints(self) -> tuple[str, ...]:
         return (self.speed,)
-
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        return (self.commanded,)
 
     def command(self, setpoints: Mapping[str, Value]) -> dict[str, Value]:
         return {self.commanded: self.amplitude * ops.clip(setpoints[self.speed] / self.boundary_speed, -1.0, 1.0)}

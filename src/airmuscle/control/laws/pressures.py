@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from ...core import ParameterError, Reference, Value, model, ops, parameter, select_prefix, united, with_prefix
-from ...engine.loop import Commanded, ControlLaw, Measurement, Memory, Sampled, commands, inputs_of, range_of
+from ...engine.loop import Commanded, ControlLaw, Measurement, Memory, Sampled, commands, range_of
 from ...physics.muscle.characteristic.tondu_lopez2000 import TONDU_LOPEZ_2000
 from .open_loop import OpenLoopLaw
 from .pid import ASTROM_HAGGLUND1995
@@ -45,14 +45,14 @@ class CoContraction(OpenLoopLaw):
     def signal_units(self) -> dict[str, str]:
         return {DIFFERENCE: "Pa", **({self.mean_setpoint: "Pa"} if self.mean_setpoint else {})}
 
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        return self.commanded
-
     def command(self, setpoints: Mapping[str, Value]) -> dict[str, Value]:
         mean = setpoints[self.mean_setpoint] if self.mean_setpoint else self.mean
         first, second = self.commanded
         return {first: mean + setpoints[DIFFERENCE], second: mean - setpoints[DIFFERENCE]}
+
+    def attained(self, measurement: Measurement, commands: Mapping[str, Value]) -> dict[str, Value]:
+        first, second = (ops.clip(commands[n], *measurement.ranges[n]) - commands[n] for n in self.commanded)
+        return {**measurement.setpoints, DIFFERENCE: measurement.setpoints[DIFFERENCE] + 0.5 * (first - second)}
 
 
 @model
@@ -89,10 +89,6 @@ class ProportionalFeedback(ControlLaw):
     def setpoints(self) -> tuple[str, ...]:
         return self.controlled
 
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        return tuple(name for each in self.commanded for name in inputs_of(each))
-
     def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
         result: dict[str, Value] = {}
         for name, commanded in zip(self.controlled, self.commanded, strict=True):
@@ -101,6 +97,14 @@ class ProportionalFeedback(ControlLaw):
             wanted = ops.where(ops.absolute_value(error) < self.zone, 0.0, self.gain * error)
             result |= commands(commanded, ops.clip(wanted, low, high))
         return result, {}
+
+    def attained(self, measurement: Measurement, commands: Mapping[str, Value]) -> dict[str, Value]:
+        """The set points with which the commands just reach the ends of their ranges, where they are beyond."""
+        result, gain = dict(measurement.setpoints), ops.maximum(self.gain, 1e-30)
+        for name, commanded in zip(self.controlled, self.commanded, strict=True):
+            y, (low, high) = measurement.columns[name], range_of(commanded, measurement.ranges)
+            result[name] = ops.clip(result[name], y + low / gain, y + high / gain)
+        return result
 
 
 SKOGESTAD_POSTLETHWAITE2005 = Reference(

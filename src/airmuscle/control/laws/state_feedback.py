@@ -174,10 +174,6 @@ class ComputedTorque(ControlLaw):
         return {"acceleration": "rad/s2", "stiffness": "N m/rad"}
 
     @property
-    def inputs(self) -> tuple[str, ...]:
-        return self.commanded
-
-    @property
     def _speed(self) -> str:
         return self.inverse.mechanism.coordinates[0].speed
 

@@ -145,10 +145,6 @@ class StaticFeedForward(OpenLoopLaw):
         named = {self.load_setpoint: "N", self.acceleration_setpoint: "m/s2"}
         return {name: unit for name, unit in named.items() if name}
 
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        return (self.commanded,)
-
     def command(self, setpoints: Mapping[str, Value]) -> dict[str, Value]:
         force = setpoints[self.load_setpoint] if self.load_setpoint else self.load
         if self.acceleration_setpoint:

@@ -1,4 +1,3 @@
-from .benchmark import SEARCH_SPREAD as SEARCH_SPREAD
 from .benchmark import BenchmarkResult as BenchmarkResult
 from .benchmark import BenchmarkRun as BenchmarkRun
 from .benchmark import ContenderResult as ContenderResult
@@ -8,16 +7,17 @@ from .benchmark import Spread as Spread
 from .benchmark import benchmark_contender as benchmark_contender
 from .benchmark import benchmark_controllers as benchmark_controllers
 from .benchmark import run_task as run_task
-from .benchmark import tune_contender as tune_contender
 from .chapter import benchmark_chapter as benchmark_chapter
-from .chapter import write_benchmark as write_benchmark
+from .commissioning import SEARCH_SPREAD as SEARCH_SPREAD
 from .commissioning import Commissioning as Commissioning
 from .commissioning import alike as alike
 from .commissioning import commission as commission
+from .commissioning import search_gains as search_gains
 from .commissioning import tracking_errors as tracking_errors
+from .commissioning import tuned_law as tuned_law
 from .contender_set import standard_contenders as standard_contenders
 from .contenders import Contender as Contender
-from .contenders import Readings as Readings
+from .contenders import PassedSignals as PassedSignals
 from .contenders import complete as complete
 from .contenders import scenario_contender as scenario_contender
 from .designed_controllers import joint_design_model as joint_design_model

@@ -3,7 +3,7 @@
 import dataclasses
 import enum
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,26 +12,27 @@ from ...core import Array, ParameterError, PhysicsError, ShortRepr, SimulationEr
 from ...engine.distribution import DistributedCalls
 from ...engine.loop import Controller
 from ...engine.processes import Workers, process_pool
-from ...engine.run import RungeKutta4
 from ...recording import Recording
-from ..tuning import LoopCase, RootMeanSquareError, Tuning, tune
+from ..tuning import Tuning
 from ..tuning.case import with_gains
-from .commissioning import Commissioning, alike, commission, run_loop
+from .commissioning import (
+    COMMISSIONING_RUNS,
+    SETS_PER_GAIN,
+    Commissioning,
+    Progress,
+    commission,
+    run_loop,
+    search_gains,
+    tuned_law,
+)
 from .contenders import Contender, complete
 from .joints import BenchmarkJoint
-from .signals import TrackingMetrics, task_loop, task_signals, track
-from .tasks import DEGREE, STANDARD_TASKS, TUNING_BEGIN, ControlTask
+from .signals import TrackingMetrics, task_signals, track
+from .tasks import STANDARD_TASKS, ControlTask
 from .truths import BenchmarkTruth
 
-SETS_PER_GAIN, COMMISSIONING_RUNS = 300, 60
-"""Most sets of gains for each gain of a search, and most runs of a commissioning (chosen)."""
-TUNING_INTEGRATOR = RungeKutta4(5e-4)
-"""Integrator of the searches (chosen); the median tracking index differs by less than 1e-6 from Rodas4(1e-6)."""
-SEARCH_SPREAD = 0.05
-"""Relative difference of the objectives of two searches that have converged, which a test holds (chosen)."""
 REST_TASK, REST_LIFE = "hold", 10_000.0
 """Task at whose end the joint rests, and life [h] of the busiest valve that an engineer requires there (chosen)."""
-Progress = Callable[[str, int, int], None]
 
 
 class Group(enum.StrEnum):
@@ -71,7 +72,8 @@ class ContenderResult(ShortRepr):
     """A contender with the gains of one search, and its runs.
 
     law            tuned controller of the valves behind the sensors
-    tuning         the search; None if nothing was tuned
+    tuning         the search, of a restarted one the better part; None if nothing was tuned
+    restarts       of the search, because that of another seed ended with a better objective
     commissionings by truth; empty for a contender that is not commissioned
     runs           of both groups on all truths; only those of the first truth keep their recordings
     """
@@ -82,6 +84,7 @@ class ContenderResult(ShortRepr):
     tuning: Tuning | None
     commissionings: Mapping[str, Commissioning]
     runs: Mapping[RunKey, BenchmarkRun]
+    restarts: int = 0
 
     @property
     def name(self) -> str:
@@ -105,6 +108,11 @@ class BenchmarkResult(ShortRepr):
     def truths(self) -> tuple[str, ...]:
         """The names of the truths."""
         return tuple(truth.name for truth in self.joint.truths)
+
+    @property
+    def extent(self) -> str:
+        """The numbers of searches and truths as a text."""
+        return f"{counted(len(self.seeds), 'search')} on {counted(len(self.truths), 'truth')}"
 
     @property
     def _by_name(self) -> dict[tuple[str, int], ContenderResult]:
@@ -172,106 +180,74 @@ def benchmark_controllers(
 
     joint               model, family, truths, sensors
     tasks               STANDARD_TASKS unless given
-    seeds               of the searches and of the noise: one search each
+    seeds               of the searches and of the noise: one search each, which `search_gains` may restart
     sets_per_gain       sets of gains that a search evaluates at most for each gain; it ends before where it has
                         converged. 0: none is tuned
     commissioning_runs  runs of each contender on a truth for the group `commissioned`; 0: there is none
     progress            called with the name of the present step, the number done and their number
     workers             number of processes, for several of which a script needs `if __name__ == "__main__":`, or an
-                        executor: a contender with one search is a task. The result does not depend on it
+                        executor: a contender with all its searches is a task. The result does not depend on it
 
     A run that fails has a reason and no metrics. Raises ParameterError for a contender that does not suit the joint.
     """
     _check_names("contender", [each.name for each in contenders])
     _check_names("task", [each.name for each in tasks])
     show = progress or (lambda text, done, total: None)
-    pairs = [(seed, contender) for seed in seeds for contender in contenders]
-    found: dict[tuple[int, str], ContenderResult] = {}
+    found: dict[str, tuple[ContenderResult, ...]] = {}
     with process_pool(workers) as executor:
         options = {
-            "joint": joint, "tasks": tuple(tasks), "sets_per_gain": sets_per_gain,
+            "joint": joint, "tasks": tuple(tasks), "seeds": tuple(seeds), "sets_per_gain": sets_per_gain,
             "commissioning_runs": commissioning_runs, "progress": show if executor is None else None,
         }  # fmt: skip
         distribution = DistributedCalls(executor, _benchmark_task, options)
         other = {each.name: known.name for each in contenders for known in contenders if each.tuned_as is known}
         for later in (False, True):  # those that take the gains of the others
-            due = [(seed, each) for seed, each in pairs if (each.name in other) == later]
-            work = [(seed, each, found.get((seed, other.get(each.name, "")))) for seed, each in due]
-            for i, result in distribution.completed(work):
-                found[result.seed, result.name] = dataclasses.replace(result, contender=due[i][1])
-                show(result.name, len(found), len(pairs))
-    results = tuple(found[seed, contender.name] for seed, contender in pairs)
-    return BenchmarkResult(joint, tuple(tasks), results)
+            due = [each for each in contenders if (each.name in other) == later]
+            for i, results in distribution.completed([(each, found.get(other.get(each.name, ""), ())) for each in due]):
+                found[due[i].name] = tuple(dataclasses.replace(result, contender=due[i]) for result in results)
+                show(due[i].name, len(found), len(contenders))
+    ordered = (found[contender.name][i] for i in range(len(seeds)) for contender in contenders)
+    return BenchmarkResult(joint, tuple(tasks), tuple(ordered))
 
 
-def _benchmark_task(options: Mapping[str, Any], task: tuple[int, Contender, ContenderResult | None]) -> ContenderResult:
-    seed, contender, tuned_as = task
-    return benchmark_contender(contender=contender, seed=seed, tuned_as=tuned_as, **options)
+def _benchmark_task(
+    options: Mapping[str, Any], task: tuple[Contender, tuple[ContenderResult, ...]]
+) -> tuple[ContenderResult, ...]:
+    contender, tuned_as = task
+    return benchmark_contender(contender=contender, tuned_as=tuned_as, **options)
 
 
 def benchmark_contender(
-    joint: BenchmarkJoint, contender: Contender, tasks: Sequence[ControlTask] = STANDARD_TASKS, *, seed: int = 1,
-    sets_per_gain: int = SETS_PER_GAIN, commissioning_runs: int = COMMISSIONING_RUNS, progress: Progress | None = None,
-    tuned_as: ContenderResult | None = None,
-) -> ContenderResult:  # fmt: skip
-    """A contender with one search: tuned, commissioned on each truth, and its runs.
+    joint: BenchmarkJoint, contender: Contender, tasks: Sequence[ControlTask] = STANDARD_TASKS, *,
+    seeds: Sequence[int] = (1,), sets_per_gain: int = SETS_PER_GAIN, commissioning_runs: int = COMMISSIONING_RUNS,
+    progress: Progress | None = None, tuned_as: Sequence[ContenderResult] = (),
+) -> tuple[ContenderResult, ...]:  # fmt: skip
+    """A contender with one search for each seed: tuned, commissioned on each truth, and its runs.
 
-    tuned_as  the result, with the same seed, of the contender whose gains it takes; otherwise that one is tuned here
+    tuned_as  the results, with the same seeds, of the contender whose gains it takes; otherwise that one is tuned here
     """
     progress = progress or (lambda text, done, total: None)
-    law, tuning = tune_contender(
-        joint, contender, seed=seed, sets_per_gain=sets_per_gain, progress=progress,
-        tuning=tuned_as.tuning if tuned_as else None,
-    )  # fmt: skip
-    bounds = complete(joint, contender).commissioned
-    found: dict[str, Commissioning] = {}
-    runs: dict[RunKey, BenchmarkRun] = {}
-    for i, truth in enumerate(joint.truths):
-        progress(f"{contender.name}: {truth.name}", i, len(joint.truths))
-        laws = {Group.MODELS: law}
-        if bounds and commissioning_runs:
-            found[truth.name] = commission(joint, truth, law, bounds, joint.tuning_tasks, runs=commissioning_runs)
-            laws[Group.COMMISSIONED] = with_gains(law, found[truth.name].gains)
-        for group, each in laws.items():
-            for task in tasks:
-                run = run_task(joint, truth, each, task)
-                kept = run if truth is joint.truths[0] else dataclasses.replace(run, recording=None)
-                runs[RunKey(group, truth.name, task.name)] = kept
-    return ContenderResult(contender, seed, law, tuning, found, runs)
-
-
-def tune_contender(
-    joint: BenchmarkJoint, contender: Contender, *, seed: int, sets_per_gain: int, progress: Progress,
-    tuning: Tuning | None = None,
-) -> tuple[Controller, Tuning | None]:  # fmt: skip
-    """The completed law of a contender with the gains that are best for the tuning tasks in the family of models.
-
-    tuning  the search of the contender whose gains it takes, if that is known
-    """
-    completed, other = complete(joint, contender, seed), contender.tuned_as
-    if other is not None and tuning is None:
-        _, tuning = tune_contender(joint, other, seed=seed, sets_per_gain=sets_per_gain, progress=progress)
-    if other is not None:
-        return with_gains(completed.law, alike(completed.law, tuning.gains if tuning else {})), tuning
-    if not completed.bounds or not sets_per_gain:
-        return completed.law, None
-    cases = list(_cases(joint, completed.law))
-    tuning = tune(
-        cases, completed.bounds, duration=joint.tuning_tasks[0].duration,
-        index=RootMeanSquareError({"angle": DEGREE}, TUNING_BEGIN), objective=joint.objective,
-        budget=sets_per_gain * len(completed.bounds) * len(cases), seed=seed,
-        integrator=None if joint.switching else TUNING_INTEGRATOR,
-        progress=lambda done, total: progress(f"tuning {contender.name}", done, total),
-    )  # fmt: skip
-    return with_gains(completed.law, tuning.gains), tuning
-
-
-def _cases(joint: BenchmarkJoint, law: Controller) -> Iterator[LoopCase]:
-    """The tuning tasks on all models."""
-    for task in joint.tuning_tasks:
-        loop = task_loop(joint, law, task, joint.model, joint.drivers)
-        for name, plant in joint.family.items():
-            yield LoopCase(f"{task.name}, {name}", plant, loop, joint.start(plant))
+    tunings = [(each.tuning, each.restarts) for each in tuned_as] or search_gains(
+        joint, contender.tuned_as or contender, seeds, sets_per_gain, progress
+    )
+    results = []
+    for seed, (tuning, restarts) in zip(seeds, tunings, strict=True):
+        law, bounds = tuned_law(joint, contender, seed, tuning), complete(joint, contender).commissioned
+        found: dict[str, Commissioning] = {}
+        runs: dict[RunKey, BenchmarkRun] = {}
+        for i, truth in enumerate(joint.truths):
+            progress(f"{contender.name}: {truth.name}", i, len(joint.truths))
+            laws = {Group.MODELS: law}
+            if bounds and commissioning_runs:
+                found[truth.name] = commission(joint, truth, law, bounds, joint.tuning_tasks, runs=commissioning_runs)
+                laws[Group.COMMISSIONED] = with_gains(law, found[truth.name].gains)
+            for group, each in laws.items():
+                for task in tasks:
+                    run = run_task(joint, truth, each, task)
+                    kept = run if truth is joint.truths[0] else dataclasses.replace(run, recording=None)
+                    runs[RunKey(group, truth.name, task.name)] = kept
+        results.append(ContenderResult(contender, seed, law, tuning, found, runs, restarts))
+    return tuple(results)
 
 
 def run_task(joint: BenchmarkJoint, truth: BenchmarkTruth, law: Controller, task: ControlTask) -> BenchmarkRun:
@@ -281,6 +257,11 @@ def run_task(joint: BenchmarkJoint, truth: BenchmarkTruth, law: Controller, task
     except (PhysicsError, SimulationError) as error:
         return BenchmarkRun(None, None, str(error))
     return BenchmarkRun(track(joint, truth.plant, task, task_signals(joint, task), record), record)
+
+
+def counted(number: int, noun: str) -> str:
+    """A number of things as a text."""
+    return f"{number} {noun}{'' if number == 1 else 'es' if noun.endswith('ch') else 's'}"
 
 
 def _check_names(kind: str, names: Sequence[str]) -> None:

@@ -3,13 +3,14 @@
 import dataclasses
 import math
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from ...core import Reference, cite, conversion
 from ...report.chapter import Chapter, NamedValue, Table, TableColumn
-from ...report.write import write_report
-from .benchmark import REST_LIFE, REST_TASK, BenchmarkResult, Group
+from .benchmark import REST_LIFE, REST_TASK, BenchmarkResult, Group, counted
+from .commissioning import RESTARTS, SEARCH_SPREAD
 from .learning import LearningCurve
 from .plots import benchmark_plots
 from .signals import BONE2019, METRICS, RATED_STROKES, SETTLING_BAND, STEADY_TIME
@@ -25,11 +26,6 @@ def _column(metric: str, values: Sequence[float], **declared: Any) -> TableColum
     _, unit, shown = METRICS[metric]
     factor = 1.0 if unit == shown else conversion(shown.removesuffix(ANR), unit.removesuffix(ANR)).factor
     return TableColumn([factor * value for value in values], unit, shown, **declared)
-
-
-def write_benchmark(result: BenchmarkResult, folder: Path | str, curves: Sequence[LearningCurve] = ()) -> Path:
-    """Write the report of a benchmark with tables as CSV and figures, all or none; return the path of its page."""
-    return write_report([benchmark_chapter(result, curves)], folder, title="Control benchmark")
 
 
 def benchmark_chapter(result: BenchmarkResult, curves: Sequence[LearningCurve] = ()) -> Chapter:
@@ -68,7 +64,7 @@ def ranking_table(result: BenchmarkResult, group: Group) -> Table:
     scores = result.scores(group)
     rest = {name: _at_rest(result, name, group) for name in scores}
     return Table(
-        f"ranking_{_key(group)}",
+        f"ranking_{group.name.lower()}",
         f"Ranking, {group}",
         {
             "controller": list(scores),
@@ -82,7 +78,7 @@ def ranking_table(result: BenchmarkResult, group: Group) -> Table:
         },
         "Score: geometric mean over the tasks of the rms error, divided by the smallest of the group on the same "
         f"truth, times {REST_LIFE:g} h over the life of the busiest valve in the task '{REST_TASK}' where it is "
-        f"shorter; 1 is the best in every task. {_spread_note(result)}",
+        f"shorter; 1 is the best in every task. Over {result.extent}.",
         brief=len(scores),
     )  # fmt: skip
 
@@ -95,7 +91,7 @@ def order_table(result: BenchmarkResult, group: Group) -> Table:
     columns: dict[str, Any] = {"better": names}
     columns |= {f"than {b}": [rows[a][j] if a != b else None for a in names] for j, b in enumerate(names)}
     return Table(
-        f"order_{_key(group)}", f"Order, {group}", columns,
+        f"order_{group.name.lower()}", f"Order, {group}", columns,
         f"Number of truths, of {len(result.truths)}, on which every search of a controller has a smaller score than "
         "every search of another one.",
     )  # fmt: skip
@@ -110,8 +106,8 @@ def error_table(result: BenchmarkResult, metric: str, group: Group) -> Table:
     name = METRICS[metric][0]
     title = f"RMS{name[3:]}" if name.startswith("rms") else name.capitalize()
     return Table(
-        f"{metric}_{_key(group)}", f"{title}, {group}", columns,
-        f"Median over searches and truths, from the beginning of the judged time of each task. {_spread_note(result)}",
+        f"{metric}_{group.name.lower()}", f"{title}, {group}", columns,
+        f"Median over searches and truths, from the beginning of the judged time of each task. Over {result.extent}.",
         brief=MAX_BRIEF,
     )  # fmt: skip
 
@@ -129,6 +125,7 @@ def search_table(result: BenchmarkResult) -> Table | None:
         "gains": [len(found[0].ranges) for found in searches.values()],
         "sets of gains": [max(len(each.history) for each in found) for found in searches.values()],
         "converged": [f"{sum(each.converged for each in found)} of {len(found)}" for found in searches.values()],
+        "restarts": [sum(each.restarts for each in tuned if each.name == name) for name in names],
         "objective": _column("rmse", [sorted(values)[len(values) // 2] for values in best.values()]),
         "spread": TableColumn([max(v) / min(v) - 1.0 if v[1:] else None for v in best.values()], "1", "%"),
     }
@@ -136,7 +133,8 @@ def search_table(result: BenchmarkResult) -> Table | None:
         "searches", "Searches", columns,
         f"For {len(result.joint.family)} models, none of which is a truth; seeds {', '.join(map(str, result.seeds))}. "
         f"Objective: {result.joint.objective}, median over the seeds; spread: largest over smallest. A search has "
-        "converged where its two best descents agree.",
+        f"converged where its two best descents agree. Where two seeds differ by more than {100 * SEARCH_SPREAD:g} %, "
+        f"the worst one is restarted, at most {RESTARTS} times.",
     )  # fmt: skip
 
 
@@ -216,10 +214,6 @@ def _rows(
     return Table(key, title, columns, shown=shown) if rows else None
 
 
-def _key(group: Group) -> str:
-    return group.name.lower()
-
-
 def _at_rest(result: BenchmarkResult, name: str, group: Group) -> tuple[float, float]:
     """Median strokes [1/s] and valve life [h] at rest; NaN without the task."""
     if REST_TASK not in [task.name for task in result.tasks]:
@@ -234,19 +228,7 @@ def _mean(result: BenchmarkResult, name: str, metric: str, group: Group) -> floa
 
 
 def _completed(result: BenchmarkResult, name: str, group: Group) -> float:
-    runs = [
-        run.metrics is not None
-        for each in result.results
-        if each.name == name
-        for key, run in each.runs.items()
-        if key.group is group
-    ]
-    return sum(runs) / len(runs)
-
-
-def _spread_note(result: BenchmarkResult) -> str:
-    searches, truths = len(result.seeds), len(result.truths)
-    return f"Over {searches} search{'es' if searches != 1 else ''} on {truths} truth{'s' if truths != 1 else ''}."
+    return float(np.isfinite([result.values(name, task.name, "rmse", group) for task in result.tasks]).mean())
 
 
 def _summary(result: BenchmarkResult) -> list[str]:
@@ -254,8 +236,8 @@ def _summary(result: BenchmarkResult) -> list[str]:
     number = len({each.name for each in result.results})
     best = (f"Smallest score, {group}: {next(iter(result.scores(group)))}." for group in result.groups)
     return [
-        f"{_counted(number, 'controller')}, {_counted(len(result.tasks), 'task')}, "
-        f"{_counted(len(joint.truths), 'truth')}. {' '.join(best)} Valves: {joint.valve}. Sampled every "
+        f"{counted(number, 'controller')}, {counted(len(result.tasks), 'task')}, "
+        f"{counted(len(joint.truths), 'truth')}. {' '.join(best)} Valves: {joint.valve}. Sampled every "
         f"{joint.sample_time * 1e3:g} ms.",
         "Every controller is tuned by the same optimiser, with at most the same number of sets of gains for each "
         "gain, for perturbed models. In the group 'commissioned' it has then as many runs on the truth as every other "
@@ -263,10 +245,6 @@ def _summary(result: BenchmarkResult) -> list[str]:
         "the models. The measurements have the resolution of a 12-bit encoder, noise and dead time, of which a part "
         "is unknown.",
     ]
-
-
-def _counted(number: int, noun: str) -> str:
-    return f"{number} {noun}{'s' if number != 1 else ''}"
 
 
 def _references(result: BenchmarkResult) -> tuple[Reference, ...]:

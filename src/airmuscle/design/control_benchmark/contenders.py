@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
 
-from ...control.laws import Cascade, CoContraction, ProportionalFeedback, SetpointCommand
+from ...control.laws import Cascade, CoContraction, ProportionalFeedback
 from ...control.laws.pressures import DIFFERENCE
-from ...core import ParameterError, Value, check_field_types, leaves, model, one_line
+from ...core import ParameterError, Value, check_field_types, leaves, model, one_line, ops, united
 from ...engine.loop import ControlLaw, Controller, Measurement, Memory, Sampled, SigmaDelta, SplitRange, WithSensors
 from ...engine.run.compiled_law import LawSample
 from ..tuning import load_scenario_loop
@@ -21,25 +21,37 @@ COMMANDED = "commanded."
 
 
 @model
-class Readings(ControlLaw):
-    """The measured columns themselves as commands, so that sensors in front of it deliver their readings."""
+class PassedSignals(ControlLaw):
+    """Measured columns as commands, and set points `commanded.<input>` as commands that are limited and remembered.
+
+    Sensors in front of it deliver their readings. In a `Cascade` with tracking it remembers what the inner law attains.
+    """
 
     from_file: ClassVar[bool] = False
 
-    columns: tuple[str, ...]
-    setpoints: ClassVar[tuple[str, ...]] = ()
-    initial_memory: ClassVar[Mapping[str, float]] = {}
+    columns: tuple[str, ...] = ()
+    commanded: tuple[str, ...] = ()
 
     @property
     def measured_columns(self) -> tuple[str, ...]:
         return self.columns
 
     @property
+    def setpoints(self) -> tuple[str, ...]:
+        return tuple(f"{COMMANDED}{name}" for name in self.commanded)
+
+    @property
     def inputs(self) -> tuple[str, ...]:
-        return self.columns
+        return (*self.columns, *self.commanded)
+
+    @property
+    def initial_memory(self) -> dict[str, float]:
+        return dict.fromkeys(self.commanded, 0.0)
 
     def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
-        return {name: measurement.columns[name] for name in self.columns}, {}
+        wanted, ranges = measurement.setpoints, measurement.ranges
+        applied = {name: ops.clip(wanted[f"{COMMANDED}{name}"], *ranges[name]) for name in self.commanded}
+        return {**{name: measurement.columns[name] for name in self.columns}, **applied}, applied
 
 
 class SensedMemory(NamedTuple):
@@ -56,7 +68,8 @@ class SensedController(Controller):
     """A controller that is no control law, with sensors in front of it and the actuation behind it.
 
     controller  commands half the pressure difference, both pressures, or the valves
-    actuation   law from these commands, as set points `commanded.<input>`, to the valves
+    actuation   law from these commands, as set points `commanded.<input>`, to the valves, which remembers them as they
+                are attained: the controller goes on as if it had commanded those
     ranges      minimum and maximum [SI] of the controller's commands; those of the plant unless given
     sensors     of all columns that controller and actuation measure
     stuck       a valve that sticks
@@ -103,6 +116,12 @@ class SensedController(Controller):
         commands, own = self.controller.step(memory.controller, seen, dt)
         points = {**measurement.setpoints, **{f"{COMMANDED}{name}": value for name, value in commands.items()}}
         valves, actuation = act.step(memory.actuation, seen._replace(setpoints=points), dt)
+        memories = zip(self.actuation.initial_memory, actuation, strict=True)
+        applied = {f".{key}".rpartition("outer.")[2].removeprefix("."): value for key, value in memories}
+        attained = {name: applied[name] for name in commands}
+        if any(abs(attained[name] - value) > 1e-9 * abs(value) for name, value in commands.items()):
+            only = {**seen.ranges, **{name: (value, value) for name, value in attained.items()}}
+            _, own = self.controller.step(memory.controller, seen._replace(ranges=only), dt)
         if self.stuck is not None and (memory.samples + 1e-6) * dt > self.stuck.time:
             valves = {**valves, self.stuck.input: self.stuck.opening}
         return valves, SensedMemory(sensors, own, actuation, memory.samples + 1)
@@ -110,17 +129,6 @@ class SensedController(Controller):
     def notes(self, memory: SensedMemory) -> tuple[str, ...]:
         """The remarks of the controller."""
         return self.controller.notes(memory.controller)
-
-
-def sensed(
-    controller: Controller, actuation: ControlLaw, ranges: Mapping[str, tuple[float, float]], sensors: tuple[Any, ...],
-    seed: int,
-) -> SensedController:  # fmt: skip
-    """A controller behind the sensors of the columns that it and the actuation measure."""
-    columns = tuple(dict.fromkeys((*controller.measured_columns, *actuation.measured_columns)))
-    known = {sensor.column: sensor for sensor in sensors}
-    chosen = tuple(known[name] for name in columns)
-    return SensedController(controller, actuation, ranges, WithSensors(Readings(columns), chosen, float(seed)))
 
 
 BAR = 1e5
@@ -183,22 +191,22 @@ def complete(joint: BenchmarkJoint, contender: Contender, seed: int = 1) -> Comp
     Raises ParameterError for a law that commands other inputs, or measures a column without a sensor.
     """
     _check_columns(joint, contender)
-    ranges = contender.bounds, contender.commissioned
+    ranges, known = (contender.bounds, contender.commissioned), {sensor.column: sensor for sensor in joint.sensors}
     if isinstance(contender.law, ControlLaw):
         law, prefix, own = _actuated(joint, contender.law, contender.name)
-        known = {sensor.column: sensor for sensor in joint.sensors}
         sensors = tuple(known[name] for name in law.measured_columns)
         tuned, commissioned = (_within(f"law.{prefix}", bounds) for bounds in ranges)
         return CompleteLaw(WithSensors(law, sensors, float(seed)), {**tuned, **_within("law.", own)}, commissioned)
     inputs = contender.law.inputs
-    stand_in = SetpointCommand(inputs, tuple(f"{COMMANDED}{name}" for name in inputs))
-    law, _, own = _actuated(joint, stand_in, contender.name)
+    law, _, own = _actuated(joint, PassedSignals((), inputs), contender.name)
     tuned, commissioned = (_within("controller.", bounds) for bounds in ranges)
     span = joint.pressure_span
     limits = dict.fromkeys(joint.pressures, (joint.min_pressure, joint.max_pressure)) | {DIFFERENCE: (-span, span)}
     limited = {name: limits[name] for name in inputs if name in limits}
     tuned = {**tuned, **_within("actuation.", own)} if tuned else {}
-    return CompleteLaw(sensed(contender.law, law, limited, joint.sensors, seed), tuned, commissioned)
+    columns = united(contender.law.measured_columns, law.measured_columns)
+    sense = WithSensors(PassedSignals(columns), tuple(known[name] for name in columns), float(seed))
+    return CompleteLaw(SensedController(contender.law, law, limited, sense), tuned, commissioned)
 
 
 def _check_columns(joint: BenchmarkJoint, contender: Contender) -> None:
@@ -212,16 +220,16 @@ def _check_columns(joint: BenchmarkJoint, contender: Contender) -> None:
 
 def _actuated(joint: BenchmarkJoint, law: ControlLaw, name: str) -> tuple[ControlLaw, str, Bounds]:
     """A law with the parts from its commands to the valves, the prefix of its parameters, and ranges of the parts."""
-    prefix, ranges = "", dict[str, tuple[float, float]]()
+    prefix, ranges, tracking = "", dict[str, tuple[float, float]](), not joint.switching
     if law.inputs == (DIFFERENCE,):
         span = (joint.pressure_span,)
-        law = Cascade(law, CoContraction(joint.pressures, 0.0, "mean_pressure"), (-span[0],), span)
+        law = Cascade(law, CoContraction(joint.pressures, 0.0, "mean_pressure"), (-span[0],), span, tracking)
         prefix = "outer."
     if set(law.inputs) == set(joint.pressures):
         valves = tuple(SplitRange(f"{side}.fill", f"{side}.discharge") for side in SIDES)
         start = (10.0 / BAR, 0.02 * BAR) if joint.switching else (2.0 / BAR, 0.0)
         inner = ProportionalFeedback(joint.pressures, valves, *start)
-        law = Cascade(law, inner, (joint.min_pressure,) * 2, (joint.max_pressure,) * 2)
+        law = Cascade(law, inner, (joint.min_pressure,) * 2, (joint.max_pressure,) * 2, tracking)
         prefix, ranges = f"outer.{prefix}", {"inner.gain": joint.pressure_gains}
         if joint.switching:
             law = SigmaDelta(law)

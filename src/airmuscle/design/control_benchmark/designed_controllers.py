@@ -220,12 +220,10 @@ class AlongMotion(Controller):
         angles = (*memory.angles, measurement.setpoints["angle"])[-self.delay - 1 :]
         deviation = measurement.columns["angle"] - angles[0]
         low, high = measurement.ranges[DIFFERENCE]
-        forward_command = min(max(float(ahead[DIFFERENCE]), low), high)
-        seen = Measurement(
-            {READING: deviation}, {READING: 0.0}, {DIFFERENCE: (low - forward_command, high - forward_command)}
-        )
+        command = float(ahead[DIFFERENCE])
+        seen = Measurement({READING: deviation}, {READING: 0.0}, {DIFFERENCE: (low - command, high - command)})
         back, later = self.design.predictive.step(memory.controller, seen, dt)
-        return {DIFFERENCE: forward_command + back[DIFFERENCE]}, MotionMemory(forward, later, angles)
+        return {DIFFERENCE: command + back[DIFFERENCE]}, MotionMemory(forward, later, angles)
 
     def notes(self, memory: MotionMemory) -> tuple[str, ...]:
         """The remarks of the designed controller."""

@@ -55,8 +55,8 @@ def error_plot(result: BenchmarkResult, group: Group = Group.MODELS) -> Plot:
         which(lambda value, _: f"{value:g}" if f"{value:.0e}"[0] in "125" else "")
     legend_below(figure, axis, columns=3)
     caption = (
-        f"Error in each task with {result.joint.name}, {group}: median and range over {len(result.seeds)} searches and "
-        f"{len(result.truths)} truths; {result.joint.valve}."
+        f"Error in each task with {result.joint.name}, {group}: median and range over {result.extent}; "
+        f"{result.joint.valve}."
     )
     return Plot(f"errors_{group.name.lower()}", caption, figure)
 

@@ -1,9 +1,10 @@
 """Signals of a task, and the metrics of its run."""
 
 import dataclasses
+import functools
 import math
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -55,11 +56,19 @@ class TaskSignals(NamedTuple):
 
 
 def task_signals(joint: BenchmarkJoint, task: ControlTask) -> TaskSignals:
-    """The signals of a task at the sampling instants of a joint."""
+    """The signals of a task at the sampling instants of a joint; kept, because every run of the task needs them."""
+    try:
+        hash(task)
+    except TypeError:  # a motion of a user may have no hash
+        return _signals(joint, task)
+    return _kept_signals(joint, task)
+
+
+def _signals(joint: BenchmarkJoint, task: ControlTask) -> TaskSignals:
     h = joint.sample_time
     time: Array = h * np.arange(round(task.duration / h) + 2, dtype=float)
     angle, speed, acceleration = task.motion.at(time)
-    mean = joint.mean_pressure + interpolated(task.stiffening, time)
+    mean = joint.mean_pressure + np.interp(time, *np.array(task.stiffening or ((0.0, 0.0),)).T)
     half = inverse_dynamics(joint, joint.model, task.motion, time, mean)
     ahead = inverse_dynamics(joint, joint.model, task.motion, time + 0.5 * h, mean)
     behind = inverse_dynamics(joint, joint.model, task.motion, time - 0.5 * h, mean)
@@ -68,12 +77,7 @@ def task_signals(joint: BenchmarkJoint, task: ControlTask) -> TaskSignals:
     return TaskSignals(time, angle, speed, acceleration, mean, half, rate, stiffness)
 
 
-def interpolated(points: Sequence[tuple[float, float]], time: Array) -> Array:
-    """Values at times (N,) of a function through points (time, value), 0 without points."""
-    if not points:
-        return np.zeros_like(time)
-    times, values = np.array(points).T
-    return np.asarray(np.interp(time, times, values))
+_kept_signals = functools.lru_cache(maxsize=128)(_signals)
 
 
 def stiffness_of(plant: Plant, first: Array, second: Array, angle: Array) -> Array:
@@ -99,23 +103,12 @@ def inverse_dynamics(joint: BenchmarkJoint, plant: Plant, motion: JointMotion, t
     difference by bisection within the range of the joint. A motion beyond the range receives the limit.
     """
     angle, speed, acceleration = motion.at(time)
-    mechanism, lengths = plant.mechanism, plant.resting_lengths
-    name, rate = mechanism.coordinates[0].name, mechanism.coordinates[0].speed
-    q, v = {name: angle}, {rate: speed}
-    rest = dict.fromkeys((each.name for each in mechanism.inputs), 0.0)
-    free, driven = (mechanism.acceleration(q, v, {name: torque}, rest)[name] for torque in (0.0, 1.0))
+    free, driven = (_acceleration(plant, angle, speed, torque) for torque in (0.0, 1.0))
     wanted = (acceleration - free) / (driven - free)
-    contractions = mechanism.contractions(q, lengths)
-    beside = [mechanism.contractions({name: angle + side * ANGLE_STEP}, lengths) for side in (0.5, -0.5)]
-    shortening = [length * (b - a) / ANGLE_STEP * speed for length, b, a in zip(lengths, *beside, strict=True)]
     low, high = np.full(time.shape, -joint.pressure_span), np.full(time.shape, joint.pressure_span)
     for _ in range(BISECTIONS):
         half = 0.5 * (low + high)
-        tensions = [
-            static_force(muscle, p, c) - muscle.damper.force(p, c, u)
-            for muscle, p, c, u in zip(plant.muscles, (mean + half, mean - half), contractions, shortening, strict=True)
-        ]
-        below = mechanism.generalised_forces(q, tensions, lengths)[name] < wanted
+        below = _torque(plant, angle, speed, mean + half, mean - half) < wanted
         low, high = np.where(below, half, low), np.where(below, high, half)
     return np.asarray(0.5 * (low + high))
 
@@ -123,19 +116,29 @@ def inverse_dynamics(joint: BenchmarkJoint, plant: Plant, motion: JointMotion, t
 def angular_acceleration(joint: BenchmarkJoint, plant: Plant, angle: float, speed: float, half: float) -> float:
     """Acceleration [rad/s2] of a plant without friction at an angle [rad], a speed [rad/s] and half a pressure
     difference [Pa] about the mean pressure."""
-    mechanism, lengths = plant.mechanism, plant.resting_lengths
-    name, rate = mechanism.coordinates[0].name, mechanism.coordinates[0].speed
-    q, rest = {name: angle}, dict.fromkeys((each.name for each in mechanism.inputs), 0.0)
-    beside = [mechanism.contractions({name: angle + side * ANGLE_STEP}, lengths) for side in (0.5, -0.5)]
+    torque = _torque(plant, angle, speed, joint.mean_pressure + half, joint.mean_pressure - half)
+    return float(_acceleration(plant, angle, speed, torque))
+
+
+def _acceleration(plant: Plant, angle: Any, speed: Any, torque: Any) -> Any:
+    """Acceleration [rad/s2] of the joint under a torque of the muscles [N m]."""
+    coordinate, inputs = plant.mechanism.coordinates[0], {each.name: 0.0 for each in plant.mechanism.inputs}
+    return plant.mechanism.acceleration(
+        {coordinate.name: angle}, {coordinate.speed: speed}, {coordinate.name: torque}, inputs
+    )[coordinate.name]
+
+
+def _torque(plant: Plant, angle: Any, speed: Any, first: Any, second: Any) -> Any:
+    """Torque of both muscles [N m] with their dampers and without friction, at their gauge pressures [Pa]."""
+    mechanism, lengths, name = plant.mechanism, plant.resting_lengths, plant.mechanism.coordinates[0].name
+    here, ahead, behind = (mechanism.contractions({name: angle + i * ANGLE_STEP}, lengths) for i in (0.0, 0.5, -0.5))
     tensions = [
         static_force(muscle, p, c) - muscle.damper.force(p, c, length * (b - a) / ANGLE_STEP * speed)
-        for muscle, p, c, length, b, a in zip(
-            plant.muscles, (joint.mean_pressure + half, joint.mean_pressure - half),
-            mechanism.contractions(q, lengths), lengths, *beside, strict=True,
+        for muscle, length, p, c, b, a in zip(
+            plant.muscles, lengths, (first, second), here, ahead, behind, strict=True
         )
     ]  # fmt: skip
-    torque = mechanism.generalised_forces(q, tensions, lengths)[name]
-    return float(mechanism.acceleration(q, {rate: speed}, {name: torque}, rest)[name])
+    return mechanism.generalised_forces({name: angle}, tensions, lengths)[name]
 
 
 def task_loop(

@@ -25,6 +25,16 @@ class ControlLaw(Controller):
     A controller that cannot be written in this way derives from Controller, and is called at each sample.
     """
 
+    if TYPE_CHECKING:  # a field of a law that does not define its inputs
+
+        @property
+        def commanded(self) -> "Commanded | tuple[Commanded, ...]":
+            """The inputs, or pairs of inputs in split range, that the law commands."""
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        return inputs_of(self.commanded)
+
     @property
     @abc.abstractmethod
     def initial_memory(self) -> Mapping[str, float]:
@@ -36,6 +46,20 @@ class ControlLaw(Controller):
     @abc.abstractmethod
     def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
         """The command of every input until the next sample, `dt` [s] later, and the memory for that sample."""
+
+    def attained(self, measurement: Measurement, commands: Mapping[str, Value]) -> Mapping[str, Value]:
+        """The set points to which the commands belong as their ranges limit them, for a law that gives the set points.
+
+        Unless a law knows more, the measured column while a command is at the end of its range.
+        """
+        at_end = 0.0 > 1.0
+        for name in self.inputs:
+            low, high = measurement.ranges[name]
+            at_end = ops.either(at_end, commands[name] >= high)
+            if len(self.inputs) == 1:  # of several, such as those in split range, zero is rest
+                at_end = ops.either(at_end, commands[name] <= low)
+        here = {**measurement.setpoints, **measurement.columns}
+        return {name: ops.where(at_end, here[name], value) for name, value in measurement.setpoints.items()}
 
 
 class EnclosingLaw(ControlLaw):
@@ -106,8 +130,10 @@ class SplitRange:
 Commanded = str | SplitRange
 
 
-def inputs_of(commanded: Commanded) -> tuple[str, ...]:
+def inputs_of(commanded: Commanded | tuple[Commanded, ...]) -> tuple[str, ...]:
     """The commanded inputs."""
+    if isinstance(commanded, tuple):
+        return tuple(name for each in commanded for name in inputs_of(each))
     return (commanded,) if isinstance(commanded, str) else (commanded.positive, commanded.negative)
 
 
@@ -138,10 +164,6 @@ class SisoController(ControlLaw):
     @property
     def setpoints(self) -> tuple[str, ...]:
         return (self.measured,)
-
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        return inputs_of(self.commanded)
 
 
 INOSE1962 = Reference(

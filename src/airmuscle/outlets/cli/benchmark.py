@@ -5,8 +5,9 @@ from pathlib import Path
 
 from ...core import InputError, SimulationError, alternatives
 from ...design.control_benchmark import Contender, LearningCurve, learn, scenario_contender, standard_contenders
-from ...design.control_benchmark.benchmark import COMMISSIONING_RUNS, BenchmarkResult, benchmark_controllers
+from ...design.control_benchmark.benchmark import BenchmarkResult, benchmark_controllers
 from ...design.control_benchmark.chapter import benchmark_chapter
+from ...design.control_benchmark.commissioning import COMMISSIONING_RUNS
 from ...design.control_benchmark.joints import BenchmarkJoint, on_off_joint, proportional_joint
 from ...design.control_benchmark.tasks import find_tasks
 from ...design.control_benchmark.truths import TRUTH_SEEDS
