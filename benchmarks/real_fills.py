@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
+import math
 import pathlib
 import time
 
@@ -149,6 +150,16 @@ def noise_floor(recording: am.Recording, width: int = 11) -> tuple[float, float]
     return float(np.sqrt(np.mean(squares))), float(np.sqrt(np.mean(slope**2) / 12)) * 1e-3
 
 
+def sensor_noise(recording: am.Recording, begin: float, end: float) -> list[float]:
+    """Standard deviation [Pa] about a straight line between two times [s], and of the differences of second, third and
+    fourth order, divided by the root of the sum of their squared binomial coefficients: white noise gives one value."""
+    rows = (recording["time"] >= begin) & (recording["time"] < end)
+    time, pressure = recording["time"][rows], recording["pressure"][rows]
+    line = np.polyval(np.polyfit(time, pressure, 1), time)
+    differences = [np.diff(pressure, order) / np.sqrt(math.comb(2 * order, order)) for order in (2, 3, 4)]
+    return [float(np.std(each)) for each in (pressure - line, *differences)]
+
+
 def make_experiment(start_plant: am.Plant, recording: am.Recording, wall: bool = False) -> Experiment:
     """The fill as an experiment that starts at the first row that differs from the initial pressure."""
     pressure, first = recording["pressure"], float(np.median(recording["pressure"][:2]))
@@ -234,6 +245,10 @@ def main() -> None:
         print(f"segments of the tube: {model.plant.circuit.tube.segment_count}")
         noise, timing = noise_floor(recording)
         later = fit.residuals()[model.sensor][recording["time"] >= 0.1]
+        for begin, end in ((0.1, END), (2.0 * END, 6.0 * END)):
+            if am.read_csv(path)["time"][-1] > end - 0.1:
+                found = ", ".join(f"{each / 1e3:.2f}" for each in sensor_noise(am.read_csv(path), begin, end))
+                print(f"{begin:g} to {end:g} s: deviation from a line, differences of order 2, 3, 4: {found} kPa")
         print(f"noise {noise / 1e3:.2f} kPa, by resolution of the times {timing / 1e3:.2f} kPa; residual of the last "
               f"plant after 0.1 s {np.sqrt(np.mean(later**2)) / 1e3:.2f} kPa")  # fmt: skip
     for wall in (False, True):

@@ -80,6 +80,14 @@ def test_the_plant_of_a_dynamic_fit_has_the_ambient_air_of_its_record(tmp_path):
     assert load_scenario(tmp_path / "fitted.toml").plant.ambient == Ambient(8e4, 303.15)
 
 
+def test_a_dynamic_fit_says_which_ambient_pressure_is_supposed(tmp_path):
+    write(tmp_path, "")
+    supposed = load_dynamic_fit(study(tmp_path, PLANT + STUDY)).fit()
+    assert any(note.startswith("No record states the ambient pressure: 101.3 kPa") for note in supposed.notes)
+    stated = PLANT + '[plant.ambient]\nmodel = "Ambient"\npressure = "95 kPa"\n' + STUDY
+    assert not any("ambient" in note for note in load_dynamic_fit(study(tmp_path, stated)).fit().notes)
+
+
 def test_another_ambient_pressure_in_the_file_of_the_study_is_refused(tmp_path):
     write(tmp_path)
     setup = load_dynamic_fit(

@@ -276,6 +276,11 @@ def describe_other_ambient(plant: System, experiment: Experiment) -> list[str]:
     return [f"the ambient air is that of the record, {texts[0]}; the plant was identified at {texts[1]}"]
 
 
+def has_standard_ambient(plant: System) -> bool:
+    """Whether the ambient pressure of a plant is the standard one, which it has where none is stated."""
+    return bool(getattr(getattr(plant, "ambient", None), "pressure", None) == Ambient().pressure)
+
+
 def describe_ambient(recordings: Sequence[Recording]) -> list[str]:
     """What is supposed of the ambient air of records that state no pressure, as sentences."""
     silent = [recording.origin for recording in recordings if "ambient" not in recording.constants]
@@ -285,6 +290,6 @@ def describe_ambient(recordings: Sequence[Recording]) -> list[str]:
     some = f"{', '.join(silent)} {'does' if len(silent) == 1 else 'do'} not state"
     which = "No record states" if len(silent) == len(recordings) else some
     return [
-        f"{which} the ambient pressure: {standard} are supposed; an error of 5 % of it changes the heat transfer by "
-        "about 20 %."
+        f"{which} the ambient pressure: {standard} are supposed; an error of 5 % of it changes a fitted heat "
+        "transfer by about 20 %."
     ]

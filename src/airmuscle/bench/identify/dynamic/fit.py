@@ -16,7 +16,15 @@ from ....recording.columns import displayed
 from ..identifiability import analyse_identifiability
 from ..model_evidence import EQUIVALENT, aicc, lag_one_autocorrelation
 from ..result import Estimate
-from .experiment import Experiment, ParameterPaths, RecordUnknown, check_ambient, make_unknowns
+from .experiment import (
+    Experiment,
+    ParameterPaths,
+    RecordUnknown,
+    check_ambient,
+    describe_ambient,
+    has_standard_ambient,
+    make_unknowns,
+)
 from .levenberg_marquardt import LevenbergMarquardt
 from .problem import MAX_RUNS, DynamicFitProblem
 from .record_model import RecordModel, count_readings, separate_residuals
@@ -188,6 +196,7 @@ def _build_result(problem: DynamicFitProblem, searches: Array, costs: Array) -> 
         *describe_bounds(estimates, jacobian, inverse, on_bound, problem.scales, problem.origins),
         *describe_optima(optima, estimates, costs, problem.margins),
         *_describe_model_error(problem, residuals, estimates, inner.size),
+        *describe_ambient([m.experiment.recording for m in problem.record_models if has_standard_ambient(m.plant)]),
     ]
     return DynamicFit(problem, estimates, correlations, analysis, residual_std, costs, optima, tuple(notes))
 
