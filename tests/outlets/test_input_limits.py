@@ -6,6 +6,7 @@ import time
 from pathlib import Path
 
 import pytest
+from command_line import airmuscle
 
 from airmuscle.bench import read
 from airmuscle.core import leaves
@@ -132,6 +133,13 @@ def test_a_message_quotes_little_of_a_path_of_thousands_of_characters(tmp_path: 
     with pytest.raises(FileError, match=r"….*: cannot be written to: File name too long") as raised:
         write_program(load_scenario("joint-dmsp-20-matrix").problem, tmp_path / ("a b " * 1500), C99())
     assert len(str(raised.value)) < 400
+
+
+def test_a_command_quotes_little_of_a_folder_that_the_system_refuses():
+    refused = airmuscle("export", "saga2007", "--to", "fmu", "--out", "a b " * 1500)
+    assert refused.exit_code == 1
+    assert "File name too long" in refused.stderr
+    assert len(refused.stderr) < 400
 
 
 def test_a_text_of_a_page_is_not_proposed_as_the_code_of_a_missing_value(tmp_path: Path):

@@ -155,7 +155,7 @@ def _exit_codes(ctx: Any) -> Iterator[None]:
     except BrokenPipeError:
         raise
     except OSError as error:  # a full disk, a closed terminal
-        echo(f"error: {error.filename or 'output'}: {error.strerror or error}.", err=True)
+        echo("error: " + quotable(f"{error.filename or 'output'}: {error.strerror or error}."), err=True)
         raise typer.Exit(1) from None
     except KeyboardInterrupt:
         echo("interrupted", err=True)
