@@ -39,7 +39,7 @@ from airmuscle.bench.identify import blank_surface
 from airmuscle.bench.identify.campaign import fit_static_stage
 from airmuscle.bench.identify.data_checks import DataChecks
 from airmuscle.errors import AirmuscleWarning, ColumnError, IdentificationError
-from airmuscle.physics import CreepElements, NoFriction
+from airmuscle.physics import Braid, CreepElements, NoFriction, TonduLopez2000
 from airmuscle.recording import Recording
 
 OTHER = dataclasses.replace(MUSCLE, radius=0.0128)
@@ -269,6 +269,19 @@ def test_the_zero_of_the_force_is_read_where_an_isobar_is_slack(tmp_path, offset
     assert notes_of(tmp_path / "right", runs) == ""
     notes = notes_of(tmp_path / "wrong", changed(runs, FORCE, lambda force: force + offset))
     assert f"the force is {offset:.0f} N over a range of contractions at constant pressure" in notes
+
+
+@pytest.mark.parametrize(
+    ("tables", "level"),
+    [({"isobar_400": sweeps()["isobar_400"]}, "pressure was measured at one level, 400 kPa"),
+     ({"held_8": ramps()["held_8"]}, "contraction was measured at one level, 8 %")],
+)  # fmt: skip
+def test_a_fit_to_one_level_says_that_the_rest_is_the_form_of_the_law(tmp_path, tables, level):
+    (recording,) = read_all(tmp_path, tables)
+    law = TonduLopez2000(Braid(0.011, np.radians(25.0), RESTING_LENGTH), 1.15)
+    notes = fit(law, recording, fixed=("geometry.braid_angle", "end_correction")).notes
+    assert any(f"The {level}: how the force depends on it follows" in note for note in notes)
+    assert not any("one level" in note for note in fitted(tmp_path / "all", sweeps()).notes)
 
 
 def test_a_pressure_sensor_at_its_limit_is_named(tmp_path):

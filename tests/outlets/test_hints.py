@@ -51,7 +51,7 @@ SAROSI = Sarosi2012(1.2e-4, 420.0, -57.0, -8.7e-3, 2.7e-3, -310.0)
 SURFACE = ("--characteristic", "ContractileSurface", "--degree")
 VALUES = {
     "fixed": ("wall_thickness",), "sigma": 1.0, "by": LevelSplit("contraction"), "leave_out": LevelSplit("pressure"),
-    "units": {"pressure": ...}, "columns": {1: "pressure [kPa]"}, "decimal": ",", "resting_length": ...,
+    "units": {"pressure": ...}, "columns": {1: "pressure [kPa]"}, "decimal": ",", "resting_length": ..., "ambient": ...,
     "constants": {"length": "73.2 mm"}, "file_name": "held{length [mm]}", "time": NoTime(),
     "degree": 2, "skip_rows": 1, "drop_outliers": True, "loss": Huber(10.0), "missing": DropMissing((-999.0,)), "displacement_zero": "12 mm",
     "all_rows": True, "law": ..., "censoring": ..., "free": ("circuit.fill.conductance",), "": ...,

@@ -1,12 +1,14 @@
 """Notes of a static fit: rows, weights, bounds, losses and misfit that affect its interpretation, as sentences."""
 
 import dataclasses
+from collections.abc import Mapping
 
 import numpy as np
 
 from ...core import Array, Hint, HintedText
+from ..segment.runs import RIPPLE_BAND
 from .branch_residuals import branch_distance, branch_notes
-from .data_checks import Remarks, Scatter
+from .data_checks import HELD, Remarks, Scatter
 from .fit_points import FitPoints
 from .problem import FORCE, FitProblem
 from .result import Fit
@@ -39,7 +41,7 @@ class Examination:
         distance = self._branch_distance()
         scatter = dataclasses.replace(checks.scatter, branches=distance) if quantity == FORCE else None
         branches = branch_notes(self.points.recordings, distance, quantity.name, delayed=checks.delay is not None)
-        notes = (*checks.notes, *map(str, self.points.repeated), *self.own, *branches)
+        notes = (*checks.notes, *map(str, self.points.repeated), *self.own, *branches, *_level_notes(fit.data_ranges))
         return Remarks((*notes, *_effect_notes(fit.effects), *_misfit_notes(fit, scatter, self.points)), scatter)
 
     def _branch_distance(self) -> float:
@@ -50,6 +52,19 @@ class Examination:
         residuals[~points.missing] = np.where(self.problem.censoring == 0, differences, np.nan)
         ends = np.cumsum([len(run) for run in points.recordings])
         return branch_distance(points.recordings, np.split(residuals, ends[:-1]), quantity)
+
+
+def _level_notes(ranges: Mapping[str, tuple[float, float]]) -> list[str]:
+    """The remark that the pressure or the contraction was measured at one level only."""
+    (low, high), (first, last) = ranges["pressure"], ranges["contraction"]
+    levels = (("pressure", high - low < RIPPLE_BAND * high, f"{0.5e-3 * (low + high):.4g} kPa"),
+              ("contraction", last - first < HELD, f"{50.0 * (first + last):.3g} %"))  # fmt: skip
+    return [
+        f"The {name} was measured at one level, {level}: how the force depends on it follows from the form of the law, "
+        "not from the data. Measure other levels before the law is used there."
+        for name, is_level, level in levels
+        if is_level
+    ]
 
 
 def _effect_notes(effects: SpecimenEffects | None) -> tuple[str, ...]:
