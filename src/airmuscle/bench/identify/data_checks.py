@@ -132,18 +132,15 @@ def saturation_notes(recordings: Sequence[Recording]) -> list[str]:
         return []
     limit = estimate_sensors([Recording({"pressure": run["pressure"]}, run.origin) for run in runs])["pressure"]
     least = MIN_DISTANCE * float(np.nanquantile(np.concatenate([run["force"] for run in runs]), 0.99))
-    found = []
-    for run in runs:
-        rows = run["pressure"] >= limit.upper_limit - 0.25 * limit.resolution
-        if rows.any() and np.ptp(run["contraction"][rows]) < HELD and np.ptp(run["force"][rows]) > least:
-            found.append((run.origin, int(np.count_nonzero(rows))))
-    if not found:
-        return []
-    return [
-        f"The pressure sensor saturates at {limit.upper_limit / 1e3:.4g} kPa, in {sum(n for _, n in found)} rows of "
-        f"{file_list([name for name, _ in found])}, where the force still changes: the pressure is greater there, and "
-        "the law takes the limit for it. Leave these rows out, or use a sensor of a greater range."
-    ]
+    at_limit = {run.origin: run.rows(run["pressure"] >= limit.upper_limit - 0.25 * limit.resolution) for run in runs}
+    held = {name: run for name, run in at_limit.items() if len(run) and np.ptp(run["contraction"]) < HELD}
+    found = {name: len(run) for name, run in held.items() if np.ptp(run["force"]) > least}
+    text = (
+        f"The pressure sensor saturates at {limit.upper_limit / 1e3:.4g} kPa, in {sum(found.values())} rows of "
+        f"{file_list([*found])}, where the force still changes: the pressure is greater there, and the law takes the "
+        "limit for it. Leave these rows out, or use a sensor of a greater range."
+    )
+    return [text] if found else []
 
 
 @dataclasses.dataclass(frozen=True)

@@ -54,16 +54,19 @@ class Examination:
         return branch_distance(points.recordings, np.split(residuals, ends[:-1]), quantity)
 
 
+def level_text(name: str, value: float) -> str:
+    """A pressure [Pa] or a contraction [1] as text with its usual unit."""
+    return f"{value / 1e3:.3g} kPa" if name == "pressure" else f"{100 * (0.0 if abs(value) < 5e-5 else value):.3g} %"
+
+
 def _level_notes(ranges: Mapping[str, tuple[float, float]]) -> list[str]:
     """The remark that the pressure or the contraction was measured at one level only."""
-    (low, high), (first, last) = ranges["pressure"], ranges["contraction"]
-    levels = (("pressure", high - low < RIPPLE_BAND * high, f"{0.5e-3 * (low + high):.4g} kPa"),
-              ("contraction", last - first < HELD, f"{50.0 * (first + last):.3g} %"))  # fmt: skip
+    bands = {"pressure": RIPPLE_BAND * ranges["pressure"][1], "contraction": HELD}
     return [
-        f"The {name} was measured at one level, {level}: how the force depends on it follows from the form of the law, "
-        "not from the data. Measure other levels before the law is used there."
-        for name, is_level, level in levels
-        if is_level
+        f"The {name} was measured at one level, {level_text(name, sum(ranges[name]) / 2)}: how the force depends on it "
+        "follows from the form of the law, not from the data. Measure other levels before the law is used there."
+        for name, band in bands.items()
+        if np.ptp(ranges[name]) < band
     ]
 
 

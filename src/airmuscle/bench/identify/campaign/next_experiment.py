@@ -11,6 +11,7 @@ from ....recording import Recording
 from ..dynamic import rank_records
 from ..dynamic.record_ranking import MIN_GAIN
 from ..experiment_design import BenchLimits, ExperimentPlan, PlannedRun, optimal_design
+from ..fit_notes import level_text
 from ..matched_rows import match_rows
 from .creep_stage import CreepStage
 from .fill_stage import FillStage
@@ -158,13 +159,8 @@ def _lengths(static: StaticStage | LeftOutStage, records: Sequence[CampaignRecor
 
 def _levels(run: PlannedRun) -> str:
     """A planned run as a phrase: its constant quantity and the sweep of the other."""
-
-    def text(name: str, value: float) -> str:
-        value = 0.0 if abs(value) < 5e-5 else value
-        return f"{value / 1e3:.3g} kPa" if name == "pressure" else f"{100 * value:.3g} %"
-
-    ends = " to ".join(text(run.swept, end) for end in run.sweep_limits)
-    return f"{run.constant} {text(run.constant, run.level)}, {run.swept} {ends}"
+    ends = " to ".join(level_text(run.swept, end) for end in run.sweep_limits)
+    return f"{run.constant} {level_text(run.constant, run.level)}, {run.swept} {ends}"
 
 
 def _static_runs(static: StaticStage | LeftOutStage) -> list[NextExperiment]:
