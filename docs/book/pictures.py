@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from airmuscle import characteristic, geometry, physics
-from airmuscle.bench.identify.hysteresis.result import plot_loops
+from airmuscle.bench.identify.hysteresis import plot_loops
 from airmuscle.core import plotting
 from airmuscle.core.errors import AirmuscleError
 from airmuscle.physics import (

@@ -13,6 +13,8 @@ from .fit import initial_friction_laws as initial_friction_laws
 from .fit import make_loop_series as make_loop_series
 from .hysteresis_chapter import hysteresis_chapters as hysteresis_chapters
 from .hysteresis_chapter import loop_chapter as loop_chapter
+from .hysteresis_chapter import loop_path as loop_path
+from .hysteresis_chapter import plot_loops as plot_loops
 from .joint import fit_jointly as fit_jointly
 from .joint import identified_friction as identified_friction
 from .joint import loops_not_joined as loops_not_joined
@@ -30,8 +32,6 @@ from .loops import LoopFit as LoopFit
 from .loops import find_loops as find_loops
 from .loops import fit_loop as fit_loop
 from .result import HysteresisFit as HysteresisFit
-from .result import loop_path as loop_path
-from .result import plot_loops as plot_loops
 from .search import branch_gap as branch_gap
 from .search import repeat_difference as repeat_difference
 from .search import search_parameters as search_parameters

@@ -2,18 +2,21 @@
 
 import dataclasses
 import functools
+import itertools
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from ....core import BLACK, BLUE, RED, leaves, legend_below, new_figure
+from ....core import BLACK, BLUE, DASHES, LINES, RED, Array, leaves, legend_below, new_figure
+from ....physics.muscle.friction import Friction
 from ....recording.columns import display_scale
 from ....report.chapter import BY_ROW, Chapter, NamedValue, Plot, Table, TableColumn
 from ....report.formatting import P_VALUE
 from ...segment import motion_direction
 from . import HysteresisFit, HysteresisLoop, JointFit, LoopFit, loops_not_joined, preferred_fit
-from .result import plot_loops
+from .limits import MILLIMETRES, Axis
+from .result import FrictionFit
 
 SEPARATE_LOOPS = 2
 """Maximum number of loops of which the brief view has the laws of each; of more it has one row each (chosen)."""
@@ -143,7 +146,7 @@ def _law_table(loop_fit: LoopFit) -> Table:
     return Table("laws", "Friction laws, best first", columns, brief=len(fits))
 
 
-def _reductions(fits: Sequence[HysteresisFit | JointFit]) -> list[float | None]:
+def _reductions(fits: Sequence[FrictionFit]) -> list[float | None]:
     """The reductions of AICc; None where it is not defined."""
     return [fit.aicc_reduction if np.isfinite(fit.aicc_reduction) else None for fit in fits]
 
@@ -236,4 +239,44 @@ def _figure(loop: HysteresisLoop) -> Any:
             axes.plot(recording[name][rows] * factor, recording["force"][rows], label=label, **style)
     axes.set(xlabel=f"{name} [{unit}]", ylabel="force [N]", title=f"{recording.origin}: {loop.description}")
     legend_below(figure, axes)
+    return figure
+
+
+TURNING_POINTS = (2.0, -2.0, -0.6, -1.1, -0.6, 0.5, -0.3, 0.5, 2.0)
+"""Turning points of the path of `plot_loops`, as multiples of the presliding distance of the law (chosen)."""
+INNER_LOOPS = ((3, 5), (6, 8))
+"""Legs of the path that form the inner loops, first and last plus one."""
+ROWS_PER_LEG = 200
+"""Rows between two turning points."""
+
+
+def loop_path(distance: float) -> Array:
+    """A path [m] from rest around an outer loop with two inner loops, scaled by a distance [m]."""
+    turning_points = itertools.pairwise((0.0, *TURNING_POINTS))
+    legs = [np.linspace(a, b, ROWS_PER_LEG, endpoint=False) for a, b in turning_points]
+    return distance * np.concatenate([*legs, [TURNING_POINTS[-1]]])
+
+
+def plot_loops(friction: Friction, axis: Axis = MILLIMETRES) -> Any:
+    """Friction force over displacement: from rest, around the outer loop, through two inner loops.
+
+    Returns a Matplotlib figure.
+    """
+    path = loop_path(friction.presliding_distance or 1e-3)
+    force = friction.force_along(path)
+    parts = [("outer loop", ROWS_PER_LEG, len(path)), ("from rest", 0, ROWS_PER_LEG + 1)]
+    parts += [
+        ("inner loops" if i == 0 else "", a * ROWS_PER_LEG, b * ROWS_PER_LEG + 1)
+        for i, (a, b) in enumerate(INNER_LOOPS)
+    ]
+    outer = force.copy()
+    for a, b in INNER_LOOPS:
+        outer[a * ROWS_PER_LEG + 1 : b * ROWS_PER_LEG] = np.nan
+    figure, axes = new_figure(width=5.6, height=3.9)
+    for (name, first, last), style in zip(parts, (0, 1, 2, 2), strict=True):
+        rows, label = slice(first, last), name or None
+        values = force if style else outer
+        axes.plot(path[rows] * axis.factor, values[rows], color=LINES[style], linestyle=DASHES[style], label=label)
+    axes.set(xlabel=axis.label, ylabel="friction [N]", title=type(friction).__name__)
+    legend_below(figure, axes, 3)
     return figure

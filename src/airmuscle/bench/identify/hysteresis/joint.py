@@ -12,13 +12,12 @@ from ....engine.processes import Workers, process_pool
 from ....physics.muscle.friction import Friction, IdentifiedFriction, PressureScaledFriction
 from ...segment.runs import RELATIVE_BAND
 from ..identifiability import UndeterminedCombination
-from ..model_evidence import aicc, effective_sample_size, f_test_p_value, reduction_of_aicc
 from .fit import make_loop_series
 from .joint_result import JointFit, agreement_of_run, force_amplitude, preferred_fit
 from .limits import combine_limits
 from .loops import LoopFit
-from .result import SIGNIFICANCE_LEVEL, HysteresisFit
-from .search import LoopSeries, free_parameters, search_parameters
+from .result import SIGNIFICANCE_LEVEL, HysteresisFit, Misfit, evidence
+from .search import LoopSeries, search_parameters
 
 MIN_PRESSURE_RATIO = 1.2
 """Minimum ratio of the highest to the lowest pressure of the runs for a fitted dependence on pressure (chosen)."""
@@ -99,9 +98,9 @@ def _fit_law(usable: Sequence[LoopFit], own: Sequence[HysteresisFit]) -> JointFi
     lowest = float(pressures.min())  # -inf where a run has no pressure
     if np.isfinite(lowest) and pressures[reference] > max(1e3, MIN_PRESSURE_RATIO * lowest):
         scaled = search_parameters(_initial_scale(own, pressures, reference), runs)
-        p_value = _f_test(constant[0], scaled[0], runs)
-        size = _sample_size(scaled[0], runs)
-        better = p_value < SIGNIFICANCE_LEVEL and _aicc(scaled[0], runs, size) < _aicc(constant[0], runs, size)
+        small, large = (Misfit.of(friction, runs) for friction, _ in (constant, scaled))
+        p_value = large.p_value(small)
+        better = p_value < SIGNIFICANCE_LEVEL and large.reduction_of_aicc(small) > 0
         candidates = [(scaled if better else constant, p_value)]
     (friction, weak), scale_p_value = candidates[0]
     return _assess(friction, weak, scale_p_value, own, usable)
@@ -121,63 +120,26 @@ def _mean_pressure(run: LoopSeries) -> float:
     return float("-inf") if run.pressure is None else float(np.mean(run.pressure[run.fitted_rows]))
 
 
-def _residuals(friction: Friction | None, runs: Sequence[LoopSeries]) -> Array:
-    return np.concatenate([run.fitted_residuals(friction) for run in runs])
-
-
-def _sample_size(friction: Friction | None, runs: Sequence[LoopSeries]) -> float:
-    return float(sum(effective_sample_size(run.fitted_residuals(friction)) for run in runs))
-
-
-def _parameter_count(friction: Friction | None, runs: Sequence[LoopSeries]) -> int:
-    own = 0 if friction is None else free_parameters(friction)
-    return own + sum(int(run.design_matrix.shape[1]) for run in runs)
-
-
-def _aicc(friction: Friction | None, runs: Sequence[LoopSeries], sample_size: float) -> float:
-    return aicc(float(np.mean(_residuals(friction, runs) ** 2)), sample_size, _parameter_count(friction, runs))
-
-
-def _f_test(smaller: Friction | None, larger: Friction, runs: Sequence[LoopSeries]) -> float:
-    """p-value of the parameters that a friction has beyond those of another one, or beyond none."""
-    square, reduced = (float(np.mean(_residuals(friction, runs) ** 2)) for friction in (smaller, larger))
-    count = _parameter_count(larger, runs)
-    added = count - _parameter_count(smaller, runs)
-    return f_test_p_value(square, reduced, _sample_size(larger, runs), count, added)
-
-
 def _assess(
     friction: Friction, weak: tuple[UndeterminedCombination, ...], scale_p_value: float, own: Sequence[HysteresisFit],
     usable: Sequence[LoopFit],
 ) -> JointFit:  # fmt: skip
     runs = [fit.series for fit in own]
-    size = _sample_size(friction, runs)
     repeats = [
         make_loop_series(each.loop.repeat[0], each.loop.static_curve, each.loop.friction_path, each.loop.repeat[1])
         for each in usable
         if each.loop.repeat is not None
     ]
     return JointFit(
-        friction=friction,
+        **evidence(friction, runs, repeats),
+        weak_combinations=weak,
         series=tuple(runs),
         agreement=tuple(
             agreement_of_run(friction, fit, each.loop.description, _mean_pressure(fit.series))
             for fit, each in zip(own, usable, strict=True)
         ),
-        rmse=_rms(_residuals(friction, runs)),
-        rmse_without_friction=_rms(_residuals(None, runs)),
-        effective_sample_size=size,
-        aicc_reduction=reduction_of_aicc(_aicc(None, runs, size), _aicc(friction, runs, size)),
-        p_value=_f_test(None, friction, runs),
         scale_p_value=scale_p_value,
-        repeat_rmse=_rms(_residuals(friction, repeats)) if repeats else float("nan"),
-        repeat_rmse_without_friction=_rms(_residuals(None, repeats)) if repeats else float("nan"),
-        weak_combinations=weak,
     )
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2)))
 
 
 class SelectedFriction(NamedTuple):

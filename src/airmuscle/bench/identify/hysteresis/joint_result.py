@@ -10,11 +10,9 @@ from ....core import LINES, Array, given_axes, leaves, legend_below, new_figure,
 from ....physics.muscle.friction import Friction, PressureScaledFriction
 from ....report.chapter import Chapter, Plot
 from ....report.shown import parameter_table
-from ...reported import Reported
-from ..identifiability import UndeterminedCombination
-from ..model_evidence import describe_reduction, effective_sample_size, f_test_p_value, format_p_value
-from .limits import MILLIMETRES, DataLimits, combine_limits, limit_reservations, undetermined_parameters
-from .result import SIGNIFICANCE_LEVEL, HysteresisFit, judged
+from ..model_evidence import effective_sample_size, format_p_value
+from .limits import MILLIMETRES, DataLimits, combine_limits, limit_reservations
+from .result import SIGNIFICANCE_LEVEL, FrictionFit, HysteresisFit, Misfit
 from .search import LoopSeries, free_parameters
 
 MAX_DEVIATION = 0.2
@@ -69,8 +67,7 @@ def agreement_of_run(joint: Friction, own: HysteresisFit, description: str, pres
     factor = -float(joint_force @ target) / power
     rest = target + factor * joint_force
     variance = float(np.mean(rest**2)) * rest.size / max(effective_sample_size(rest), 1.0)
-    joint_residuals, residuals = run.fitted_residuals(joint), run.fitted_residuals(own.friction)
-    free = free_parameters(own.friction)
+    joint_misfit, misfit = Misfit.of(joint, (run,)), Misfit.of(own.friction, (run,))
     largest = max(_rms(own_force), _rms(joint_force), 1e-300)
     amplitude = force_amplitude(run, joint)
     return RunAgreement(
@@ -81,13 +78,7 @@ def agreement_of_run(joint: Friction, own: HysteresisFit, description: str, pres
         amplitude_stderr=float(np.sqrt(variance / power)) * amplitude,
         joint_amplitude=amplitude,
         deviation=_rms(own_force - joint_force) / largest,
-        p_value=f_test_p_value(
-            float(np.mean(joint_residuals**2)),
-            float(np.mean(residuals**2)),
-            effective_sample_size(residuals),
-            curve.shape[1] + free,
-            free,
-        ),
+        p_value=misfit.p_value(joint_misfit._replace(parameters=curve.shape[1])),
     )
 
 
@@ -133,26 +124,17 @@ def plot_amplitudes(runs: Sequence[RunAgreement], friction: Friction, name: str,
     return figure
 
 
-@dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class JointFit(Reported):
+@dataclasses.dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class JointFit(FrictionFit):
     """A friction law fitted to several runs together, each with its own static curve; forces in N.
 
     `friction` is a `PressureScaledFriction` if the runs justify a dependence on pressure; `scale_p_value` is that of
-    its F test, NaN where the runs have one pressure. `repeat_rmse` is the error on the second runs, NaN without any.
+    its F test, NaN where the runs have one pressure.
     """
 
-    friction: Friction
     series: tuple[LoopSeries, ...]
     agreement: tuple[RunAgreement, ...]
-    rmse: float
-    rmse_without_friction: float
-    effective_sample_size: float
-    aicc_reduction: float
-    p_value: float
     scale_p_value: float
-    repeat_rmse: float
-    repeat_rmse_without_friction: float
-    weak_combinations: tuple[UndeterminedCombination, ...] = ()
 
     @property
     def law(self) -> Friction:
@@ -166,17 +148,10 @@ class JointFit(Reported):
 
     @property
     def limits(self) -> DataLimits:
-        """Maximum force and range of the speed of all runs."""
         return combine_limits(tuple(run.limits for run in self.series))
 
     @property
-    def undetermined(self) -> tuple[str, ...]:
-        """Paths of the parameters that the runs do not determine."""
-        return undetermined_parameters(self.friction, self.limits, self.weak_combinations)
-
-    @property
     def reservations(self) -> tuple[str, ...]:
-        """The reasons, as sentences, why the runs cannot justify one friction whatever the statistical tests say."""
         different = [str(run) for run in self.agreement if run.disagrees]
         reasons = []
         if different:
@@ -187,11 +162,6 @@ class JointFit(Reported):
         if self.repeat_rmse >= self.repeat_rmse_without_friction:
             reasons.append("It does not lower the error on the second runs.")
         return (*reasons, *limit_reservations(self.friction, self.limits, self.weak_combinations, MILLIMETRES))
-
-    @property
-    def justified(self) -> bool:
-        """Whether AICc and the F test favour the friction, and no reservation contradicts it."""
-        return self.aicc_reduction > 0 and self.p_value < SIGNIFICANCE_LEVEL and not self.reservations
 
     @property
     def scale_text(self) -> str:
@@ -217,16 +187,9 @@ class JointFit(Reported):
         """Whether the runs justify one friction, as sentences with the numbers."""
         text = (
             f"{self.name} fitted to {len(self.series)} runs together reduces the rms error from "
-            f"{self.rmse_without_friction:.3g} to {self.rmse:.3g} N. {self.scale_text} "
-            f"{describe_reduction(self.aicc_reduction)}, effective sample size {self.effective_sample_size:.0f}; "
-            f"F test {format_p_value(self.p_value)}."
+            f"{self.rmse_without_friction:.3g} to {self.rmse:.3g} N. {self.scale_text}"
         )
-        if np.isfinite(self.repeat_rmse):
-            text += (
-                f" On the second runs the rms error changes from {self.repeat_rmse_without_friction:.3g} to "
-                f"{self.repeat_rmse:.3g} N."
-            )
-        return judged(text, self, "this friction for all runs")
+        return self._judged(text, "this friction for all runs", "second runs")
 
     def plot(self, *, ax: Any = None) -> Any:
         """Plot the amplitude of the friction over the pressure, of each run and of the joint fit.
@@ -255,7 +218,7 @@ class JointFit(Reported):
 
 SIMILAR_RMSE = 1.02
 """Maximum ratio of the rms errors of two laws that describe the data equally well (chosen)."""
-AnyFit = TypeVar("AnyFit", HysteresisFit, JointFit)
+AnyFit = TypeVar("AnyFit", bound=FrictionFit)
 
 
 def preferred_fit(fits: Sequence[AnyFit]) -> AnyFit | None:
@@ -272,5 +235,5 @@ def preferred_fit(fits: Sequence[AnyFit]) -> AnyFit | None:
     return min(similar, key=lambda fit: free_parameters(fit.friction))
 
 
-def _is_open(fit: HysteresisFit | JointFit) -> bool:
+def _is_open(fit: FrictionFit) -> bool:
     return bool(fit.undetermined) or any("[" in leaf.path for leaf in leaves(fit.friction))

@@ -1,12 +1,13 @@
-"""HysteresisFit: fitted friction, reduction of the error, tests whether the data justify it, and its figures."""
+"""FrictionFit and HysteresisFit: fitted friction, tests whether the data justify it, and its figures."""
 
+import abc
 import dataclasses
-import itertools
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ....core import DASHES, LINES, Array, given_axes, leaves, legend_below, new_figure, relabel_in_display_units
+from ....core import LINES, Array, given_axes, leaves, legend_below, new_figure, relabel_in_display_units
 from ....physics.muscle.friction import Friction
 from ....report.chapter import BY_ROW, Chapter, Plot, Table, TableColumn
 from ...reported import Reported
@@ -19,47 +20,8 @@ from ..model_evidence import (
     format_p_value,
     reduction_of_aicc,
 )
-from .limits import MILLIMETRES, Axis, limit_reservations, parameters_on_bounds, undetermined_parameters
-from .search import LoopSeries, branch_gap, repeat_difference
-
-TURNING_POINTS = (2.0, -2.0, -0.6, -1.1, -0.6, 0.5, -0.3, 0.5, 2.0)
-"""Turning points of the path of `plot_loops`, as multiples of the presliding distance of the law (chosen)."""
-INNER_LOOPS = ((3, 5), (6, 8))
-"""Legs of the path that form the inner loops, first and last plus one."""
-ROWS_PER_LEG = 200
-"""Rows between two turning points."""
-
-
-def loop_path(distance: float) -> Array:
-    """A path [m] from rest around an outer loop with two inner loops, scaled by a distance [m]."""
-    turning_points = itertools.pairwise((0.0, *TURNING_POINTS))
-    legs = [np.linspace(a, b, ROWS_PER_LEG, endpoint=False) for a, b in turning_points]
-    return distance * np.concatenate([*legs, [TURNING_POINTS[-1]]])
-
-
-def plot_loops(friction: Friction, axis: Axis = MILLIMETRES) -> Any:
-    """Friction force over displacement: from rest, around the outer loop, through two inner loops.
-
-    Returns a Matplotlib figure.
-    """
-    path = loop_path(friction.presliding_distance or 1e-3)
-    force = friction.force_along(path)
-    parts = [("outer loop", ROWS_PER_LEG, len(path)), ("from rest", 0, ROWS_PER_LEG + 1)]
-    parts += [
-        ("inner loops" if i == 0 else "", a * ROWS_PER_LEG, b * ROWS_PER_LEG + 1)
-        for i, (a, b) in enumerate(INNER_LOOPS)
-    ]
-    outer = force.copy()
-    for a, b in INNER_LOOPS:
-        outer[a * ROWS_PER_LEG + 1 : b * ROWS_PER_LEG] = np.nan
-    figure, axes = new_figure(width=5.6, height=3.9)
-    for (name, first, last), style in zip(parts, (0, 1, 2, 2), strict=True):
-        rows, label = slice(first, last), name or None
-        values = force if style else outer
-        axes.plot(path[rows] * axis.factor, values[rows], color=LINES[style], linestyle=DASHES[style], label=label)
-    axes.set(xlabel=axis.label, ylabel="friction [N]", title=type(friction).__name__)
-    legend_below(figure, axes, 3)
-    return figure
+from .limits import DataLimits, limit_reservations, parameters_on_bounds, undetermined_parameters
+from .search import LoopSeries, branch_gap, free_parameters, repeat_difference
 
 
 def plot_hysteresis(series: LoopSeries, friction: Friction, coefficients: Array, title: str, *, ax: Any = None) -> Any:
@@ -104,23 +66,49 @@ MIN_BRANCH_RATIO = 0.1
 """Minimum ratio of the rows of the two branches for a friction to be justified (chosen)."""
 
 
-@dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class HysteresisFit(Reported):
-    """A friction law fitted to a loop, compared with the same static curve without friction; forces in N.
+class Misfit(NamedTuple):
+    """Residuals of runs with one friction, or without: their mean square [N^2], effective number, and parameters."""
 
-    `gap` is the rms difference of the falling and the rising branch, `residual_gap` the part that the friction does not
-    explain. `repeat_rmse` and `repeat_rmse_without_friction` are the errors on a second run, where only the static
-    coefficients are fitted again, because the level may shift between runs. `repeatability` is the standard deviation
-    of one run about the mean of the two; an error below it means overfitting. These three are NaN without a second run.
+    mean_square: float
+    sample_size: float
+    parameters: int
+
+    @classmethod
+    def of(cls, friction: Friction | None, runs: Sequence[LoopSeries]) -> "Misfit":
+        """The misfit of runs that have one friction and a static curve each."""
+        parts = [run.fitted_residuals(friction) for run in runs]
+        own = 0 if friction is None else free_parameters(friction)
+        count = own + sum(int(run.design_matrix.shape[1]) for run in runs)
+        return cls(mean_square(parts), float(sum(map(effective_sample_size, parts))), count)
+
+    def reduction_of_aicc(self, smaller: "Misfit") -> float:
+        """AICc of a smaller model minus that of this one, for the effective number of these residuals."""
+        before, after = (aicc(each.mean_square, self.sample_size, each.parameters) for each in (smaller, self))
+        return reduction_of_aicc(before, after)
+
+    def p_value(self, smaller: "Misfit") -> float:
+        """p-value of the F test of the parameters that this model has beyond a smaller one."""
+        added = self.parameters - smaller.parameters
+        return f_test_p_value(smaller.mean_square, self.mean_square, self.sample_size, self.parameters, added)
+
+
+def mean_square(parts: Sequence[Array]) -> float:
+    """The mean square of all residuals; NaN without any."""
+    values = np.concatenate([np.zeros(0), *parts])
+    return float(np.mean(values**2)) if values.size else float("nan")
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class FrictionFit(Reported):
+    """A friction law fitted to runs, compared with the same static curves without friction; forces in N.
+
+    `repeat_rmse` and `repeat_rmse_without_friction` are the errors on second runs, where only the static coefficients
+    are fitted again, because the level may shift between runs; NaN without a second run.
     """
 
     friction: Friction
-    coefficients: Array
-    """Coefficients of the static curve."""
     rmse: float
     rmse_without_friction: float
-    gap: float
-    residual_gap: float
     effective_sample_size: float
     aicc_reduction: float
     """AICc without friction minus AICc with friction; positive where the friction is the better model."""
@@ -128,36 +116,95 @@ class HysteresisFit(Reported):
     """p-value of the F test of the friction parameters."""
     repeat_rmse: float
     repeat_rmse_without_friction: float
-    repeatability: float
-    series: LoopSeries
     weak_combinations: tuple[UndeterminedCombination, ...] = ()
     """Combinations of parameters that the data determine poorly or not at all."""
 
     @property
-    def on_bounds(self) -> tuple[str, ...]:
-        """Paths of the parameters that the search moved to a bound, declared or set by the data."""
-        return parameters_on_bounds(self.friction, self.series.limits)
+    @abc.abstractmethod
+    def limits(self) -> DataLimits:
+        """Maximum force and range of the speed of the data."""
+
+    @property
+    @abc.abstractmethod
+    def reservations(self) -> tuple[str, ...]:
+        """The reasons, as sentences, why the data cannot justify a friction whatever the statistical tests say."""
 
     @property
     def undetermined(self) -> tuple[str, ...]:
         """Paths of the parameters that the data do not determine: on a bound, or with a large standard error."""
-        return undetermined_parameters(self.friction, self.series.limits, self.weak_combinations)
+        return undetermined_parameters(self.friction, self.limits, self.weak_combinations)
 
     @property
     def justified(self) -> bool:
-        """Whether AICc, the F test and, if there is one, the second run favour the friction, without reservations."""
+        """Whether AICc, the F test and any second runs favour the friction, without reservations."""
         confirmed = not self.repeat_rmse >= self.repeat_rmse_without_friction
         is_significant = self.aicc_reduction > 0 and self.p_value < SIGNIFICANCE_LEVEL
         return is_significant and confirmed and not self.reservations
 
+    def _judged(self, text: str, what: str, repeats: str, further: str = "") -> str:
+        """A text with the statistical tests, the reservations, what is not determined, and whether it is justified."""
+        sentences = [
+            f"{text} {describe_reduction(self.aicc_reduction)}, effective sample size "
+            f"{self.effective_sample_size:.0f}; F test {format_p_value(self.p_value)}."
+        ]
+        if np.isfinite(self.repeat_rmse):
+            sentences.append(
+                f"On the {repeats} the rms error changes from {self.repeat_rmse_without_friction:.3g} to "
+                f"{self.repeat_rmse:.3g} N{further}."
+            )
+        sentences += self.reservations
+        sentences += [f"Not determined: {', '.join(self.undetermined)}."] if self.undetermined else []
+        verdict = f"The data {'justify' if self.justified else 'do not justify'} {what}."
+        return " ".join([*sentences, *map(str, self.weak_combinations), verdict])
+
+
+def evidence(friction: Friction, runs: Sequence[LoopSeries], repeats: Sequence[LoopSeries]) -> dict[str, Any]:
+    """The numbers of a `FrictionFit` of runs, and of second runs, by field."""
+    fitted, plain = (Misfit.of(each, runs) for each in (friction, None))
+    again = [mean_square([run.fitted_residuals(each) for run in repeats]) for each in (friction, None)]
+    return {
+        "friction": friction,
+        "rmse": float(np.sqrt(fitted.mean_square)),
+        "rmse_without_friction": float(np.sqrt(plain.mean_square)),
+        "effective_sample_size": fitted.sample_size,
+        "aicc_reduction": fitted.reduction_of_aicc(plain),
+        "p_value": fitted.p_value(plain),
+        "repeat_rmse": float(np.sqrt(again[0])),
+        "repeat_rmse_without_friction": float(np.sqrt(again[1])),
+    }
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class HysteresisFit(FrictionFit):
+    """A friction law fitted to a loop, compared with the same static curve without friction; forces in N.
+
+    `gap` is the rms difference of the falling and the rising branch, `residual_gap` the part that the friction does not
+    explain. `repeatability` is the standard deviation of one run about the mean of it and a second one; an error below
+    it means overfitting. It is NaN without a second run.
+    """
+
+    coefficients: Array
+    """Coefficients of the static curve."""
+    gap: float
+    residual_gap: float
+    repeatability: float
+    series: LoopSeries
+
+    @property
+    def limits(self) -> DataLimits:
+        return self.series.limits
+
+    @property
+    def on_bounds(self) -> tuple[str, ...]:
+        """Paths of the parameters that the search moved to a bound, declared or set by the data."""
+        return parameters_on_bounds(self.friction, self.limits)
+
     @property
     def reservations(self) -> tuple[str, ...]:
-        """The reasons, as sentences, why this loop cannot justify a friction whatever the statistical tests say."""
         reasons = list(self.reservations_of_rows)
         if self.rmse < self.repeatability:
             reasons.append("The error is below the repeatability, which indicates overfitting.")
-        series = self.series
-        return (*reasons, *limit_reservations(self.friction, series.limits, self.weak_combinations, series.axis))
+        return (*reasons, *limit_reservations(self.friction, self.limits, self.weak_combinations, self.series.axis))
 
     @property
     def reservations_of_rows(self) -> tuple[str, ...]:
@@ -184,15 +231,10 @@ class HysteresisFit(Reported):
         """Whether the data justify this friction, as sentences with the numbers."""
         text = (
             f"{type(self.friction).__name__} reduces the rms error from {self.rmse_without_friction:.3g} to "
-            f"{self.rmse:.3g} N{self._gap_text}. {describe_reduction(self.aicc_reduction)}, effective sample size "
-            f"{self.effective_sample_size:.0f}; F test {format_p_value(self.p_value)}."
+            f"{self.rmse:.3g} N{self._gap_text}."
         )
-        if np.isfinite(self.repeat_rmse):
-            text += (
-                f" On the second run the rms error changes from {self.repeat_rmse_without_friction:.3g} to "
-                f"{self.repeat_rmse:.3g} N; the repeatability of the runs is {self.repeatability:.3g} N."
-            )
-        return judged(text, self, "this friction")
+        further = f"; the repeatability of the runs is {self.repeatability:.3g} N"
+        return self._judged(text, "this friction", "second run", further)
 
     @property
     def _gap_text(self) -> str:
@@ -236,49 +278,23 @@ class HysteresisFit(Reported):
         )
 
 
-def judged(text: str, fit: Any, what: str) -> str:
-    """A text on a fit, with its reservations, what it does not determine, and whether the data justify it."""
-    undetermined = [f"Not determined: {', '.join(fit.undetermined)}."] if fit.undetermined else []
-    weak = [str(each) for each in fit.weak_combinations]
-    verdict = f"The data {'justify' if fit.justified else 'do not justify'} {what}."
-    return " ".join([text, *fit.reservations, *undetermined, *weak, verdict])
-
-
 def assess_fit(
     friction: Friction, weak: tuple[UndeterminedCombination, ...], run: LoopSeries, repeat: LoopSeries | None
 ) -> HysteresisFit:
     """The statistics of a fitted friction with its poorly determined combinations, compared with the static curve."""
-    free = sum(leaf.declared.fitted for leaf in leaves(friction))
-    coefficients, static = run.coefficients(friction), run.coefficients(None)
-    rows = run.fitted_rows
+    coefficients, static, rows = run.coefficients(friction), run.coefficients(None), run.fitted_rows
     residuals, plain = run.residuals(friction, coefficients)[rows], run.residuals(None, static)[rows]
-    square, plain_square = float(np.mean(residuals**2)), float(np.mean(plain**2))
-    sample_size, base = effective_sample_size(residuals), run.design_matrix.shape[1]
-    path, direction = run.path[rows], run.direction[rows]
-    repeat_rmse = plain_repeat_rmse = repeatability = float("nan")
+    path, direction, repeatability = run.path[rows], run.direction[rows], float("nan")
     if repeat is not None:
-        repeat_rmse = _rms(repeat.fitted_residuals(friction))
-        plain_repeat_rmse = _rms(repeat.fitted_residuals(None))
         values = repeat.residuals(None, static)[repeat.fitted_rows]
         second_run = (repeat.path[repeat.fitted_rows], values, repeat.direction[repeat.fitted_rows])
         repeatability = repeat_difference(path, plain, direction, *second_run).rms / np.sqrt(2)
     return HysteresisFit(
-        friction=friction,
+        **evidence(friction, (run,), () if repeat is None else (repeat,)),
+        weak_combinations=weak,
         coefficients=coefficients,
-        rmse=float(np.sqrt(square)),
-        rmse_without_friction=float(np.sqrt(plain_square)),
         gap=branch_gap(path, plain, direction).rms,
         residual_gap=branch_gap(path, residuals, direction).rms,
-        effective_sample_size=sample_size,
-        aicc_reduction=reduction_of_aicc(aicc(plain_square, sample_size, base), aicc(square, sample_size, base + free)),
-        p_value=f_test_p_value(plain_square, square, sample_size, base + free, free),
-        repeat_rmse=repeat_rmse,
-        repeat_rmse_without_friction=plain_repeat_rmse,
         repeatability=repeatability,
         series=run,
-        weak_combinations=weak,
     )
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2))) if values.size else float("nan")
