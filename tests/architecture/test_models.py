@@ -4,7 +4,10 @@ from __future__ import annotations
 
 import importlib
 import inspect
+import json
 import pkgutil
+import re
+from pathlib import Path
 
 from airmuscle.files.library import PACKAGES, files, model_class, model_names
 from airmuscle.physics import Characteristic
@@ -43,3 +46,13 @@ def test_every_law_of_a_paper_has_a_library_file():
         if law.references and law.__name__ not in GENERAL_LAWS and f'"{law.__name__}"' not in texts
     ]
     assert not missing, "\n".join(missing)
+
+
+def test_the_bibliography_is_sorted_and_each_of_its_references_is_used():
+    package = Path(files.__file__).parents[2]
+    known = json.loads((package / "core" / "references.json").read_text(encoding="utf-8"))
+    used = {
+        key for path in package.rglob("*.py") for key in re.findall(r'published\("([^"]+)"', path.read_text("utf-8"))
+    }
+    assert list(known) == sorted(known)
+    assert used == set(known)

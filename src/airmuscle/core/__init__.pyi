@@ -112,6 +112,7 @@ from .plotting import legend_outside as legend_outside
 from .plotting import relabel_in_display_units as relabel_in_display_units
 from .plotting import rendered as rendered
 from .reference import CHOSEN as CHOSEN
+from .reference import published as published
 from .short_repr import ShortRepr as ShortRepr
 from .short_repr import describe_model as describe_model
 from .system import add_prefix as add_prefix

@@ -1,7 +1,10 @@
 """References of formulas and numbers; `cite` collects the references of an object."""
 
 import dataclasses
-from collections.abc import Iterator
+import functools
+import json
+from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 from .annotation import check_field_types
@@ -31,6 +34,18 @@ class Reference:
         doi = f", doi:{self.doi}" if self.doi else ""
         note = f" [{self.note}]" if self.note else ""
         return f'{self.authors}{year}: "{self.title}", {self.where}{doi}.{note}'
+
+
+@functools.cache
+def _bibliography() -> Mapping[str, Mapping[str, Any]]:
+    text = Path(__file__).with_name("references.json").read_text(encoding="utf-8")
+    return dict(json.loads(text))
+
+
+def published(key: str, note: str = "") -> Reference:
+    """The reference of a key in `references.json`, the bibliography of the program; `note` replaces its note."""
+    found = Reference(key, **_bibliography()[key])
+    return dataclasses.replace(found, note=note or found.note)
 
 
 CHOSEN = "chosen"

@@ -5,7 +5,7 @@ import functools
 
 import airmuscle as am
 
-from ..core import CHOSEN, Reference
+from ..core import CHOSEN, published
 from ..files.library import load_data
 from ..report.formatting import format_number, format_quantity, typographic
 
@@ -36,13 +36,7 @@ DURATION = 25.0
 FILLING, DISCHARGING = (5.0, 15.0), (19.0, 25.0)
 """Beginning and end of both phases of Fig. 3 [s]."""
 
-MATRIX_CATALOGUE = Reference(
-    "matrix-821",
-    "MATRIX",
-    "Solenoid valves series 820",
-    "as quoted by Hošovský et al.",
-    note="EMX821.104C224, 3-position 2-way on/off with closed centre; C = 2.6167e-9 m3/(s Pa), b = 0.433",
-)
+MATRIX_CATALOGUE = published("matrix-821")
 
 
 @dataclasses.dataclass(frozen=True)

@@ -7,7 +7,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from ...core import Array, ParameterError, Reference, ShortRepr, SolveError, Status, check_field_types
+from ...core import Array, ParameterError, Reference, ShortRepr, SolveError, Status, check_field_types, published
 from ...engine.compile.cache.kernel import Kernel
 from ...engine.compile.function import augmented_rates
 from ...engine.compile.program import compile_system
@@ -16,15 +16,7 @@ from .estimates import StateEstimate
 from .riccati import check_known, check_numbers, check_sample_time
 from .state_estimator import StateEstimator
 
-QI2019 = Reference(
-    key="qi-2019",
-    authors="Qi, H., Bone, G. M., Zhang, Y.",
-    title="Position control of pneumatic actuators using three-mode discrete-valued model predictive control",
-    where="Actuators 8(3), 56",
-    year=2019,
-    doi="10.3390/act8030056",
-    note="enumeration of the modes of on/off valves over a short horizon, cost of switching",
-)
+QI2019 = published("qi-2019")
 MAX_SEQUENCES = 1_000_000
 """Maximum number of sequences of modes (chosen)."""
 _choose = Kernel("choose_mode", "best_mode_sequence")

@@ -6,30 +6,14 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ...core import Array, ParameterError, Reference, check_whole
+from ...core import Array, ParameterError, Reference, check_whole, published
 from ...engine.compile.cache.kernel import Kernel
 from ...recording.recording import Recording
 from .estimates import BoundFilter, StateEstimate
 from .state_estimator import StateEstimator
 
-BAR_SHALOM2001 = Reference(
-    key="bar-shalom-2001",
-    authors="Bar-Shalom, Y., Li, X. R., Kirubarajan, T.",
-    title="Estimation with Applications to Tracking and Navigation",
-    where="Wiley, New York, chapters 5 and 10",
-    year=2001,
-    doi="10.1002/0471221279",
-    note="extended Kalman filter; consistency by the normalised estimation error squared",
-)
-RAUCH1965 = Reference(
-    key="rauch-1965",
-    authors="Rauch, H. E., Tung, F., Striebel, C. T.",
-    title="Maximum likelihood estimates of linear dynamic systems",
-    where="AIAA Journal 3(8):1445-1450",
-    year=1965,
-    doi="10.2514/3.3166",
-    note="smoother by a backward pass over the estimates of the filter",
-)
+BAR_SHALOM2001 = published("bar-shalom-2001")
+RAUCH1965 = published("rauch-1965")
 _predict_extended = Kernel("predict_extended", "kalman_filter")
 _correct_extended = Kernel("correct_extended", "kalman_filter")
 
@@ -122,24 +106,8 @@ def consistency_band(dimension: int, runs: int, probability: float = 0.95) -> tu
     return low, high
 
 
-JULIER_UHLMANN2004 = Reference(
-    key="julier-uhlmann-2004",
-    authors="Julier, S. J., Uhlmann, J. K.",
-    title="Unscented filtering and nonlinear estimation",
-    where="Proceedings of the IEEE 92(3):401-422",
-    year=2004,
-    doi="10.1109/JPROC.2003.823141",
-    note="the unscented transformation",
-)
-WAN_VAN_DER_MERWE2000 = Reference(
-    key="wan-van-der-merwe-2000",
-    authors="Wan, E. A., van der Merwe, R.",
-    title="The unscented Kalman filter for nonlinear estimation",
-    where="Proc. IEEE Adaptive Systems for Signal Processing, Communications, and Control Symposium, 153-158",
-    year=2000,
-    doi="10.1109/ASSPCC.2000.882463",
-    note="scaled sigma points with alpha, beta and kappa",
-)
+JULIER_UHLMANN2004 = published("julier-uhlmann-2004")
+WAN_VAN_DER_MERWE2000 = published("wan-van-der-merwe-2000")
 _predict_unscented = Kernel("predict_unscented", "kalman_filter")
 _correct_unscented = Kernel("correct_unscented", "kalman_filter")
 

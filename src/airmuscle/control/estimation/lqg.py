@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ...core import Array, ParameterError, Reference
+from ...core import Array, ParameterError, published
 from ...physics.analysis.linear_model import LinearModel
 from ...physics.analysis.sampled_model import held
 from ..laws.state_feedback import StateFeedback
@@ -19,24 +19,8 @@ from .riccati import (
     steady_target,
 )
 
-HAN2009 = Reference(
-    key="han-2009",
-    authors="Han, J.",
-    title="From PID to active disturbance rejection control",
-    where="IEEE Transactions on Industrial Electronics 56(3):900-906",
-    year=2009,
-    doi="10.1109/TIE.2008.2011621",
-    note="extended state observer",
-)
-GAO2003 = Reference(
-    key="gao-2003",
-    authors="Gao, Z.",
-    title="Scaling and bandwidth-parameterization based controller tuning",
-    where="Proceedings of the American Control Conference, Denver, 4989-4996",
-    year=2003,
-    doi="10.1109/ACC.2003.1242516",
-    note="bandwidths of controller and observer as parameters",
-)
+HAN2009 = published("han-2009")
+GAO2003 = published("gao-2003")
 
 
 def design_lqg(

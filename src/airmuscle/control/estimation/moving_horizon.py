@@ -6,7 +6,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from ...core import Array, ParameterError, Reference, ShortRepr, SolveError, Status, check_field_types
+from ...core import Array, ParameterError, Reference, ShortRepr, SolveError, Status, check_field_types, published
 from ...engine.compile.cache.kernel import Kernel
 from ...recording.recording import Recording
 from ..laws.linear_model_predictive import TOLERANCES, UNLIMITED
@@ -14,16 +14,7 @@ from .estimates import StateEstimate
 from .kalman_filters import ExtendedKalmanFilter
 from .riccati import check_known
 
-RAO2003 = Reference(
-    key="rao-2003",
-    authors="Rao, C. V., Rawlings, J. B., Mayne, D. Q.",
-    title="Constrained state estimation for nonlinear discrete-time systems: stability and moving horizon "
-    "approximations",
-    where="IEEE Transactions on Automatic Control 48(2):246-258",
-    year=2003,
-    doi="10.1109/TAC.2002.808470",
-    note="moving horizon estimation with an arrival cost from the extended Kalman filter",
-)
+RAO2003 = published("rao-2003")
 MAX_HORIZON, STEPS, SETTLED = 200, 20, 1e-9
 """Maximum number of samples of a window; Gauss-Newton steps, and the step in standard deviations that ends them
 (chosen)."""

@@ -3,21 +3,14 @@
 from collections.abc import Mapping
 from typing import ClassVar
 
-from ...core import ParameterError, Reference, Value, autodiff, model, ops, parameter
+from ...core import ParameterError, Reference, Value, autodiff, model, ops, parameter, published
 from ...engine.loop import ControlLaw, Measurement, Memory, Sampled
 from ...physics.mechanism.base import Mechanism
 from ...physics.muscle.characteristic.tondu_lopez2000 import TONDU_LOPEZ_2000
 from ...physics.muscle.muscle import Muscle
 from .static_inverse import check_invertible, pressure_between, static_force
 
-TONIETTI_BICCHI2002 = Reference(
-    key="tonietti-bicchi-2002",
-    authors="Tonietti, G., Bicchi, A.",
-    title="Adaptive simultaneous position and stiffness control for a soft robot arm",
-    where="IEEE/RSJ International Conference on Intelligent Robots and Systems, Lausanne",
-    year=2002,
-    note="simultaneous control of angle and stiffness by two pneumatic muscles",
-)
+TONIETTI_BICCHI2002 = published("tonietti-bicchi-2002")
 
 
 UNREACHED = 0.01

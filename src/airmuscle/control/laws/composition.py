@@ -4,7 +4,19 @@ import itertools
 from collections.abc import Mapping
 from typing import ClassVar
 
-from ...core import Parameter, ParameterError, Reference, Value, alternatives, leaves, model, ops, parameter, unflatten
+from ...core import (
+    Parameter,
+    ParameterError,
+    Reference,
+    Value,
+    alternatives,
+    leaves,
+    model,
+    ops,
+    parameter,
+    published,
+    unflatten,
+)
 from ...core.system import select_prefix, united, with_prefix
 from ...engine.loop import ControlLaw, EnclosingLaw, Measurement, Memory, Sampled, parameter_units
 from .pid import ASTROM_HAGGLUND1995
@@ -142,15 +154,7 @@ class WithFeedForward(ControlLaw):
         return commands, {**with_prefix("feed_forward.", first), **with_prefix("feedback.", second)}
 
 
-RUGH_SHAMMA2000 = Reference(
-    key="rugh-shamma-2000",
-    authors="Rugh, W. J., Shamma, J. S.",
-    title="Research on gain scheduling",
-    where="Automatica 36(10):1401-1425",
-    year=2000,
-    doi="10.1016/S0005-1098(00)00058-3",
-    note="gains interpolated between operating points",
-)
+RUGH_SHAMMA2000 = published("rugh-shamma-2000")
 
 
 @model

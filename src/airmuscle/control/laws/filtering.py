@@ -6,7 +6,18 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ...core import Parameter, ParameterError, Reference, Value, model, ops, parameter, select_prefix, with_prefix
+from ...core import (
+    Parameter,
+    ParameterError,
+    Reference,
+    Value,
+    model,
+    ops,
+    parameter,
+    published,
+    select_prefix,
+    with_prefix,
+)
 from ...engine.loop.control_law import Commanded, ControlLaw, EnclosingLaw, Memory, Sampled, SplitRange, inputs_of
 from ...engine.loop.controller import Measurement, relative_unit
 from .enclosing import MAX_SAMPLES
@@ -90,32 +101,9 @@ def _tustin(coefficients: tuple[Value, ...], k: Value) -> tuple[Value, Value, Va
     return second + first + 1.0, 2.0 - 2.0 * second, second - first + 1.0
 
 
-SMITH1957 = Reference(
-    key="smith-1957",
-    authors="Smith, O. J. M.",
-    title="Closer control of loops with dead time",
-    where="Chemical Engineering Progress 53(5):217-219",
-    year=1957,
-    note="feedback of a model without the dead time",
-)
-HARA1988 = Reference(
-    key="hara-1988",
-    authors="Hara, S., Yamamoto, Y., Omata, T., Nakano, M.",
-    title="Repetitive control system: a new type servo system for periodic exogenous signals",
-    where="IEEE Transactions on Automatic Control 33(7):659-668",
-    year=1988,
-    doi="10.1109/9.1274",
-    note="internal model of a period with a low-pass filter",
-)
-TOMIZUKA1989 = Reference(
-    key="tomizuka-1989",
-    authors="Tomizuka, M., Tsao, T.-C., Chew, K.-K.",
-    title="Analysis and synthesis of discrete-time repetitive controllers",
-    where="Journal of Dynamic Systems, Measurement, and Control 111(3):353-358",
-    year=1989,
-    doi="10.1115/1.3153060",
-    note="zero-phase low-pass filter, stability of the sampled loop",
-)
+SMITH1957 = published("smith-1957")
+HARA1988 = published("hara-1988")
+TOMIZUKA1989 = published("tomizuka-1989")
 
 
 @model

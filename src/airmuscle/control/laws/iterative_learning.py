@@ -6,26 +6,10 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from ...core import Array, ParameterError, Reference, model, parameter
+from ...core import Array, ParameterError, Reference, model, parameter, published
 
-AMANN1996 = Reference(
-    key="amann-1996",
-    authors="Amann, N., Owens, D. H., Rogers, E.",
-    title="Iterative learning control for discrete-time systems with exponential rate of convergence",
-    where="IEE Proceedings - Control Theory and Applications 143(2):217-224",
-    year=1996,
-    doi="10.1049/ip-cta:19960244",
-    note="norm-optimal learning",
-)
-BRISTOW2006 = Reference(
-    key="bristow-2006",
-    authors="Bristow, D. A., Tharayil, M., Alleyne, A. G.",
-    title="A survey of iterative learning control",
-    where="IEEE Control Systems Magazine 26(3):96-114",
-    year=2006,
-    doi="10.1109/MCS.2006.1636313",
-    note="robustness filter Q, condition of monotonic convergence",
-)
+AMANN1996 = published("amann-1996")
+BRISTOW2006 = published("bristow-2006")
 MAX_SAMPLES = 4000
 """Maximum number of samples of a trial, whose matrices have the square of it (chosen)."""
 

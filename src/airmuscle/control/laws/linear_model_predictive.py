@@ -8,7 +8,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ...core import Array, Reference, ShortRepr, Status
+from ...core import Array, Reference, ShortRepr, Status, published
 from ...engine.compile.cache.kernel import Kernel
 from ...engine.loop.controller import Measurement, MultivariableController, failure_notes
 
@@ -46,32 +46,9 @@ class CondensedProblem(ShortRepr):
     max_change: Array
 
 
-RAWLINGS2017 = Reference(
-    key="rawlings-2017",
-    authors="Rawlings, J. B., Mayne, D. Q., Diehl, M. M.",
-    title="Model Predictive Control: Theory, Computation, and Design",
-    where="2nd edition, Nob Hill Publishing, Madison, chapters 1, 2 and 8",
-    year=2017,
-    note="target calculation, disturbance model for offset-free control, condensed quadratic program",
-)
-GOLDFARB_IDNANI1983 = Reference(
-    key="goldfarb-idnani-1983",
-    authors="Goldfarb, D., Idnani, A.",
-    title="A numerically stable dual method for solving strictly convex quadratic programs",
-    where="Mathematical Programming 27:1-33",
-    year=1983,
-    doi="10.1007/BF02591962",
-    note="dual active-set method",
-)
-CHISCI2001 = Reference(
-    key="chisci-2001",
-    authors="Chisci, L., Rossiter, J. A., Zappa, G.",
-    title="Systems with persistent disturbances: predictive control with restricted constraints",
-    where="Automatica 37(7):1019-1028",
-    year=2001,
-    doi="10.1016/S0005-1098(01)00051-6",
-    note="limits narrowed by the reach of bounded disturbances",
-)
+RAWLINGS2017 = published("rawlings-2017")
+GOLDFARB_IDNANI1983 = published("goldfarb-idnani-1983")
+CHISCI2001 = published("chisci-2001")
 _sample = Kernel("predictive_sample", "predictive")
 UNLIMITED, TOLERANCES = 1e30, (1e-9, 1e-6, 1e-12, 1e-9)
 """A limit that nothing reaches; tolerances of the quadratic program, by their places in the kernel (chosen)."""

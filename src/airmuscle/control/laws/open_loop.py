@@ -4,7 +4,7 @@ import abc
 from collections.abc import Mapping
 from typing import ClassVar
 
-from ...core import Parameter, ParameterError, Reference, Value, model, ops, parameter
+from ...core import Parameter, ParameterError, Reference, Value, model, ops, parameter, published
 from ...engine.loop import ControlLaw, Measurement, Memory, Sampled
 from .pid import ASTROM_HAGGLUND1995
 
@@ -109,15 +109,7 @@ class MotionFeedForward(OpenLoopLaw):
         return {self.commanded: motion}
 
 
-ARMSTRONG1994 = Reference(
-    key="armstrong-1994",
-    authors="Armstrong-Hélouvry, B., Dupont, P., Canudas de Wit, C.",
-    title="A survey of models, analysis tools and compensation methods for the control of machines with friction",
-    where="Automatica 30(7), 1083-1138",
-    year=1994,
-    doi="10.1016/0005-1098(94)90209-7",
-    note="compensation of Coulomb friction by a model in the feed-forward",
-)
+ARMSTRONG1994 = published("armstrong-1994")
 
 
 @model

@@ -3,18 +3,11 @@
 import functools
 from typing import ClassVar
 
-from ...core import ParameterError, Reference, Value, model, ops, parameter
+from ...core import ParameterError, Reference, Value, model, ops, parameter, published
 from ...engine.loop import Commanded, Measurement, Memory, Sampled, SisoController, commands, range_of
 from .sliding_mode import sliding_memory, sliding_variable
 
-ASTROM_HAGGLUND1995 = Reference(
-    key="astrom-hagglund-1995",
-    authors="Åström, K. J., Hägglund, T.",
-    title="PID Controllers: Theory, Design, and Tuning",
-    where="2nd edition, Instrument Society of America, Research Triangle Park, chapter 3",
-    year=1995,
-    note="standard form, filter of the derivative, weights of the set point, back-calculation, differences in time",
-)
+ASTROM_HAGGLUND1995 = published("astrom-hagglund-1995")
 
 
 @model

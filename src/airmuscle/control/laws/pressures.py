@@ -3,7 +3,18 @@
 from collections.abc import Mapping
 from typing import ClassVar
 
-from ...core import ParameterError, Reference, Value, model, ops, parameter, select_prefix, united, with_prefix
+from ...core import (
+    ParameterError,
+    Reference,
+    Value,
+    model,
+    ops,
+    parameter,
+    published,
+    select_prefix,
+    united,
+    with_prefix,
+)
 from ...engine.loop import Commanded, ControlLaw, Measurement, Memory, Sampled, commands, range_of
 from ...physics.muscle.characteristic.tondu_lopez2000 import TONDU_LOPEZ_2000
 from .open_loop import OpenLoopLaw
@@ -107,14 +118,7 @@ class ProportionalFeedback(ControlLaw):
         return result
 
 
-SKOGESTAD_POSTLETHWAITE2005 = Reference(
-    key="skogestad-postlethwaite-2005",
-    authors="Skogestad, S., Postlethwaite, I.",
-    title="Multivariable Feedback Control: Analysis and Design",
-    where="2nd edition, Wiley, Chichester, chapter 10",
-    year=2005,
-    note="decentralised control",
-)
+SKOGESTAD_POSTLETHWAITE2005 = published("skogestad-postlethwaite-2005")
 
 
 @model

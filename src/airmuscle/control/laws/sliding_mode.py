@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import ClassVar
 
-from ...core import Reference, Value, model, ops, parameter
+from ...core import Reference, Value, model, ops, parameter, published
 from ...engine.loop import Commanded, Measurement, Memory, Sampled, SisoController, commands, range_of
 
 
@@ -24,15 +24,7 @@ def sliding_variable(
     return error + sliding_time * rate, {"started": 1.0, "error": error, "error_rate": rate}
 
 
-SLOTINE_SASTRY1983 = Reference(
-    key="slotine-sastry-1983",
-    authors="Slotine, J.-J. E., Sastry, S. S.",
-    title="Tracking control of non-linear systems using sliding surfaces, with application to robot manipulators",
-    where="International Journal of Control 38(2):465-492",
-    year=1983,
-    doi="10.1080/00207178308933088",
-    note="sliding variable and boundary layer",
-)
+SLOTINE_SASTRY1983 = published("slotine-sastry-1983")
 
 
 @model
@@ -70,15 +62,7 @@ class SlidingMode(SisoController):
         return commands(self.commanded, ops.clip(self.equivalent_output + self.amplitude * saturated, low, high)), later
 
 
-LEVANT1993 = Reference(
-    key="levant-1993",
-    authors="Levant, A.",
-    title="Sliding order and sliding accuracy in sliding mode control",
-    where="International Journal of Control 58(6):1247-1263",
-    year=1993,
-    doi="10.1080/00207179308923053",
-    note="super-twisting algorithm",
-)
+LEVANT1993 = published("levant-1993")
 
 
 @model

@@ -3,18 +3,11 @@
 from collections.abc import Mapping
 from typing import ClassVar
 
-from ...core import ParameterError, Reference, Value, model, ops, parameter, select_prefix, with_prefix
+from ...core import ParameterError, Reference, Value, model, ops, parameter, published, select_prefix, with_prefix
 from ...engine.loop import ControlLaw, Measurement, Memory, MultivariableController, Sampled
 from .angle_and_stiffness import AntagonisticInverse
 
-FRANKLIN1998 = Reference(
-    key="franklin-1998",
-    authors="Franklin, G. F., Powell, J. D., Workman, M. L.",
-    title="Digital Control of Dynamic Systems",
-    where="3rd edition, Addison-Wesley, Menlo Park, chapters 8 and 9",
-    year=1998,
-    note="state feedback with a predictor-corrector observer and integral action",
-)
+FRANKLIN1998 = published("franklin-1998")
 
 
 @model
@@ -109,23 +102,8 @@ def product(matrix: tuple[Value, ...], vector: list[Value], rows: int = 0) -> li
     return [sum((matrix[i * width + j] * vector[j] for j in range(width)), 0.0) for i in range(rows)]
 
 
-SPONG2020 = Reference(
-    key="spong-2020",
-    authors="Spong, M. W., Hutchinson, S., Vidyasagar, M.",
-    title="Robot Modeling and Control",
-    where="2nd edition, Wiley, Hoboken, chapter 9",
-    year=2020,
-    note="inverse dynamics control (computed torque)",
-)
-FLIESS1995 = Reference(
-    key="fliess-1995",
-    authors="Fliess, M., Lévine, J., Martin, P., Rouchon, P.",
-    title="Flatness and defect of non-linear systems: introductory theory and examples",
-    where="International Journal of Control 61(6), 1327-1361",
-    year=1995,
-    doi="10.1080/00207179508921959",
-    note="flat outputs",
-)
+SPONG2020 = published("spong-2020")
+FLIESS1995 = published("fliess-1995")
 
 
 @model

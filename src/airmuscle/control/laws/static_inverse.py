@@ -5,22 +5,14 @@ from typing import ClassVar
 
 import numpy as np
 
-from ...core import ParameterError, Reference, Value, model, ops, parameter
+from ...core import ParameterError, Reference, Value, model, ops, parameter, published
 from ...physics.muscle.characteristic.base import ForceLaw
 from ...physics.muscle.geometry.meridian import SAGA_2007
 from ...physics.muscle.muscle import Muscle
 from ...physics.muscle.series import ElasticSeriesElement
 from .open_loop import OpenLoopLaw
 
-ANDERSON_BJORCK1973 = Reference(
-    key="anderson-bjorck-1973",
-    authors="Anderson, N., Björck, Å.",
-    title="A new high order method of regula falsi type for computing a root of an equation",
-    where="BIT Numerical Mathematics 13:253-264",
-    year=1973,
-    doi="10.1007/BF01951936",
-    note="the bracketed secant method of the static inverse",
-)
+ANDERSON_BJORCK1973 = published("anderson-bjorck-1973")
 
 
 @model

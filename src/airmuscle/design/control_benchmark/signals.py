@@ -12,7 +12,7 @@ import numpy.typing as npt
 from ...control.laws.angle_and_stiffness import AntagonisticInverse
 from ...control.laws.enclosing import WithStuckValve
 from ...control.laws.static_inverse import static_force
-from ...core import Array, ParameterError, Reference, alternatives
+from ...core import Array, ParameterError, alternatives, published
 from ...engine.loop import ControlLaw, Controller, ControlLoop, Driver, SampledSignal
 from ...physics.plant.plant import Plant
 from ...physics.pneumatics import REFERENCE_DENSITY, FillDischarge, WithTubes, absolute_pressure
@@ -154,14 +154,7 @@ def task_loop(
     return ControlLoop(law, joint.sample_time, setpoint, disturbance(task, plant.inputs), drivers)
 
 
-BONE2019 = Reference(
-    key="bone-2019",
-    authors="Bone, G. M., et al.",
-    title="Discrete-valued model predictive control of a pneumatic actuator with on/off valves",
-    where="Actuators 8(3):56",
-    year=2019,
-    note="metrics ITAE, RMSE, OS, SSE and switches per second",
-)
+BONE2019 = published("bone-2019")
 Mask = npt.NDArray[np.bool_]
 SETTLING_BAND = 0.5
 """Half width of the band in which a motion has settled [degree] (chosen)."""

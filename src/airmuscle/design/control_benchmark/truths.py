@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ...core import Reference, ShortRepr, Value, model, ops, parameter
+from ...core import Reference, ShortRepr, Value, model, ops, parameter, published
 from ...engine.loop import Driver, SolenoidDriver
 from ...files.library.entry_file import load_law
 from ...physics.mechanism import AntagonisticJoint, JointWithExternalTorque
@@ -36,14 +36,7 @@ MAX_EXTRA_DELAY = 2
 """Greatest unknown part of the dead time [samples] (chosen)."""
 PRESLIDING = 5e-4
 """Deflection of a muscle at which its friction slides [m] (chosen)."""
-SAINT_VENANT1839 = Reference(
-    key="saint-venant-wantzel-1839",
-    authors="de Saint-Venant, B., Wantzel, L.",
-    title="Mémoire et expériences sur l'écoulement de l'air",
-    where="Journal de l'École Polytechnique 16(27), 85-122",
-    year=1839,
-    note="isentropic flow through a nozzle; cited after textbooks, not read",
-)
+SAINT_VENANT1839 = published("saint-venant-wantzel-1839")
 
 
 @model

@@ -7,17 +7,10 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from ...core import Array, ParameterError, Reference, check_field_types
+from ...core import Array, ParameterError, Reference, check_field_types, published
 from .tracking import waveform_amplitude
 
-ASTROM_HAGGLUND1984 = Reference(
-    key="astrom-hagglund-1984",
-    authors="Åström, K. J., Hägglund, T.",
-    title="Automatic tuning of simple regulators with specifications on phase and amplitude margins",
-    where="Automatica 20(5), 645-651",
-    year=1984,
-    note="relay experiment and describing function; cited after textbooks, not read",
-)
+ASTROM_HAGGLUND1984 = published("astrom-hagglund-1984")
 UNSETTLED = 0.05
 """Relative change in the last tenth of a step response from which on it is not settled (chosen)."""
 DEAD_BAND = 0.25

@@ -7,19 +7,22 @@ from collections.abc import Callable, Mapping
 import numpy as np
 import numpy.typing as npt
 
-from ...core import Array, ColumnError, ParameterError, Reference, ShortRepr, alternatives, check_field_types, cite
+from ...core import (
+    Array,
+    ColumnError,
+    ParameterError,
+    Reference,
+    ShortRepr,
+    alternatives,
+    check_field_types,
+    cite,
+    published,
+)
 from ...engine.loop.control_loop import ControlLoop
 from .case import GainRange, LoopCase, loop_with_gains
 from .tracking import TrackingIndex
 
-HANSEN2016 = Reference(
-    key="hansen-2016",
-    authors="Hansen, N.",
-    title="The CMA evolution strategy: a tutorial",
-    where="arXiv:1604.00772",
-    year=2016,
-    note="rank-one and rank-mu update, cumulative step-size adaptation and the default constants",
-)
+HANSEN2016 = published("hansen-2016")
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)

@@ -8,7 +8,7 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from ...control.laws.pid import PID
-from ...core import AirmuscleError, Array, ParameterError, Reference, check_field_types
+from ...core import AirmuscleError, Array, ParameterError, Reference, check_field_types, published
 from ...engine.loop import Schedule, WithDrivers, inputs_of, range_of
 from ...engine.run import simulate
 from ...engine.run.integrators import Integrator
@@ -22,41 +22,12 @@ from .process_models import (
     integrator_of_step,
 )
 
-SKOGESTAD2003 = Reference(
-    key="skogestad-2003",
-    authors="Skogestad, S.",
-    title="Simple analytic rules for model reduction and PID controller tuning",
-    where="Journal of Process Control 13, 291-309",
-    year=2003,
-    note="SIMC rules; formulas as quoted in the later literature",
-)
-ASTROM_HAGGLUND2004 = Reference(
-    key="astrom-hagglund-2004",
-    authors="Åström, K. J., Hägglund, T.",
-    title="Revisiting the Ziegler–Nichols step response method for PID control",
-    where="Journal of Process Control 14, 635-650",
-    year=2004,
-    note="AMIGO rules; formulas as quoted in the later literature",
-)
+SKOGESTAD2003 = published("skogestad-2003")
+ASTROM_HAGGLUND2004 = published("astrom-hagglund-2004")
 
 
-ZIEGLER_NICHOLS1942 = Reference(
-    key="ziegler-nichols-1942",
-    authors="Ziegler, J. G., Nichols, N. B.",
-    title="Optimum settings for automatic controllers",
-    where="Transactions of the ASME 64, 759-768",
-    year=1942,
-    note="settings from ultimate gain and period; formulas as quoted in the later literature",
-)
-TYREUS_LUYBEN1992 = Reference(
-    key="tyreus-luyben-1992",
-    authors="Tyreus, B. D., Luyben, W. L.",
-    title="Tuning PI controllers for integrator/dead time processes",
-    where="Industrial & Engineering Chemistry Research 31(11), 2625-2628",
-    year=1992,
-    doi="10.1021/ie00011a029",
-    note="settings from ultimate gain and period; formulas as quoted in the later literature",
-)
+ZIEGLER_NICHOLS1942 = published("ziegler-nichols-1942")
+TYREUS_LUYBEN1992 = published("tyreus-luyben-1992")
 
 
 @dataclasses.dataclass(frozen=True)

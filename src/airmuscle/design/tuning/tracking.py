@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ...core import Array, ParameterError, Reference, check_field_types, suggestion
+from ...core import Array, ParameterError, Reference, check_field_types, published, suggestion
 from ...engine.loop.control_loop import SETPOINT
 
 MAX_HARMONICS, ROWS_PER_HARMONIC, SURE_HARMONICS = 15, 4, 5
@@ -78,14 +78,7 @@ def _two_arcs(phase: Array, values: Array, extrema: Array) -> tuple[float, float
     return residual, 0.25 * float(high + back_high - low - back_low)
 
 
-GRAHAM_LATHROP1953 = Reference(
-    key="graham-lathrop-1953",
-    authors="Graham, D., Lathrop, R. C.",
-    title="The synthesis of “optimum” transient response: criteria and standard forms",
-    where="Transactions of the AIEE, Part II: Applications and Industry 72(5), 273-288",
-    year=1953,
-    note="integral of time-multiplied absolute error (ITAE)",
-)
+GRAHAM_LATHROP1953 = published("graham-lathrop-1953")
 
 
 @dataclasses.dataclass(frozen=True)

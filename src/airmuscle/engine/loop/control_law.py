@@ -8,7 +8,7 @@ import dataclasses
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from ...core import ParameterError, Reference, Value, model, ops, parameter, select_prefix, with_prefix
+from ...core import ParameterError, Reference, Value, model, ops, parameter, published, select_prefix, with_prefix
 from .controller import Controller, Measurement
 
 Memory = Mapping[str, Value]
@@ -166,15 +166,7 @@ class SisoController(ControlLaw):
         return (self.measured,)
 
 
-INOSE1962 = Reference(
-    key="inose-1962",
-    authors="Inose, H., Yasuda, Y., Murakami, J.",
-    title="A telemetering system by code modulation - Δ-Σ modulation",
-    where="IRE Transactions on Space Electronics and Telemetry SET-8(3):204-209",
-    year=1962,
-    doi="10.1109/IRET-SET.1962.5008839",
-    note="first-order modulator",
-)
+INOSE1962 = published("inose-1962")
 
 
 @model

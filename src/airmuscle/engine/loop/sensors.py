@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ...core import Array, ParameterError, Reference, Value, ops, select_prefix, with_prefix
+from ...core import Array, ParameterError, Reference, Value, ops, published, select_prefix, with_prefix
 from ...core.declaration import Parameter, model, parameter
 from .control_law import ControlLaw, EnclosingLaw, Memory, Sampled
 from .controller import Measurement, SignalRelated
@@ -60,15 +60,7 @@ class ColumnSensor(SignalRelated):
         return waiting[0], {"lagged": lagged, **{f"delayed{i}": each for i, each in enumerate(moved)}}
 
 
-LECUYER1999 = Reference(
-    key="lecuyer-1999",
-    authors="L'Ecuyer, P.",
-    title="Good parameters and implementations for combined multiple recursive random number generators",
-    where="Operations Research 47(1):159-164",
-    year=1999,
-    doi="10.1287/opre.47.1.159",
-    note="MRG32k3a, whose products are exact in double precision",
-)
+LECUYER1999 = published("lecuyer-1999")
 FIRST_MODULUS, SECOND_MODULUS = 4294967087.0, 4294944443.0
 _SEED_MODULUS, _SEED_FACTOR = 2147483647.0, 16807.0
 """Park and Miller's generator, from which the state of a seed is taken."""

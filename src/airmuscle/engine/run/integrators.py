@@ -4,38 +4,15 @@ import abc
 import functools
 from typing import ClassVar
 
-from ...core import Array, ParameterError, Reference, abridged, model, parameter
+from ...core import Array, ParameterError, Reference, abridged, model, parameter, published
 from ..compile.cache.kernel import fixed_step, rodas4
 from ..compile.program import CompiledSystem, Tableau
 from ..loop.inputs import PiecewiseLinear
 from .bound_integrator import MAX_STEPS, Binding, BoundIntegrator, RawSolution
 
-HAIRER_WANNER1996 = Reference(
-    "hairer-wanner-1996",
-    "Hairer, E., Wanner, G.",
-    "Solving Ordinary Differential Equations II: Stiff and Differential-Algebraic Problems",
-    "2nd edition, Springer, Berlin, section VI.4",
-    1996,
-    doi="10.1007/978-3-642-05221-7",
-    note="method RODAS",
-)
-KUTTA1901 = Reference(
-    "kutta-1901",
-    "Kutta, W.",
-    "Beitrag zur näherungsweisen Integration totaler Differentialgleichungen",
-    "Zeitschrift für Mathematik und Physik 46:435-453",
-    1901,
-    note="the classical method of order four",
-)
-PRINCE_DORMAND1981 = Reference(
-    "prince-dormand-1981",
-    "Prince, P. J., Dormand, J. R.",
-    "High order embedded Runge-Kutta formulae",
-    "Journal of Computational and Applied Mathematics 7(1):67-75",
-    1981,
-    doi="10.1016/0771-050X(81)90010-3",
-    note="table 2, RK8(7)13M, the weights of order eight",
-)
+HAIRER_WANNER1996 = published("hairer-wanner-1996")
+KUTTA1901 = published("kutta-1901")
+PRINCE_DORMAND1981 = published("prince-dormand-1981")
 
 
 class Integrator(abc.ABC):

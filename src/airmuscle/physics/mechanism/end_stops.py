@@ -3,19 +3,11 @@
 import abc
 from typing import ClassVar
 
-from ...core import ParameterError, Reference, Value, Values, check_structure, model, ops, parameter
+from ...core import ParameterError, Reference, Value, Values, check_structure, model, ops, parameter, published
 from .base import Coordinate, Mechanism
 from .wrapper import MechanismWrapper
 
-HUNT_CROSSLEY1975 = Reference(
-    key="hunt-crossley-1975",
-    authors="Hunt, K. H., Crossley, F. R. E.",
-    title="Coefficient of restitution interpreted as damping in vibroimpact",
-    where="Journal of Applied Mechanics 42(2), 440-445",
-    year=1975,
-    doi="10.1115/1.3423596",
-    note="contact force with a damping proportional to the elastic force",
-)
+HUNT_CROSSLEY1975 = published("hunt-crossley-1975")
 
 
 @model

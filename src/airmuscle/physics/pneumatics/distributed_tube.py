@@ -3,19 +3,12 @@
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from ...core import Reference, Value, Values, model, ops, parameter
+from ...core import Reference, Value, Values, model, ops, parameter, published
 from ...core.system import StateVariable, add_prefix, select_prefix, with_prefix
 from .gas import GAS_CONSTANT, SPECIFIC_HEAT_CONSTANT_PRESSURE, Air, Ambient, Flow, Gas, Isothermal
 from .tube import TubeModel, check_segment_count
 
-BLASIUS1913 = Reference(
-    "blasius-1913",
-    "Blasius, H.",
-    "Das Ähnlichkeitsgesetz bei Reibungsvorgängen in Flüssigkeiten",
-    "Mitteilungen über Forschungsarbeiten auf dem Gebiete des Ingenieurwesens 131",
-    1913,
-    note="friction factor 0.3164 Re^(-1/4) of turbulent flow in a smooth tube",
-)
+BLASIUS1913 = published("blasius-1913")
 TRANSITION_REYNOLDS_NUMBER = (64.0 / 0.3164) ** (4.0 / 3.0)
 """Reynolds number at which the friction of Hagen-Poiseuille and that of Blasius are equal, 1187."""
 MAX_MACH_NUMBER = 1.0 / 3.0

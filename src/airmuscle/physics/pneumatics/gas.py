@@ -8,7 +8,19 @@ import abc
 import dataclasses
 from typing import ClassVar, NamedTuple
 
-from ...core import ABSOLUTE, AMBIENT_PRESSURE, Reference, StateVariable, Value, Values, autodiff, model, ops, parameter
+from ...core import (
+    ABSOLUTE,
+    AMBIENT_PRESSURE,
+    Reference,
+    StateVariable,
+    Value,
+    Values,
+    autodiff,
+    model,
+    ops,
+    parameter,
+    published,
+)
 
 GAS_CONSTANT = 287.05
 """Specific gas constant of dry air [J/(kg K)]."""
@@ -23,10 +35,7 @@ REFERENCE_DENSITY = 1.185
 REFERENCE_TEMPERATURE = 293.15
 """Temperature of the reference atmosphere of ISO 8778 [K]."""
 
-ISO8778 = Reference(
-    "iso-8778", "ISO", "Fluid power: standard reference atmosphere", "ISO 8778", 2003,
-    note="100 kPa, 293.15 K, 1.185 kg/m3",
-)  # fmt: skip
+ISO8778 = published("iso-8778")
 
 
 @model

@@ -2,7 +2,7 @@
 
 from typing import ClassVar
 
-from ...core import Input, ParameterError, Reference, StateVariable, Value, Values, model, ops, parameter
+from ...core import Input, ParameterError, Reference, StateVariable, Value, Values, model, ops, parameter, published
 from .circuit import Circuit, CircuitFlows, ambient_air
 from .gas import NO_FLOW, Air, Ambient, absolute_pressure, gauge_pressure
 from .supply import AirSource
@@ -124,14 +124,7 @@ class ProportionalRegulator(Circuit):
 DELAY_STAGES = 4
 """Number of equal lags that make up the dead time (chosen): 10 to 90 % of a step take 1.2 times the dead time."""
 
-ITV_LOGS = Reference(
-    "actuated-design-lab2026",
-    "Actuated Design Lab",
-    "Measurements of three SMC ITV2050 regulators on pneumatic artificial muscles, and models fitted to them",
-    "public repositories jetson_project (analysis/itv) and porcaro_2026",
-    2026,
-    note="step table, amplitude map, reversals; pilot with integral action, dead zone and leak (models B and BL)",
-)
+ITV_LOGS = published("actuated-design-lab2026")
 
 
 @model

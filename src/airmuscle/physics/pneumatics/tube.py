@@ -4,7 +4,7 @@ import abc
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from ...core import ParameterError, Reference, Value, Values, model, ops, parameter, unflatten
+from ...core import ParameterError, Reference, Value, Values, model, ops, parameter, published, unflatten
 from ...core.system import StateVariable, add_prefix, select_prefix, with_prefix
 from .circuit import Circuit, CircuitFlows, CircuitWrapper, port_prefix
 from .gas import Air, Ambient, Flow, Gas, Isothermal, gauge_pressure
@@ -47,14 +47,7 @@ class TubeModel(abc.ABC):
         return {}
 
 
-ECKERSTEN = Reference(
-    "eckersten-1975",
-    "Eckersten, J.",
-    "Simplified flow calculations for pneumatic components",
-    "Atlas Copco, Stockholm; after P. Beater, Pneumatic Drives, Springer 2007",
-    1975,
-    note="conductance and critical ratio of a tube; secondary source, compared with Darcy's law in the tests",
-)
+ECKERSTEN = published("eckersten-1975")
 _TEMPLATE_VALVE = Valve(1e-8, 0.3)
 
 

@@ -3,7 +3,7 @@
 import abc
 from typing import ClassVar
 
-from ...core import Reference, Value, model, ops, parameter
+from ...core import Reference, Value, model, ops, parameter, published
 from .gas import REFERENCE_DENSITY, REFERENCE_TEMPERATURE, SPECIFIC_HEAT_CONSTANT_PRESSURE, Air, Flow
 
 
@@ -21,14 +21,7 @@ class Orifice(abc.ABC):
         """
 
 
-ISO6358 = Reference(
-    "iso-6358",
-    "ISO",
-    "Pneumatic fluid power: determination of flow-rate characteristics of components using compressible fluids",
-    "ISO 6358-1",
-    2013,
-    note="sonic conductance C, critical pressure ratio b; linear in the pressure difference near equal pressures",
-)
+ISO6358 = published("iso-6358")
 
 
 @model
@@ -73,16 +66,7 @@ class Valve(Orifice):
         return ops.sqrt(1.0 - subsonic**2) / (1.0 - self.laminar_ratio)
 
 
-ISO6358_2013 = Reference(
-    "iso-6358-1-2013",
-    "ISO",
-    "Pneumatic fluid power: determination of flow-rate characteristics of components using compressible fluids, "
-    "part 1, general rules and test methods for steady-state flow",
-    "ISO 6358-1",
-    2013,
-    note="terms: sonic conductance C, critical back-pressure ratio b, subsonic index m, cracking pressure; the formula "
-    "with the cracking pressure is from a secondary source, the standard itself was not available",
-)
+ISO6358_2013 = published("iso-6358-1-2013")
 
 _MIN_BASE = 1e-9
 """Lower bound of the base of the power, which keeps its derivative finite where the chord applies."""

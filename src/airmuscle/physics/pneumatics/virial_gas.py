@@ -2,18 +2,10 @@
 
 from typing import ClassVar
 
-from ...core import Reference, Value, Values, model, ops, parameter
+from ...core import Reference, Value, Values, model, ops, parameter, published
 from .gas import GAS_CONSTANT, HEAT_CAPACITY_RATIO, Air, Ambient, BarotropicGas, FirstLawGas
 
-CIPM_2007 = Reference(
-    "cipm-2007",
-    "Picard, A., Davis, R. S., Gläser, M., Fujii, K.",
-    "Revised formula for the density of moist air (CIPM-2007)",
-    "Metrologia 45:149-155",
-    2008,
-    doi="10.1088/0026-1394/45/2/004",
-    note="compressibility of dry air, coefficients a_0 to a_2 after published programs; 15 to 27 °C, 60 to 110 kPa",
-)
+CIPM_2007 = published("cipm-2007")
 _COMPRESSIBILITY = (1.58123e-6, -2.9331e-8, 1.1043e-10)
 """a_0 [K/Pa], a_1 [1/Pa] and a_2 [1/(K Pa)] of Z = 1 - p/T (a_0 + a_1 t + a_2 t^2) + ..., t in degrees Celsius."""
 

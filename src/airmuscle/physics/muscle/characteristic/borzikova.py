@@ -9,16 +9,21 @@ from typing import ClassVar
 
 import numpy as np
 
-from ....core import GeometryLimitError, ParameterError, Reference, Value, bar, model, ops, parameter, percent
+from ....core import (
+    GeometryLimitError,
+    ParameterError,
+    Reference,
+    Value,
+    bar,
+    model,
+    ops,
+    parameter,
+    percent,
+    published,
+)
 from .base import ContractionLaw
 
-BORZIKOVA = Reference(
-    "borzikova-sam",
-    "Borzíková, Balara, Piteľ",
-    "The Mathematical Model of Contraction Characteristic k = (F, p) of the Pneumatic Artificial Muscle",
-    "FVT TU Košice, Prešov",
-    note="undated; newest reference of 2006, grant 1/4077/07: 2007 or later; minus signs are missing in the text",
-)
+BORZIKOVA = published("borzikova-sam")
 
 
 @model

@@ -4,19 +4,12 @@ import dataclasses
 from collections.abc import Callable
 from typing import ClassVar
 
-from ....core import ParameterError, Reference, Value, model, ops, parameter
+from ....core import ParameterError, Reference, Value, model, ops, parameter, published
 from ..geometry.base import check_degree
 from .base import Characteristic, ForceLaw
 from .validity_range import DataScales, MeasuredPoints, ValidityRange
 
-HOSOVSKY_HILL = Reference(
-    "hosovsky-hill",
-    "Hošovský, A. et al.",
-    "Pneumatic artificial muscle modelling based on modified Hill's muscle model",
-    "TU Košice",
-    note="polynomial of total degree five in contraction and pressure, 21 coefficients, limited to 0..1200 N; "
-    "the coefficients are not printed",
-)
+HOSOVSKY_HILL = published("hosovsky-hill")
 
 
 def exponents(degree: int) -> tuple[tuple[int, int], ...]:

@@ -2,18 +2,11 @@
 
 from typing import ClassVar, Self
 
-from ....core import ParameterError, Reference, Value, model, ops, parameter
+from ....core import ParameterError, Reference, Value, model, ops, parameter, published
 from .base import PressureLaw
 from .validity_range import DataScales, MeasuredPoints
 
-HUNT_2017 = Reference(
-    "hunt-2017",
-    "Hunt, A. J., Graber-Tilton, A., Quinn, R. D.",
-    "Modeling length effects of braided pneumatic actuators",
-    "ASME IDETC/CIE, Cleveland",
-    2017,
-    note="formula and coefficients of a 10 mm Festo muscle from a secondary source: two copies that agree",
-)
+HUNT_2017 = published("hunt-2017")
 
 _MAX_TANGENT_ARGUMENT = 1.5
 """Upper limit of the argument of the tangent; it corresponds to 2.9 MPa, above the strength of any muscle."""

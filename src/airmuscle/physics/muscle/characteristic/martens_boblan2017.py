@@ -2,21 +2,12 @@
 
 from typing import ClassVar, Self
 
-from ....core import Reference, Value, model, ops, parameter
+from ....core import Reference, Value, model, ops, parameter, published
 from ..geometry.braid import Braid
 from .base import ForceLaw
 from .validity_range import DataScales, MeasuredPoints
 
-MARTENS_BOBLAN_2017 = Reference(
-    "martens-boblan-2017",
-    "Martens, M., Boblan, I.",
-    "Modeling the Static Force of a Festo Pneumatic Muscle Actuator: A New Approach and a Comparison to Existing "
-    "Models",
-    "Actuators 6(4):33",
-    2017,
-    "10.3390/act6040033",
-    "formula, parameters and measured force maps of the appendix, CC BY 4.0; numbers read from a public copy",
-)
+MARTENS_BOBLAN_2017 = published("martens-boblan-2017")
 
 _MAX_CONTRACTION = 0.4
 """Upper limit of the contractions for which the modulus E(L) was identified."""

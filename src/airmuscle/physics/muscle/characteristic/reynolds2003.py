@@ -2,20 +2,12 @@
 
 from typing import ClassVar, Self
 
-from ....core import Reference, Value, model, ops, parameter
+from ....core import Reference, Value, model, ops, parameter, published
 from ..passive_elements import Damper, Spring
 from .base import ForceLaw
 from .validity_range import DataScales, MeasuredPoints
 
-REYNOLDS_2003 = Reference(
-    "reynolds-2003",
-    "Reynolds, D. B., Repperger, D. W., Phillips, C. A., Bandry, G.",
-    "Modeling the dynamic characteristics of pneumatic muscle",
-    "Annals of Biomedical Engineering 31(3):310-317",
-    2003,
-    "10.1114/1.1554921",
-    "coefficients from a secondary source, Lilly and Quesada, IEEE TNSRE 12(3):349 (2004); units of N/mm inferred",
-)
+REYNOLDS_2003 = published("reynolds-2003")
 
 
 @model

@@ -2,18 +2,11 @@
 
 from typing import ClassVar, Self
 
-from ....core import Reference, Value, model, ops, parameter
+from ....core import Reference, Value, model, ops, parameter, published
 from .base import ForceLaw
 from .validity_range import DataScales, MeasuredPoints
 
-SAROSI_2012 = Reference(
-    "sarosi-2012",
-    "Sárosi, J.",
-    "New approximation algorithm for the force of fluidic muscles",
-    "7th IEEE International Symposium on Applied Computational Intelligence and Informatics",
-    2012,
-    note="and later papers of the author up to 2017; formula and coefficients from a secondary source",
-)
+SAROSI_2012 = published("sarosi-2012")
 
 
 @model

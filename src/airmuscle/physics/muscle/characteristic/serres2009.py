@@ -2,19 +2,12 @@
 
 from typing import ClassVar, Self
 
-from ....core import Reference, Value, model, ops, parameter
+from ....core import Reference, Value, model, ops, parameter, published
 from ..passive_elements import Damper, Spring
 from .base import ForceLaw
 from .validity_range import DataScales, MeasuredPoints
 
-SERRES_2009 = Reference(
-    "serres-2009",
-    "Serres, J. L., Reynolds, D. B., Phillips, C. A., Gerschutz, M. J., Repperger, D. W.",
-    "Characterisation of a phenomenological model for commercial pneumatic muscle actuators",
-    "Computer Methods in Biomechanics and Biomedical Engineering 12(4):423-430",
-    2009,
-    note="coefficients as printed in the abstract",
-)
+SERRES_2009 = published("serres-2009")
 
 
 @model

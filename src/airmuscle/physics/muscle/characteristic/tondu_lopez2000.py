@@ -2,21 +2,13 @@
 
 from typing import ClassVar, Self
 
-from ....core import Reference, Value, model, ops, parameter
+from ....core import Reference, Value, model, ops, parameter, published
 from ..geometry.braid import Braid
 from .base import MIN_PRESSURE, ForceLaw
 from .solve import check_solution
 from .validity_range import DataScales, MeasuredPoints
 
-TONDU_LOPEZ_2000 = Reference(
-    "tondu-lopez-2000",
-    "Tondu, B., Lopez, P.",
-    "Modeling and control of McKibben artificial muscle robot actuators",
-    "IEEE Control Systems Magazine 20(2):15-38",
-    2000,
-    "10.1109/37.833638",
-    "static model in its usual form, with a constant end correction",
-)
+TONDU_LOPEZ_2000 = published("tondu-lopez-2000")
 
 
 @model

@@ -3,7 +3,7 @@
 import abc
 from typing import Any, ClassVar, NamedTuple, Self
 
-from ....core import ParameterError, Reference, StateVariable, Value, Values, model, ops, parameter
+from ....core import ParameterError, Reference, StateVariable, Value, Values, model, ops, parameter, published
 from .path import LoopScales
 
 
@@ -163,24 +163,11 @@ class IdentifiedFriction(FrictionWrapper):
         return IdentifiedRange((self.min_pressure, self.max_pressure), (-self.max_speed, self.max_speed))
 
 
-TONDU_LOPEZ2000 = Reference(
-    key="tondu-lopez-2000",
-    authors="Tondu, B., Lopez, P.",
-    title="Modeling and control of McKibben artificial muscle robot actuators",
-    where="IEEE Control Systems Magazine 20(2), 15-38",
-    year=2000,
-    doi="10.1109/37.833638",
-    note="dry friction between the threads, proportional to the contact pressure; the affine form is chosen here",
+TONDU_LOPEZ2000 = published(
+    "tondu-lopez-2000",
+    "dry friction between the threads, proportional to the contact pressure; the affine form is chosen here",
 )
-DAVIS_CALDWELL2006 = Reference(
-    key="davis-caldwell-2006",
-    authors="Davis, S., Caldwell, D. G.",
-    title="Braid effects on contractile range and friction modeling in pneumatic muscle actuators",
-    where="The International Journal of Robotics Research 25(4), 359-369",
-    year=2006,
-    doi="10.1177/0278364906063227",
-    note="friction of the threads of the braid, which increases with pressure",
-)
+DAVIS_CALDWELL2006 = published("davis-caldwell-2006")
 
 
 @model

@@ -2,34 +2,13 @@
 
 from typing import Any, ClassVar, Self
 
-from ....core import Reference, StateVariable, Value, Values, model, ops, parameter
+from ....core import Reference, StateVariable, Value, Values, model, ops, parameter, published
 from .base import Friction
 from .path import LoopScales, relative_deflection
 
-BOUC1967 = Reference(
-    key="bouc-1967",
-    authors="Bouc, R.",
-    title="Forced vibration of mechanical systems with hysteresis",
-    where="Proceedings of the Fourth Conference on Nonlinear Oscillation, Prague, 315",
-    year=1967,
-)
-WEN1976 = Reference(
-    key="wen-1976",
-    authors="Wen, Y.-K.",
-    title="Method for random vibration of hysteretic systems",
-    where="Journal of the Engineering Mechanics Division, ASCE, 102(2), 249-263",
-    year=1976,
-    note="the exponent n",
-)
-ISMAIL2009 = Reference(
-    key="ismail-2009",
-    authors="Ismail, M., Ikhouane, F., Rodellar, J.",
-    title="The hysteresis Bouc-Wen model, a survey",
-    where="Archives of Computational Methods in Engineering 16, 161-188",
-    year=2009,
-    doi="10.1007/s11831-009-9031-8",
-    note="normalised form, and the bounds sigma >= 1/2, n >= 1 within which it cannot create energy",
-)
+BOUC1967 = published("bouc-1967")
+WEN1976 = published("wen-1976")
+ISMAIL2009 = published("ismail-2009")
 MIN_RELATIVE_DEFLECTION = 1e-12
 """Lower bound of |w|, so that its powers are differentiable at zero (chosen)."""
 

@@ -2,18 +2,11 @@
 
 from typing import Any, ClassVar, Self
 
-from ....core import Reference, StateVariable, Value, Values, model, ops, parameter
+from ....core import Reference, StateVariable, Value, Values, model, ops, parameter, published
 from .base import Friction
 from .path import LoopScales, deflection
 
-DAHL1968 = Reference(
-    key="dahl-1968",
-    authors="Dahl, P. R.",
-    title="A solid friction model",
-    where="The Aerospace Corporation, El Segundo, report TOR-0158(3107-18)-1",
-    year=1968,
-    note="dF/dx = sigma_0 (1 - (F/F_C) sgn v)^i; here with the exponent i = 1",
-)
+DAHL1968 = published("dahl-1968")
 
 
 @model

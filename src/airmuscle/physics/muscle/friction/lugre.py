@@ -2,19 +2,11 @@
 
 from typing import Any, ClassVar, Self
 
-from ....core import Reference, StateVariable, Value, Values, model, ops, parameter
+from ....core import Reference, StateVariable, Value, Values, model, ops, parameter, published
 from .base import Friction
 from .path import LoopScales, compute_speed, deflection
 
-CANUDAS_DE_WIT1995 = Reference(
-    key="canudas-de-wit-1995",
-    authors="Canudas de Wit, C., Olsson, H., Åström, K. J., Lischinsky, P.",
-    title="A new model for control of systems with friction",
-    where="IEEE Transactions on Automatic Control 40(3), 419-425",
-    year=1995,
-    doi="10.1109/9.376053",
-    note="equations of the bristle and of the force; g(v) in the form with exp(-(v/v_S)^2)",
-)
+CANUDAS_DE_WIT1995 = published("canudas-de-wit-1995")
 
 
 @model

@@ -3,37 +3,13 @@
 from collections.abc import Sequence
 from typing import Any, ClassVar, Self
 
-from ....core import ParameterError, Reference, StateVariable, Value, Values, model, ops, parameter
+from ....core import ParameterError, Reference, StateVariable, Value, Values, model, ops, parameter, published
 from .base import Friction
 from .path import LoopScales, stop_operators
 
-IWAN1966 = Reference(
-    key="iwan-1966",
-    authors="Iwan, W. D.",
-    title="A distributed-element model for hysteresis and its steady-state dynamic response",
-    where="Journal of Applied Mechanics 33(4), 893-900",
-    year=1966,
-    doi="10.1115/1.3625199",
-    note="parallel spring elements with Coulomb sliders",
-)
-GOLDFARB_CELANOVIC1997 = Reference(
-    key="goldfarb-celanovic-1997",
-    authors="Goldfarb, M., Celanovic, N.",
-    title="Modeling piezoelectric stack actuators for control of micromanipulation",
-    where="IEEE Control Systems Magazine 17(3), 69-79",
-    year=1997,
-    doi="10.1109/37.588158",
-    note="the same elements for the hysteresis of a piezoelectric actuator",
-)
-VO_MINH2011 = Reference(
-    key="vo-minh-2011",
-    authors="Vo-Minh, T., Tjahjowidodo, T., Ramon, H., Van Brussel, H.",
-    title="A new approach to modeling hysteresis in a pneumatic artificial muscle using the Maxwell-slip model",
-    where="IEEE/ASME Transactions on Mechatronics 16(1), 177-186",
-    year=2011,
-    doi="10.1109/TMECH.2009.2038373",
-    note="the same elements for the hysteresis of a pneumatic artificial muscle; its parameter values are not used",
-)
+IWAN1966 = published("iwan-1966")
+GOLDFARB_CELANOVIC1997 = published("goldfarb-celanovic-1997")
+VO_MINH2011 = published("vo-minh-2011")
 
 
 def element_rate(deflection: Value, limit: Value, transition: Value, speed: Value) -> Value:

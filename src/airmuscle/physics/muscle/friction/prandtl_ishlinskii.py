@@ -2,31 +2,13 @@
 
 from typing import Any, ClassVar, Self
 
-from ....core import ParameterError, Reference, StateVariable, Value, Values, model, ops, parameter
+from ....core import ParameterError, Reference, StateVariable, Value, Values, model, ops, parameter, published
 from .base import Friction
 from .maxwell_slip import check_equal_lengths, element_rate
 from .path import LoopScales, stop_operators
 
-KUHNEN2003 = Reference(
-    key="kuhnen-2003",
-    authors="Kuhnen, K.",
-    title="Modeling, identification and compensation of complex hysteretic nonlinearities: a modified "
-    "Prandtl-Ishlinskii approach",
-    where="European Journal of Control 9(4), 407-418",
-    year=2003,
-    doi="10.3166/ejc.9.407-418",
-    note="dead-zone operators in series with a Prandtl-Ishlinskii operator, there composed of play operators",
-)
-AL_JANAIDEH2011 = Reference(
-    key="al-janaideh-2011",
-    authors="Al Janaideh, M., Rakheja, S., Su, C.-Y.",
-    title="An analytical generalized Prandtl-Ishlinskii model inversion for hysteresis compensation in "
-    "micropositioning control",
-    where="IEEE/ASME Transactions on Mechatronics 16(4), 734-744",
-    year=2011,
-    doi="10.1109/TMECH.2010.2052366",
-    note="asymmetric and saturating loops of actuators",
-)
+KUHNEN2003 = published("kuhnen-2003")
+AL_JANAIDEH2011 = published("al-janaideh-2011")
 
 
 @model

@@ -5,18 +5,10 @@ from typing import ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from ....core import Reference, Value, model, ops, parameter
+from ....core import Reference, Value, model, ops, parameter, published
 from .base import Geometry
 
-CHOU_HANNAFORD_1996 = Reference(
-    "chou-hannaford-1996",
-    "Chou, C.-P., Hannaford, B.",
-    "Measurement and modeling of McKibben pneumatic artificial muscles",
-    "IEEE Transactions on Robotics and Automation 12(1):90-102",
-    1996,
-    "10.1109/70.481753",
-    "V = b^3/(4 pi n^2) cos(theta) sin^2(theta)",
-)
+CHOU_HANNAFORD_1996 = published("chou-hannaford-1996")
 
 
 @model

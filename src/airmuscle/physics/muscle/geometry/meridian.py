@@ -8,17 +8,9 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from ....core import Array, Reference, Value, ops
+from ....core import Array, Reference, Value, ops, published
 
-SAGA_2007 = Reference(
-    "saga-2007",
-    "Saga, N., Nakamura, T., Yaegashi, K.",
-    "Mathematical Model of Pneumatic Artificial Muscle Reinforced by Straight Fibers",
-    "Journal of Intelligent Material Systems and Structures 18:175-180",
-    2007,
-    "10.1177/1045389X06063462",
-    "equations (1) to (19), Table 1; restored from a damaged copy and rederived",
-)
+SAGA_2007 = published("saga-2007")
 
 Profile = tuple[Array, Array]
 """Axial positions [m] and radii [m]."""

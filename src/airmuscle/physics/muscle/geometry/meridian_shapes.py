@@ -4,7 +4,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from ....core import Array, Reference, Value, model, ops
+from ....core import Array, Reference, Value, model, ops, published
 from .meridian import Meridian, Profile, Segment, double_angle_term, segment_volume, stumpff, triple_angle_term
 
 _NODES, _WEIGHTS = (
@@ -147,14 +147,7 @@ class Catenary(Meridian):
         return half * t, end_radius + half * ops.sqrt(w) * product * (1 - t * t) / 2
 
 
-FERRARESI_2001 = Reference(
-    "ferraresi-2001",
-    "Ferraresi, C., Franco, W., Manuello Bertetto, A.",
-    "Flexible Pneumatic Actuators: A Comparison between the McKibben and the Straight Fibres Muscles",
-    "Journal of Robotics and Mechatronics 13(1), 56 ff.",
-    2001,
-    note="circular meridian, balance at the middle section; secondary source: Saga et al. 2007, with errors",
-)
+FERRARESI_2001 = published("ferraresi-2001")
 
 
 class SegmentDerivatives(NamedTuple):

@@ -5,18 +5,11 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from ....core import Array, Reference, Value, model
+from ....core import Array, Reference, Value, model, published
 from .meridian import Profile, Segment
 from .straight_fibre import FibreTube
 
-DAERDEN_LEFEBER_2001 = Reference(
-    "daerden-lefeber-2001",
-    "Daerden, F., Lefeber, D.",
-    "The concept and design of pleated pneumatic artificial muscles",
-    "International Journal of Fluid Power 2(3):41-50",
-    2001,
-    note="elliptic integrals of a membrane without hoop stress; rederived here, not copied",
-)
+DAERDEN_LEFEBER_2001 = published("daerden-lefeber-2001")
 _ROOT_MU_BRACKET = (1e-6, 0.9)
 """Search interval of sqrt(mu)."""
 _ROOT_TOLERANCES = {"xatol": 0.0, "xrtol": 4 * float(np.finfo(float).eps), "fatol": 0.0, "frtol": 0.0}
