@@ -91,6 +91,7 @@ from .errors import TraceError as TraceError
 from .errors import UnitError as UnitError
 from .errors import UnknownNameError as UnknownNameError
 from .errors import alternatives as alternatives
+from .errors import check_known as check_known
 from .errors import listed as listed
 from .errors import quotable as quotable
 from .errors import suggestion as suggestion

@@ -14,7 +14,7 @@ import numpy as np
 
 from .absolute_pressure import AbsolutePressure
 from .annotation import abridged, conforms, describe, one_line, type_hints
-from .errors import AirmuscleWarning, ParameterError, alternatives
+from .errors import AirmuscleWarning, ParameterError, check_known
 from .short_repr import ShortRepr
 from .units import is_known_unit, quantity, usual_unit
 
@@ -236,7 +236,4 @@ def check_structure(obj: Any) -> None:
 def check_field(cls: type[Any], name: str) -> None:
     """Raise ParameterError, with the closest field name, if a model class has no field of this name."""
     known = [f.name for f in dataclasses.fields(cls) if f.init]
-    if name not in known:
-        raise ParameterError(
-            f"{cls.__name__} has no parameter '{one_line(name)}'{alternatives(name, known, 'its parameters are')}"
-        )
+    check_known(f"{cls.__name__} has no parameter", one_line(name), known, "its parameters are")

@@ -24,7 +24,7 @@ import difflib
 import itertools
 import re
 import unicodedata
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from typing import Any, Self
 
 MAX_LISTED, MAX_LISTED_NAME, MAX_LISTED_TEXT = 40, 60, 400
@@ -274,6 +274,16 @@ def alternatives(name: str, known: Iterable[str], introduction: str = "there are
         stems.setdefault(re.sub(r"\[\d+\]", "[]", each), []).append(each)
     shown = [group[0] if len(group) == 1 else f"{group[0]} to {group[-1]}" for group in stems.values()]
     return f"; {introduction} {listed(shown, longest=MAX_WORD) or 'none'}.{suggestion(str(name), names)}"
+
+
+def check_known(
+    missing: str, names: str | Iterable[str], known: Collection[str], introduction: str = "there are",
+    error: type[AirmuscleError] = ParameterError,
+) -> None:  # fmt: skip
+    """Raise an error, "no input 'x'; there are a, b.", with the nearest name, for the first name that is not known."""
+    for name in (names,) if isinstance(names, str) else names:
+        if name not in known:
+            raise error(f"{missing} '{name}'{alternatives(str(name), known, introduction)}")
 
 
 def suggestion(name: str, known: Iterable[str]) -> str:

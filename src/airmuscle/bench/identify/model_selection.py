@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core import HintedText, IdentificationError
+from ...core import HintedText, IdentificationError, check_known
 from ...engine.processes import Workers
 from ...recording import Recording
 from ...report.chapter import Chapter, NamedValue, Table, TableColumn
@@ -158,8 +158,7 @@ class Comparison(Reported):
     def __getitem__(self, name: str) -> RankedModel:
         """A ranked model by its name. Raises IdentificationError."""
         models = {model.candidate.name: model for model in self.ranking}
-        if name not in models:
-            raise IdentificationError(f"the comparison has no model '{name}'; it has {', '.join(models)}.")
+        check_known("the comparison has no model", name, models, "it has", IdentificationError)
         return models[name]
 
     def chapter(self) -> Chapter:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ...core import Array, ParameterError, alternatives, contraction_text, quantity_text
+from ...core import Array, check_known, contraction_text, quantity_text
 from ...physics.muscle.characteristic import Characteristic, ValidityRange
 from ...recording import Recording
 from ...report.chapter import Chapter, NamedValue, Plot, Table
@@ -115,10 +115,8 @@ class Fit(Reported):
 
     def __getitem__(self, name: str) -> Estimate:
         """An estimate by the path of its parameter, for example `geometry.radius`. Raises ParameterError."""
-        for estimate in self.estimates:
-            if estimate.name == name:
-                return estimate
-        raise ParameterError(f"the fit has no parameter '{name}'{alternatives(name, self.names, 'it has')}")
+        check_known("the fit has no parameter", name, self.names, "it has")
+        return self.estimates[self.names.index(name)]
 
     @property
     def names(self) -> tuple[str, ...]:

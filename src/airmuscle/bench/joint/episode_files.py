@@ -32,7 +32,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core import Array, ColumnError, FileError, alternatives, quantity
+from ...core import Array, ColumnError, FileError, alternatives, check_known, quantity
 from ..readers.file_kind import read_toml
 from .episode_formats import Arrays, find_episode_files, read_arrays
 from .episodes import Episode, Episodes, join, speed_of
@@ -259,6 +259,5 @@ def _columns(name: str, arrays: Arrays, channels: Channels) -> Array:
 
 
 def _array(name: str, arrays: Arrays, column: str) -> Array:
-    if column not in arrays:
-        raise ColumnError(f"{name}: no column '{column}'{alternatives(column, arrays)}")
+    check_known(f"{name}: no column", column, arrays, error=ColumnError)
     return arrays[column]

@@ -30,16 +30,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ...core import (
-    AirmuscleError,
-    ColumnError,
-    ParameterError,
-    abridged,
-    alternatives,
-    check_field_types,
-    listed,
-    suggestion,
-)
+from ...core import AirmuscleError, ColumnError, ParameterError, abridged, check_field_types, listed, suggestion
+from ...core.errors import check_known
 from ...recording.columns import QUANTITIES, parse_heading
 from .channels import RawTable
 from .constants import SPECIMEN, check_stated, parse_constant_name
@@ -155,8 +147,7 @@ def mapping_of_tables(content: Mapping[str, Any], where: str, base: ColumnMappin
     """
     given = {key: value for key, value in content.items() if value is not None}
     for key, value in given.items():
-        if key not in _KEYS:
-            raise ParameterError(f"{where}: unknown key '{key}'{alternatives(key, _KEYS, 'allowed are')}")
+        check_known(f"{where}: unknown key", key, _KEYS, "allowed are")
         if key in (*_TEXTS, *_WORDS) and not isinstance(value, str):
             raise ParameterError(f"{where}: {key} = {abridged(value)}; it must be a quoted text.")
         if key in _WORDS and value not in _WORDS[key]:

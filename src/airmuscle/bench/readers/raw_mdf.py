@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core import Array, FileError, alternatives
+from ...core import Array, FileError, alternatives, check_known
 from .channels import Channel, RawTable, merge_channels
 from .separate_process import import_lab_package, in_separate_process, run_reader
 from .time_base import Decimation, Downsampling, read_reduced
@@ -111,8 +111,7 @@ def _select_groups(path: Path, groups: dict[str, Any], name: str | None) -> list
         raise FileError(f"{path.name}: no channel contains values.")
     if name is None:
         return list(groups.values())
-    if name not in groups:
-        raise FileError(f"{path.name}: no group '{name}'{alternatives(name, groups, 'the groups are')}")
+    check_known(f"{path.name}: no group", name, groups, "the groups are", FileError)
     return [groups[name]]
 
 

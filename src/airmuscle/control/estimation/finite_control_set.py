@@ -8,12 +8,13 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from ...core import Array, ParameterError, Reference, ShortRepr, SolveError, Status, check_field_types, published
+from ...core.errors import check_known
 from ...engine.compile.cache.kernel import Kernel
 from ...engine.compile.function import augmented_rates
 from ...engine.compile.program import compile_system
 from ...engine.loop.controller import Controller, Measurement
 from .estimates import StateEstimate
-from .riccati import check_known, check_numbers, check_sample_time
+from .riccati import check_numbers, check_sample_time
 from .state_estimator import StateEstimator
 
 QI2019 = published("qi-2019")
@@ -83,7 +84,7 @@ class FiniteControlSet(ShortRepr, Controller):
         if not self.permitted or not self.modes:
             raise ParameterError(f"{owner}: give one mode or more, and the permitted deviation of one column or more.")
         for mode in self.modes:
-            check_known(owner, "modes", mode, known.input_names)
+            check_known(f"{owner}: modes names", mode, known.input_names)
             if set(mode) != set(self.modes[0]) or not np.isfinite(list(mode.values())).all():
                 raise ParameterError(
                     f"{owner}: the mode {dict(mode)} must have a finite number for each of {', '.join(self.modes[0])}."

@@ -7,12 +7,12 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from ...core import Array, ParameterError, Reference, ShortRepr, SolveError, Status, check_field_types, published
+from ...core.errors import check_known
 from ...engine.compile.cache.kernel import Kernel
 from ...recording.recording import Recording
 from ..laws.linear_model_predictive import TOLERANCES, UNLIMITED
 from .estimates import StateEstimate
 from .kalman_filters import ExtendedKalmanFilter
-from .riccati import check_known
 
 RAO2003 = published("rao-2003")
 MAX_HORIZON, STEPS, SETTLED = 200, 20, 1e-9
@@ -66,7 +66,7 @@ class MovingHorizonEstimator(ShortRepr):
 
     def __post_init__(self) -> None:
         check_field_types(self)
-        check_known("MovingHorizonEstimator", "bounds", self.bounds, self.filter.states)
+        check_known("MovingHorizonEstimator: bounds names", self.bounds, self.filter.states)
         if not 1 <= self.horizon <= MAX_HORIZON:
             raise ParameterError(
                 f"MovingHorizonEstimator: horizon is {self.horizon}; allowed range: 1 to {MAX_HORIZON} samples."

@@ -6,7 +6,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from ...core import Array, ParameterError, Reference, ShortRepr, check_field_types
+from ...core import Array, ParameterError, Reference, ShortRepr, check_field_types, check_known
 from ...engine.compile.program import compile_system
 from ...engine.loop.controller import Measurement, MultivariableController, failure_notes
 from ...physics.analysis.linear_model import linearise
@@ -14,7 +14,7 @@ from ...physics.analysis.sampled_model import held
 from ..laws.linear_model_predictive import RAWLINGS2017
 from .estimates import StateEstimate
 from .predictive_program import MAX_HORIZON, PredictiveProgram, Programs
-from .riccati import check_known, check_numbers, check_sample_time, regulator
+from .riccati import check_numbers, check_sample_time, regulator
 from .state_estimator import StateEstimator
 
 
@@ -85,7 +85,7 @@ class NonlinearModelPredictive(ShortRepr, MultivariableController):
             ("controlled", self.controlled, columns), ("commanded", self.commanded, known.input_names),
             ("limits", self.limits, columns), ("operating_inputs", self.operating_inputs, known.input_names),
         ):  # fmt: skip
-            check_known(owner, argument, names, allowed)
+            check_known(f"{owner}: {argument} names", names, allowed)
         check_numbers(owner, "permitted", self.permitted, (*known.state_names, *self.commanded), self.commanded)
         if self.estimator.parameters:
             estimated = ", ".join(self.estimator.parameters)

@@ -1,10 +1,10 @@
 """Designs of linear controllers: checks of their arguments, sampled plants, steady states and gains."""
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ...core import Array, ParameterError, alternatives
+from ...core import Array, ParameterError, check_known
 from ...physics.analysis.linear_model import LinearModel
 from ...physics.analysis.sampled_model import held
 
@@ -12,18 +12,11 @@ DISTURBANCE = ".disturbance"
 """End of the name of an estimated disturbance, after that of its state."""
 
 
-def check_known(owner: str, argument: str, names: Iterable[str], known: Sequence[str]) -> None:
-    """Raise ParameterError, with the nearest name, for a name that is not known."""
-    for name in names:
-        if name not in known:
-            raise ParameterError(f"{owner}: {argument} names '{name}'{alternatives(name, known)}")
-
-
 def check_numbers(
     owner: str, argument: str, given: Mapping[str, float], known: Sequence[str], needed: Sequence[str]
 ) -> None:
     """Raise ParameterError for an unknown name, a number that is not positive and finite, or a missing number."""
-    check_known(owner, argument, given, known)
+    check_known(f"{owner}: {argument} names", given, known)
     for name, value in given.items():
         if not 0 < value < float("inf"):
             raise ParameterError(f"{owner}: {argument} of '{name}' is {value!r}; it must be positive and finite.")
@@ -44,9 +37,10 @@ def checked_scale(
     Raises ParameterError for unknown names, numbers that are missing or not positive, and direct feedthrough.
     """
     names = (*model.states, *(f"{name}{DISTURBANCE}" for name in disturbed))
-    check_known(owner, "disturbed", disturbed, model.states)
+    check_known(f"{owner}: disturbed names", disturbed, model.states)
     for argument, chosen in columns.items():
-        check_known(owner, argument, chosen, tuple(columns["measured"]) if argument == "controlled" else model.outputs)
+        known = tuple(columns["measured"]) if argument == "controlled" else model.outputs
+        check_known(f"{owner}: {argument} names", chosen, known)
         for name, row in zip(chosen, model.select(outputs=list(chosen)).D, strict=True):
             if row.any():
                 raise ParameterError(

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core import Array, ParameterError, ShortRepr, SolveError, Status, System, check_field_types, tree
+from ...core import Array, ParameterError, ShortRepr, SolveError, Status, System, check_field_types, check_known, tree
 from ...core.system import check_system, state_vector
 from ...engine.compile.cache.kernel import evaluate
 from ...engine.compile.function import AugmentedRates, augmented_rates, states_and_outputs
@@ -15,7 +15,7 @@ from ...engine.compile.program import CompiledSystem, compile_system
 from ...engine.loop.control_loop import COMMAND
 from ...recording.recording import Recording
 from .estimates import BoundFilter, FilterArrays, Innovation, MeasuredRows, Pass, StateEstimate
-from .riccati import DISTURBANCE, check_known, check_numbers
+from .riccati import DISTURBANCE, check_numbers
 
 UNKNOWN = 1e30
 """Factor of the variance of a missing measurement."""
@@ -62,7 +62,7 @@ class StateEstimator(ShortRepr, abc.ABC):
             ("measured", self.measured, columns), ("parameters", self.parameters, leaves),
             ("disturbances", self.disturbances, states),
         ):  # fmt: skip
-            check_known(owner, argument, names, known)
+            check_known(f"{owner}: {argument} names", names, known)
         check_numbers(owner, "process_noise", self.process_noise, self.states, ())
         check_numbers(owner, "measurement_noise", self.measurement_noise, self.measured, self.measured)
         if not 0 < self.sample_time < float("inf"):
@@ -140,7 +140,7 @@ class StateEstimator(ShortRepr, abc.ABC):
 
         Parameters start at those of the plant and disturbances at 0, unless the state contains them.
         """
-        check_known(type(self).__name__, "deviations", deviations, self.states)
+        check_known(f"{type(self).__name__}: deviations names", deviations, self.states)
         count = len(self._compiled.description.state_names)
         further = {name: self._parameter_values.get(name, 0.0) for name in self.states[count:]}
         own = {name: value for name, value in state.items() if name not in further}

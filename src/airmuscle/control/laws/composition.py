@@ -4,19 +4,8 @@ import itertools
 from collections.abc import Mapping
 from typing import ClassVar
 
-from ...core import (
-    Parameter,
-    ParameterError,
-    Reference,
-    Value,
-    alternatives,
-    leaves,
-    model,
-    ops,
-    parameter,
-    published,
-    unflatten,
-)
+from ...core import Parameter, ParameterError, Reference, Value, leaves, model, ops, parameter, published, unflatten
+from ...core.errors import check_known
 from ...core.system import select_prefix, united, with_prefix
 from ...engine.loop import ControlLaw, EnclosingLaw, Measurement, Memory, Sampled, parameter_units
 from .pid import ASTROM_HAGGLUND1995
@@ -184,11 +173,7 @@ class GainSchedule(EnclosingLaw):
         if any(b <= a for a, b in itertools.pairwise(self.breakpoints)):
             raise ParameterError(f"GainSchedule: the breakpoints {self.breakpoints} must rise.")
         known = {leaf.path: leaf for leaf in leaves(self.law)}
-        if self.scheduled not in known:
-            raise ParameterError(
-                f"GainSchedule: {type(self.law).__name__} has no parameter '{self.scheduled}'"
-                f"{alternatives(self.scheduled, known)}"
-            )
+        check_known(f"GainSchedule: {type(self.law).__name__} has no parameter", self.scheduled, known)
         low, high = known[self.scheduled].declared.bounds
         for value in self.scheduled_values:
             if not low <= value <= high:

@@ -2,7 +2,7 @@
 
 from typing import ClassVar
 
-from ...core import ParameterError, Reference, Value, alternatives, model, ops, parameter, select_prefix, with_prefix
+from ...core import ParameterError, Reference, Value, check_known, model, ops, parameter, select_prefix, with_prefix
 from ...engine.loop import LECUYER1999, STATE, ControlLaw, EnclosingLaw, Measurement, Memory, Sampled, drawn, seeded
 from .pid import ASTROM_HAGGLUND1995
 from .state_feedback import FRANKLIN1998
@@ -242,11 +242,7 @@ class WithStuckValve(EnclosingLaw):
     stuck_opening: float = parameter("1", "u_f", "opening of the stuck valve", bounds=(-1.0, 1.0), default=0.0)
 
     def check(self) -> None:
-        if self.stuck_input not in self.law.inputs:
-            raise ParameterError(
-                f"WithStuckValve: the law does not command '{self.stuck_input}'"
-                f"{alternatives(self.stuck_input, self.law.inputs, 'it commands')}"
-            )
+        check_known("WithStuckValve: the law does not command", self.stuck_input, self.law.inputs, "it commands")
 
     @property
     def initial_memory(self) -> dict[str, float]:

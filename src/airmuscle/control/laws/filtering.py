@@ -11,6 +11,7 @@ from ...core import (
     ParameterError,
     Reference,
     Value,
+    check_known,
     model,
     ops,
     parameter,
@@ -26,10 +27,7 @@ from .state_feedback import FRANKLIN1998
 
 def check_measured(owner: str, law: ControlLaw, column: str) -> None:
     """Raise ParameterError where a law does not measure a column."""
-    if column not in law.measured_columns:
-        raise ParameterError(
-            f"{owner}: the law does not measure '{column}'; it measures {', '.join(law.measured_columns) or 'nothing'}."
-        )
+    check_known(f"{owner}: the law does not measure", column, law.measured_columns, "it measures")
 
 
 @model
@@ -190,11 +188,7 @@ class RepetitiveControl(EnclosingLaw):
                 f"allowed range: a period of 4 to {MAX_SAMPLES}, a lead from 0 to two less than that."
             )
         check_measured("RepetitiveControl", self.law, self.column)
-        if self.column not in self.law.setpoints:
-            raise ParameterError(
-                f"RepetitiveControl: the law has no set point '{self.column}'; there are "
-                f"{', '.join(self.law.setpoints) or 'none'}."
-            )
+        check_known("RepetitiveControl: the law has no set point", self.column, self.law.setpoints)
 
     @property
     def initial_memory(self) -> dict[str, float]:

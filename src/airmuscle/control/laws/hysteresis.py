@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from ...core import Array, Reference, Value, model, ops, parameter, select_prefix, with_prefix
-from ...core.errors import ParameterError, alternatives
+from ...core.errors import ParameterError, check_known
 from ...engine.loop import ControlLaw, EnclosingLaw, Measurement, Memory, Sampled
 from ...physics.muscle.friction.prandtl_ishlinskii import KUHNEN2003
 
@@ -173,11 +173,7 @@ class HysteresisCompensation(EnclosingLaw):
     inverse: InverseHysteresisOperator
 
     def check(self) -> None:
-        if self.commanded not in self.law.inputs:
-            raise ParameterError(
-                f"HysteresisCompensation: the law does not command '{self.commanded}'"
-                f"{alternatives(self.commanded, self.law.inputs, 'it commands')}"
-            )
+        check_known("HysteresisCompensation: the law does not command", self.commanded, self.law.inputs, "it commands")
 
     @property
     def initial_memory(self) -> dict[str, float]:

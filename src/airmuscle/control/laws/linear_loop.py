@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ...core import Array, ParameterError, System, alternatives
+from ...core import Array, ParameterError, System, check_known
 from ...engine.loop import ControlLaw, ControlLoop, ControlLoopState, designed_loop
 from ...physics.analysis import LinearModel, linearise
 from ...physics.analysis.sampled_model import SampledModel, bode_figure, checked_frequencies, nyquist_figure, sampled
@@ -156,10 +156,7 @@ class LinearLoop:
         """
         known = self.law.measured
         name = known[0] if column is None else column
-        if name not in known:
-            raise ParameterError(
-                f"open_loop: the law does not measure '{name}'{alternatives(name, known, 'it measures')}"
-            )
+        check_known("open_loop: the law does not measure", name, known, "it measures")
         return self._model(known.index(name))
 
     @property
@@ -208,8 +205,7 @@ class LinearLoop:
     def step_response(self, setpoint: str, duration: float, size: float = 1.0) -> dict[str, Array]:
         """`time` [s] and the deviations (K,) of all measured columns at the samples after a step of a set point."""
         known = self.law.setpoints
-        if setpoint not in known:
-            raise ParameterError(f"step_response: the law has no set point '{setpoint}'{alternatives(setpoint, known)}")
+        check_known("step_response: the law has no set point", setpoint, known)
         time = self.sample_time * np.arange(max(round(duration / self.sample_time), 1) + 1)
         steps = np.zeros((time.size, len(known)))
         steps[:, known.index(setpoint)] = size

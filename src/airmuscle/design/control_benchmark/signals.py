@@ -12,7 +12,7 @@ import numpy.typing as npt
 from ...control.laws.angle_and_stiffness import AntagonisticInverse
 from ...control.laws.enclosing import WithStuckValve
 from ...control.laws.static_inverse import static_force
-from ...core import Array, ParameterError, alternatives, published
+from ...core import Array, ParameterError, check_known, published
 from ...engine.loop import ControlLaw, Controller, ControlLoop, Driver, SampledSignal
 from ...physics.plant.plant import Plant
 from ...physics.pneumatics import REFERENCE_DENSITY, FillDischarge, WithTubes, absolute_pressure
@@ -49,8 +49,7 @@ class TaskSignals(NamedTuple):
         known.pop("time")
         points = {}
         for name in names:
-            if name not in known:
-                raise ParameterError(f"a task has no set point '{name}'{alternatives(name, known)}")
+            check_known("a task has no set point", name, known)
             points[name] = tuple(zip(self.time.tolist(), known[name].tolist(), strict=True))
         return SampledSignal(points)
 

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from ...core import Array, ParameterError, alternatives, check_field_types
+from ...core import Array, ParameterError, check_field_types, check_known
 
 
 @dataclasses.dataclass(frozen=True)
@@ -212,7 +212,5 @@ TUNING_BEGIN = 0.7
 def find_tasks(names: tuple[str, ...]) -> tuple[ControlTask, ...]:
     """Standard tasks by their names, all without names. Raises ParameterError for an unknown one."""
     known = {task.name: task for task in STANDARD_TASKS}
-    for name in names:
-        if name not in known:
-            raise ParameterError(f"there is no task '{name}'{alternatives(name, known)}")
+    check_known("there is no task", names, known)
     return tuple(known[name] for name in dict.fromkeys(names)) or STANDARD_TASKS

@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core import ABSOLUTE, Array, ParameterError, abridged, alternatives, parameters, quantity
+from ...core import ABSOLUTE, Array, ParameterError, abridged, check_known, parameters, quantity
 from ...core.absolute_pressure import AbsolutePressure, ambient_pressure
 from ...core.tree import absolute_pressures, flatten, leaves, with_parameters
 from ...engine.loop.control_loop import ControlLoop
@@ -66,10 +66,7 @@ class ScenarioTemplate:
     def parameter(self, path: str, where: str) -> ScenarioParameter:
         """The parameter with a path. Raises ParameterError with the closest path."""
         known = self.parameters()
-        if path not in known:
-            raise ParameterError(
-                f"{where}: the scenario has no parameter '{path}'{alternatives(path, known, 'its parameters are')}"
-            )
+        check_known(f"{where}: the scenario has no parameter", path, known, "its parameters are")
         return known[path]
 
     def initial_states(self, varied: Sequence[ScenarioParameter], values: Array) -> list[dict[str, float] | None]:

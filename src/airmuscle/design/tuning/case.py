@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...core import Array, Leaf, ShortRepr, abridged, leaves, structure, with_parameters
-from ...core.errors import ParameterError, PhysicsError, alternatives
+from ...core.errors import ParameterError, PhysicsError, check_known
 from ...engine.loop import Controller, ControlLoop
 from ...physics.equilibrium import find_equilibrium
 from ...physics.plant.plant import Plant
@@ -55,11 +55,7 @@ def gain_ranges(controller: Controller, bounds: Any) -> tuple[GainRange, ...]:
         what = "empty" if isinstance(bounds, Mapping) else abridged(bounds)
         raise ParameterError(f'bounds: they are {what}; give a range for each gain, {{"gain": (0.1, 10.0)}}.')
     known = {leaf.path: leaf for leaf in leaves(controller)}
-    for path in bounds:
-        if path not in known:
-            raise ParameterError(
-                f"bounds: {type(controller).__name__} has no parameter '{path}'{alternatives(str(path), known)}"
-            )
+    check_known(f"bounds: {type(controller).__name__} has no parameter", bounds, known)
     return tuple(_range(known[path], pair) for path, pair in bounds.items())
 
 

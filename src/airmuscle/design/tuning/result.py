@@ -7,17 +7,8 @@ from collections.abc import Callable, Mapping
 import numpy as np
 import numpy.typing as npt
 
-from ...core import (
-    Array,
-    ColumnError,
-    ParameterError,
-    Reference,
-    ShortRepr,
-    alternatives,
-    check_field_types,
-    cite,
-    published,
-)
+from ...core import Array, ColumnError, ParameterError, Reference, ShortRepr, check_field_types, cite, published
+from ...core.errors import check_known
 from ...engine.loop.control_loop import ControlLoop
 from .case import GainRange, LoopCase, loop_with_gains
 from .tracking import TrackingIndex
@@ -113,8 +104,7 @@ class TuningHistory(ShortRepr):
     def means(self, metric: str) -> Array:
         """The mean (E,) of a metric over the cases: `index`, `air` or `travel`."""
         names = ("index", "air", "travel")
-        if metric not in names:
-            raise ColumnError(f"history: no metric '{metric}'{alternatives(metric, names)}")
+        check_known("history: no metric", metric, names, error=ColumnError)
         return np.asarray(getattr(self.metrics, metric).mean(axis=1))
 
     def pareto(self, metric: str) -> npt.NDArray[np.intp]:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ...core import Leaf, ShortRepr, conversion, leaves, quantity
-from ...core.errors import AirmuscleWarning, FileError, ParameterError, alternatives
+from ...core.errors import AirmuscleWarning, FileError, ParameterError, check_known
 from ...engine.loop import ControlLoop, parameter_units
 from ...files.library import Location, ParameterUncertainty, load_law, located_errors, write_text
 from ...files.library.files import is_path, list_plants, read_toml
@@ -109,11 +109,7 @@ class ScenarioLoop(ShortRepr):
             raise ParameterError(f"bounds '{text}' must be a gain, its minimum and its maximum: 'gain=5 1/m:500 1/m'.")
         known = {leaf.path: leaf for leaf in leaves(self.loop.controller)}
         path = path.strip()
-        if path not in known:
-            raise ParameterError(
-                f"bounds '{text}': {type(self.loop.controller).__name__} has no parameter '{path}'"
-                f"{alternatives(path, known)}"
-            )
+        check_known(f"bounds '{text}': {type(self.loop.controller).__name__} has no parameter", path, known)
         unit = self.unit(known[path])
         first, second = (_read_bound(value, unit, self.ambient, f"bounds '{text}'") for value in (low, high))
         return path, (first, second)

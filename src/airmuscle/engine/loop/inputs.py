@@ -10,7 +10,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ...core import FEW, Array, ParameterError, ShortRepr, abridged, all_finite, alternatives, as_float, one_line
+from ...core import FEW, Array, ParameterError, ShortRepr, abridged, all_finite, as_float, check_known, one_line
 
 FEW_SEGMENTS = 16
 """Segments up to which they are gone through one by one, which is faster (measured)."""
@@ -168,9 +168,7 @@ NO_INPUT = "the plant has no input"
 
 def check_input_names(given: Iterable[str], inputs: Sequence[str], prefix: str = NO_INPUT) -> None:
     """Raise ParameterError, with the nearest name, for a name that is no input of the plant."""
-    for name in given:
-        if name not in inputs:
-            raise ParameterError(f"{prefix} '{name}'{alternatives(name, inputs)}")
+    check_known(prefix, given, inputs)
 
 
 def check_mapping(kind: str, given: object, example: str = "((5, 1), (15, 0))") -> None:

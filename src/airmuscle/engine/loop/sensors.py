@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ...core import Array, ParameterError, Reference, Value, ops, published, select_prefix, with_prefix
+from ...core import Array, ParameterError, Reference, Value, check_known, ops, published, select_prefix, with_prefix
 from ...core.declaration import Parameter, model, parameter
 from .control_law import ControlLaw, EnclosingLaw, Memory, Sampled
 from .controller import Measurement, SignalRelated
@@ -125,11 +125,7 @@ class WithSensors(EnclosingLaw):
     def check(self) -> None:
         named = [sensor.column for sensor in self.sensors]
         for name in named:
-            if name not in self.law.measured_columns:
-                raise ParameterError(
-                    f"WithSensors: the law does not measure '{name}'; it measures "
-                    f"{', '.join(self.law.measured_columns) or 'nothing'}."
-                )
+            check_known("WithSensors: the law does not measure", name, self.law.measured_columns, "it measures")
             if named.count(name) > 1:
                 raise ParameterError(f"WithSensors: '{name}' has two sensors; give one for each column.")
         if self.seed % 1.0:

@@ -2,13 +2,14 @@
 
 import dataclasses
 import functools
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from ...core import Array, ParameterError, System, Value, alternatives, autodiff, model, ops, suggestion, tree
+from ...core import Array, ParameterError, System, Value, autodiff, check_known, model, ops, suggestion, tree
 from ...recording.recording import Recording
 from ..loop import SETPOINT, ControlLaw, ControlLoop, Measurement, Memory, Sampled
 from .compiled_law import TracedSample, trace_sample
@@ -135,9 +136,7 @@ class LawWithSensitivities(ControlLaw):
         if not self.columns:
             raise ParameterError("LawWithSensitivities: there are no columns; give at least one.")
         known = [leaf.path for leaf in tree.leaves(self.law)]
-        for path in (path for group in self.columns for path in group):
-            if path not in known:
-                raise ParameterError(f"{type(self.law).__name__} has no parameter '{path}'{alternatives(path, known)}")
+        check_known(f"{type(self.law).__name__} has no parameter", itertools.chain(*self.columns), known)
 
     def _with_derivatives(self, names: tuple[str, ...]) -> tuple[str, ...]:
         return (*names, *(sensitivity(name, k) for name in names for k in range(len(self.columns))))

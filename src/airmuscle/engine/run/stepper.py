@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core import Array, ColumnLimit, DiagnosticCode, Status, System, one_line, tree
-from ...core.errors import ParameterError, SimulationError, alternatives
+from ...core.errors import ParameterError, SimulationError, check_known
 from ...core.system import check_system, state_vector
 from ..compile.cache.kernel import begin_step, end_step
 from ..compile.program import CompiledSystem, compile_system
@@ -134,7 +134,7 @@ class Stepper:
     def __getitem__(self, name: str) -> float:
         """The present value of a state, an output or an input [SI]. Raises ParameterError for an unknown name."""
         if name not in self._index:
-            raise ParameterError(f"Stepper: no state, output or input '{name}'{alternatives(name, self._index)}")
+            check_known("Stepper: no state, output or input", name, self._index)
         kind, i = self._index[name]
         return float(getattr(self, kind)[i])
 
@@ -211,7 +211,7 @@ class Stepper:
         values: list[Any] = self.inputs.tolist()
         for name, value in inputs.items():
             if name not in self.input_names:
-                raise ParameterError(f"Stepper: no input '{name}'{alternatives(name, self.input_names)}")
+                check_known("Stepper: no input", name, self.input_names)
             values[self.input_names.index(name)] = value
         return values
 

@@ -1,9 +1,10 @@
 """Forward sensitivities: a system extended by the derivatives of its states with respect to chosen parameters."""
 
+import itertools
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
-from ...core import ParameterError, Value, alternatives, autodiff, model, ops, parameter, tree
+from ...core import ParameterError, Value, autodiff, check_known, model, ops, parameter, tree
 from ...core.system import Input, SensitivitySystem, StateVariable, System
 
 TOLERANCE_FACTOR = 10.0
@@ -44,22 +45,10 @@ class WithSensitivities(SensitivitySystem):
                 f"there are {len(self.scales)}."
             )
         known = [leaf.path for leaf in tree.leaves(self.inner)]
-        for path in (path for group in self.columns for path in group):
-            if path not in known:
-                raise ParameterError(
-                    f"{type(self.inner).__name__} has no parameter '{path}'{alternatives(path, known)}"
-                )
-        for name in self.dependent_inputs:
-            if name not in self.inner.inputs:
-                raise ParameterError(
-                    f"{type(self.inner).__name__} has no input '{name}'{alternatives(name, self.inner.inputs)}"
-                )
+        check_known(f"{type(self.inner).__name__} has no parameter", itertools.chain(*self.columns), known)
+        check_known(f"{type(self.inner).__name__} has no input", self.dependent_inputs, self.inner.inputs)
         values = _Symbols(self.inner).call("outputs") if self.observed else {}
-        for name in self.observed:
-            if name not in values:
-                raise ParameterError(
-                    f"{type(self.inner).__name__} has no state or output '{name}'{alternatives(name, values)}"
-                )
+        check_known(f"{type(self.inner).__name__} has no state or output", self.observed, values)
 
     @property
     def parameter_indices(self) -> tuple[tuple[int, ...], ...]:

@@ -8,18 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from ...bench.readers.file_kind import read_toml as read_toml_file
-from ...core import (
-    AirmuscleError,
-    FileError,
-    ParameterError,
-    UnknownNameError,
-    abridged,
-    alternatives,
-    listed,
-    one_line,
-    suggestion,
-    units,
-)
+from ...core import AirmuscleError, FileError, ParameterError, UnknownNameError, abridged, one_line, suggestion, units
+from ...core.errors import check_known, listed
 
 
 @dataclasses.dataclass(frozen=True)
@@ -62,9 +52,7 @@ def located_errors(location: object) -> Iterator[None]:
 
 def check_keys(table: Mapping[str, Any], known: Sequence[str], location: Location) -> None:
     """Raise ParameterError for an unknown key, with the most similar known key."""
-    for key in table:
-        if key not in known:
-            raise ParameterError(f"{location}: unknown key '{one_line(key)}'{alternatives(key, known)}")
+    check_known(f"{location}: unknown key", map(one_line, table), known)
 
 
 def read_number(value: Any, unit: str, where: object, about: str = "") -> float:

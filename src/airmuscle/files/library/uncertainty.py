@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core import Array, ParameterError, alternatives, check_field_types, parameter
+from ...core import Array, ParameterError, check_field_types, check_known, parameter
 from ...recording.columns import QUANTITIES
 
 PREDICTED = ("force", "contraction", "pressure")
@@ -43,10 +43,7 @@ class StatedBand:
 
     def __post_init__(self) -> None:
         check_field_types(self)
-        if self.quantity not in PREDICTED:
-            raise ParameterError(
-                f"StatedBand: quantity is '{self.quantity}'{alternatives(self.quantity, PREDICTED, 'allowed are')}"
-            )
+        check_known("StatedBand: quantity is", self.quantity, PREDICTED, "allowed are")
         for name in WIDTHS:
             value = getattr(self, name)
             if value is not None and not (math.isfinite(value) and value > 0.0):

@@ -29,7 +29,7 @@ from types import MappingProxyType
 from typing import Any
 
 from ...bench.identify.prediction import PlantUncertainty
-from ...core import FileError, ParameterError, ShortRepr, alternatives, ambient_pressure
+from ...core import FileError, ParameterError, ShortRepr, ambient_pressure, check_known
 from ...engine.loop import ControlLoop, InputSignal
 from ...engine.run import Integrator, Problem, solve
 from ...physics.plant.plant import Plant
@@ -214,6 +214,4 @@ def initial_pressure(tables: Mapping[str, Any], location: Location, plant: Plant
 
 def check_columns(columns: Sequence[str], known: Sequence[str], location: Location) -> None:
     """Raise ParameterError for a column that a run does not have."""
-    for name in columns:
-        if name not in known:
-            raise ParameterError(f"{location}: the run has no column '{name}'{alternatives(name, known)}")
+    check_known(f"{location}: the run has no column", columns, known)

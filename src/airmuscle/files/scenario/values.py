@@ -10,7 +10,7 @@ from typing import Any
 
 from ...bench.identify.dynamic import InitialValue, StartTime
 from ...bench.identify.dynamic.experiment import ParameterPaths, RecordUnknown
-from ...core import ParameterError, abridged, alternatives, tree
+from ...core import ParameterError, abridged, check_known, tree
 from ...engine.run import Integrator
 from ...physics.plant.plant import Plant
 from ...recording.columns import quantity_of
@@ -126,11 +126,7 @@ def read_paths(value: Any, plant: Plant, where: Location) -> tuple[ParameterPath
                 f"{where} contains {abridged(item)}; each item must be a path in quotes, or a list of paths with one "
                 "common value."
             )
-        for path in paths:
-            if path not in known:
-                raise ParameterError(
-                    f"{where}: the plant has no parameter '{path}'{alternatives(path, known, 'its parameters are')}"
-                )
+        check_known(f"{where}: the plant has no parameter", paths, known, "its parameters are")
     return tuple(tuple(item) if isinstance(item, list) else item for item in value)
 
 

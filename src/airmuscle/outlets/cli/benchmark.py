@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 
-from ...core import InputError, SimulationError, alternatives
+from ...core import InputError, SimulationError, check_known
 from ...design.control_benchmark import Contender, LearningCurve, learn, scenario_contender, standard_contenders
 from ...design.control_benchmark.benchmark import BenchmarkResult, benchmark_controllers
 from ...design.control_benchmark.chapter import benchmark_chapter
@@ -93,8 +93,7 @@ def _contenders(joint: BenchmarkJoint, names: Sequence[str]) -> tuple[Contender,
     for name in names:
         if name not in known and is_path(name):
             known[name] = scenario_contender(joint, name)
-        if name not in known:
-            raise InputError(f"there is no controller '{name}'{alternatives(name, known)}")
+        check_known("there is no controller", name, known, error=InputError)
     return tuple(known[name] for name in dict.fromkeys(names)) or tuple(known.values())
 
 

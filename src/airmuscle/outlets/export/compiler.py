@@ -11,7 +11,7 @@ import sys
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from ...core import FileError, ParameterError, alternatives, temporary_folder
+from ...core import FileError, ParameterError, check_known, temporary_folder
 from .identifiers import template
 
 COMPILERS = ("gcc", "clang", "cc")
@@ -211,8 +211,7 @@ PLATFORMS = {
 
 def find_platform(name: str) -> Platform:
     """The platform of a name. Raises ParameterError, with the nearest name."""
-    if name not in PLATFORMS:
-        raise ParameterError(f"there is no platform '{name}'{alternatives(name, PLATFORMS)}")
+    check_known("there is no platform", name, PLATFORMS)
     return PLATFORMS[name]
 
 

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ...core import Array, Input, ParameterError, ShortRepr, atomic_folder, leaves, with_parameters
+from ...core import Array, Input, ParameterError, ShortRepr, atomic_folder, check_known, leaves, with_parameters
 from ...engine.compile.program import compile_system
 from ...engine.run.integrators import Rodas4
 from ...physics.mechanism import HangingMass
@@ -84,11 +84,7 @@ class MuscleActuator(ShortRepr):
         if bool(tendon) == bool(joint):
             raise ParameterError("MuscleActuator: give either a tendon or a joint as transmission.")
         config = {path: _text(path, value) for path, value in (parameters or {}).items()}
-        for path in config:
-            if path not in self.parameters:
-                raise ParameterError(
-                    f"MuscleActuator: there is no parameter '{path}'; there are {', '.join(self.parameters)}."
-                )
+        check_known("MuscleActuator: there is no parameter", config, self.parameters)
         if rest_length is not None:
             config[REST_LENGTH] = _text(REST_LENGTH, rest_length)
         _load(self.plugin_name, self.library)

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from ...control import LinearModelPredictive
-from ...core import Array, ParameterError, alternatives, atomic_folder
+from ...core import Array, ParameterError, atomic_folder, check_known
 from ...engine.compile.kernel_text import CKernels, plain_kernels
 from ...engine.loop import MEASURED, Controller, ControlLoop, EnclosingLaw, WithSensors, without_simulated
 from ...engine.loop.controller import Measurement
@@ -173,9 +173,7 @@ def make_run(
         run = run_data(problem)
     system = export_system(problem.compiled, plant_parameters)
     known = (*system.columns, *(loop.added_columns if loop else ()))
-    for column in columns:
-        if column not in known:
-            raise ParameterError(f"the run has no column '{column}'{alternatives(column, known)}")
+    check_known("the run has no column", columns, known)
     lines = provenance(title, problem.system, (run.integrator,), notes)
     chosen = tuple(c for c in columns if c != "time") or known
     return ExportedRun(name, system, run, lines, chosen, loop)

@@ -4,7 +4,7 @@ import dataclasses
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from ...core import ParameterError, alternatives, leaves, quantity, with_parameters
+from ...core import check_known, leaves, quantity, with_parameters
 from ...files.library import PARTS, Entry, load_law, scale_entry
 from .declaration import option, request
 from .reading import read_pair
@@ -43,11 +43,7 @@ def with_values(entry: Any, changes: Mapping[str, float | str]) -> Any:
         return entry
     parts = {name: part for name in PARTS if (part := getattr(entry, name, None)) is not None}
     known = {f"{name}.{leaf.path}": leaf for name, part in parts.items() for leaf in leaves(part)}
-    for path in changes:
-        if path not in known:
-            raise ParameterError(
-                f"{entry.name} has no parameter '{path}'{alternatives(path, known, 'its parameters are')}"
-            )
+    check_known(f"{entry.name} has no parameter", changes, known, "its parameters are")
     values = {path: quantity(value, known[path].declared.unit, where=path) for path, value in changes.items()}
     changed = {
         name: with_parameters(part, [values.get(f"{name}.{leaf.path}", leaf.value) for leaf in leaves(part)])

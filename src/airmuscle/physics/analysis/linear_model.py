@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ...core import Array, ParameterError, System, alternatives
+from ...core import Array, ParameterError, System, check_known
 from ...core.system import check_system, state_vector
 from ...engine.compile.function import derivatives
 from ...engine.compile.program import CompiledSystem, compile_system
@@ -234,7 +234,5 @@ def linearise(plant: System, state: Mapping[str, float], inputs: Mapping[str, fl
 def _places(kind: str, wanted: Sequence[str] | None, known: tuple[str, ...]) -> list[int]:
     if wanted is None:
         return list(range(len(known)))
-    for name in wanted:
-        if name not in known:
-            raise ParameterError(f"no {kind} '{name}'{alternatives(name, known)}")
+    check_known(f"no {kind}", wanted, known)
     return [known.index(name) for name in wanted]

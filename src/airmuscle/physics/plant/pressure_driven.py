@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import ClassVar
 
-from ...core import ParameterError, Value, Values, alternatives, model, parameter
+from ...core import ParameterError, Value, Values, check_known, model, parameter
 from ...core.system import Input, StateVariable, System, select_prefix, with_prefix
 from ..mechanism import ExternalLoad, Mechanism
 from ..muscle import Muscle
@@ -104,9 +104,7 @@ class PressureDriven(System):
                 f"PressureDriven: {len(pressures)} pressures are given for {len(self.muscle)} muscles; give one each."
             )
         known = [s.name for s in self.states]
-        for name in values:
-            if name not in known:
-                raise ParameterError(f"PressureDriven: no state '{name}'{alternatives(name, known)}")
+        check_known("PressureDriven: no state", values, known)
         state: dict[str, Value] = dict.fromkeys(known, 0.0)
         contractions = self.mechanism.contractions({**state, **values}, self.resting_lengths)
         for prefix, muscle, p, eps in zip(self.prefixes, self.muscle, pressures, contractions, strict=True):

@@ -7,6 +7,7 @@ import numpy as np
 
 from ...core import ParameterError, TraceError, at_ambient, check_above_vacuum, one_line, quantity, with_ambient
 from ...core.declaration import as_finite_float, check_structure, parameters
+from ...core.errors import check_known
 from ..mechanism import Mechanism
 from ..muscle import Muscle
 from ..muscle.characteristic.validity_range import ValidityRange
@@ -102,9 +103,7 @@ def _check_counts(muscles: Sequence[Muscle], circuit: Any, circuits: Sequence[Ci
 
 def check_free(values: Iterable[str], free: Sequence[str]) -> None:
     """Raise ParameterError for a name that is not a state, or for a state of the air, which the pressure determines."""
-    for name in values:
-        if name not in free:
-            raise ParameterError(f"Plant: no coordinate '{name}'; there are {', '.join(free) or 'none'}.")
+    check_known("Plant: no coordinate", values, free)
 
 
 def as_quantity(where: str, value: Any, unit: str, ambient: Ambient) -> float:

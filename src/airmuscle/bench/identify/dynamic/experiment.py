@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ....core import Hint, ParameterError, ShortRepr, alternatives, check_field_types, tree
+from ....core import Hint, ParameterError, ShortRepr, check_field_types, check_known, tree
 from ....engine.compile import System
 from ....engine.loop.inputs import InputSignal, Schedule, check_input_signal
 from ....physics.pneumatics import Ambient
@@ -168,11 +168,7 @@ def _plant_unknown(
 ) -> Unknown:
     paths = (target,) if isinstance(target, str) else target
     leaves = {leaf.path: leaf for leaf in tree.leaves(plant)}
-    for path in paths:
-        if path not in leaves:
-            raise ParameterError(
-                f"{type(plant).__name__} has no parameter '{path}'{alternatives(path, leaves, 'its parameters are')}"
-            )
+    check_known(f"{type(plant).__name__} has no parameter", paths, leaves, "its parameters are")
     leaf = leaves[paths[0]]
     low, high = bounds.get(paths[0], leaf.declared.bounds)
     name = paths[0] + ("" if record is None else f" of record {record + 1}")
@@ -190,11 +186,9 @@ def _record_unknown(experiment: Experiment, target: StartTime | InitialValue, re
         value, unit, symbol = experiment.start_time, "s", "t_0"
     else:
         known = experiment.initial_conditions.known
-        if target.name not in known:
-            raise ParameterError(
-                f"the initial conditions of record {record + 1} have no known value '{target.name}'"
-                f"{alternatives(target.name, known, 'known are')}"
-            )
+        check_known(
+            f"the initial conditions of record {record + 1} have no known value", target.name, known, "known are"
+        )
         value, symbol = known[target.name], f"{target.name}_0"
         unit = column_heading(target.name).partition("[")[2].rstrip("]") or "SI"
     name, margin = f"{target} of record {record + 1}", target.margin

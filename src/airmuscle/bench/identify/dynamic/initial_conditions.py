@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ....core import Array, IdentificationError, ParameterError, Status, System, alternatives, autodiff, tree
+from ....core import Array, IdentificationError, ParameterError, Status, System, autodiff, check_known, tree
 from ....engine.compile.cache.kernel import newton
 from ....engine.compile.function import Function
 from ....engine.loop import InputSignal, PiecewiseLinear
@@ -73,10 +73,8 @@ class InitialConditions:
         """Raise ParameterError for a name that the system lacks, or where the number of conditions is wrong."""
         names = [s.name for s in system.states]
         for name in (*self.known, *self.stationary, *(n for pair in self.equal for n in pair), *self.settled):
-            if name not in (names if name in (*self.stationary, *self.settled) else values):
-                raise ParameterError(
-                    f"the initial conditions name '{name}'{alternatives(name, values, 'the system has')}"
-                )
+            allowed = names if name in (*self.stationary, *self.settled) else values
+            check_known("the initial conditions name", name, allowed, "the system has")
         count = len(self.known) + len(self.stationary) + len(self.equal) + len(self.settled)
         if count != len(names) or set(self.guess) != set(names):
             raise ParameterError(

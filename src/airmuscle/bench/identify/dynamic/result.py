@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ....core import Array, IdentificationError, ParameterError, alternatives, tree
+from ....core import Array, IdentificationError, check_known, tree
 from ....core.plotting import BLACK, RED, given_axes, legend_outside, new_figure
 from ....engine.compile import System
 from ....recording import Recording
@@ -68,11 +68,9 @@ class DynamicFit(Reported):
 
         Raises ParameterError.
         """
-        for estimate in self.estimates:
-            if estimate.name == name:
-                return estimate
         names = [e.name for e in self.estimates]
-        raise ParameterError(f"the fit has no unknown '{name}'{alternatives(name, names, 'it has')}")
+        check_known("the fit has no unknown", name, names, "it has")
+        return self.estimates[names.index(name)]
 
     @property
     def values(self) -> Array:

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from ....core import Array, ParameterError, Status, System, alternatives, as_float, one_line
+from ....core import Array, ParameterError, Status, System, as_float, check_known, one_line
 from ....core.system import check_system
 from ...compile.program import CompiledSystem, compile_system
 from ...loop import ControlLoop, InputSignal, PiecewiseLinear
@@ -200,9 +200,7 @@ def _job(
 
 
 def _kept(keep: Sequence[str], names: Sequence[str]) -> tuple[str, ...]:
-    for name in [keep] if isinstance(keep, str) else keep:
-        if name not in names:
-            raise ParameterError(f"keep: no column '{name}'{alternatives(name, names)}")
+    check_known("keep: no column", keep, names)
     return (keep,) if isinstance(keep, str) else tuple(dict.fromkeys(keep))
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ....core import AirmuscleError, Array, ParameterError, PhysicsError, System, alternatives, one_line, tree
+from ....core import AirmuscleError, Array, ParameterError, PhysicsError, System, check_known, one_line, tree
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -142,10 +142,7 @@ def variations_of(system: Any, given: Mapping[str, npt.ArrayLike], count: int | 
     leaves = {leaf.path: (place, leaf) for place, leaf in enumerate(tree.leaves(system))}
     columns = []
     for path, values in given.items():
-        if path not in leaves:
-            raise ParameterError(
-                f"variations: {type(system).__name__} has no parameter '{path}'{alternatives(path, leaves)}"
-            )
+        check_known(f"variations: {type(system).__name__} has no parameter", path, leaves)
         columns.append(_column(leaves[path][1], values))
     follow = tree.absolute_pressures(system, dict(zip(given, columns, strict=True)))
     given = {**given, **follow}
@@ -208,9 +205,7 @@ def count_of_states(given: Mapping[str, npt.ArrayLike] | None) -> int | None:
 def given_states(system: System, given: Mapping[str, npt.ArrayLike], count: int) -> Array:
     """Initial states (N, n) from numbers or columns (N,) by name."""
     names = [s.name for s in system.states]
-    for name in given:
-        if name not in names:
-            raise ParameterError(f"the plant has no state '{name}'{alternatives(name, names)}")
+    check_known("the plant has no state", given, names)
     missing = [name for name in names if name not in given]
     if missing:
         raise ParameterError(f"initial_states lack {', '.join(missing)}; give a number for all, or a column (N,).")
