@@ -4,18 +4,19 @@ import dataclasses
 
 import numpy as np
 
+from ....core import tree
 from ....physics.mechanism import Isometric
 from ....physics.muscle import Muscle
 from ....physics.muscle.geometry import Vessel
 from ....physics.plant.plant import Plant
-from ....physics.pneumatics import Circuit, EnergyBalance, FillDischarge, Supply, Tank, Tube, Valve, WithTubes
+from ....physics.pneumatics import Circuit, EnergyBalance, FillDischarge, Supply, Tube, Valve, WithTubes
 from ..dynamic import stated_ambient
 from .record import CampaignRecord
 
 ASSUMED_CONDUCTANCE = 1e-8
 """Conductance [m3/(s Pa)] for which the relative volumes are fitted (chosen)."""
-HEAT_TRANSFER_BOUNDS = (1e-3, 1e3)
-"""Bounds of the heat transfer [W/K] (chosen)."""
+HEAT_TRANSFER, HEAT_TRANSFER_BOUNDS = "gas.heat_transfer", (1e-3, 1e3)
+"""Path of the heat transfer, and its bounds [W/K] (chosen)."""
 
 
 def held_contraction(record: CampaignRecord) -> float:
@@ -50,36 +51,17 @@ def valves_of(circuit: object) -> FillDischarge:
     return valves
 
 
-def with_valves(circuit: object, valves: FillDischarge) -> Circuit:
-    """The circuit with other valves."""
-    return dataclasses.replace(circuit, circuit=valves) if isinstance(circuit, WithTubes) else valves
-
-
 def rescaled(plant: object, scale: float) -> Plant:
     """The plant with its conductances, heat transfer and volumes of supply and tube multiplied by the scale."""
     assert isinstance(plant, Plant)
-    whole, circuit, gas = plant.circuit, valves_of(plant.circuit), plant.gas
-    assert isinstance(gas, EnergyBalance)
-    if isinstance(whole, WithTubes):
-        tube = whole.tube
-        assert isinstance(tube, Tube)
-        assert isinstance(tube.orifice, Valve)
-        orifice = dataclasses.replace(tube.orifice, conductance=tube.orifice.conductance * scale)
-        whole = dataclasses.replace(whole, tube=dataclasses.replace(tube, volume=tube.volume * scale, orifice=orifice))
-    supply = circuit.supply
-    if isinstance(supply, Tank) and isinstance(supply.feed, Valve):
-        feed = dataclasses.replace(supply.feed, conductance=supply.feed.conductance * scale)
-        supply = dataclasses.replace(supply, feed=feed, volume=supply.volume * scale)
-    fill, discharge = (
-        dataclasses.replace(valve, conductance=valve.conductance * scale)
-        for valve in (circuit.fill, circuit.discharge)
-        if isinstance(valve, Valve)
-    )
-    return dataclasses.replace(
-        plant,
-        circuit=with_valves(whole, dataclasses.replace(circuit, supply=supply, fill=fill, discharge=discharge)),
-        gas=dataclasses.replace(gas, heat_transfer=float(np.clip(gas.heat_transfer * scale, *HEAT_TRANSFER_BOUNDS))),
-    )
+    values = [leaf.value for leaf in tree.leaves(plant)]
+    for i, leaf in enumerate(tree.leaves(plant)):
+        if leaf.path == HEAT_TRANSFER:
+            values[i] = float(np.clip(leaf.value * scale, *HEAT_TRANSFER_BOUNDS))
+        elif leaf.path.startswith("circuit.") and leaf.path.endswith(("conductance", "volume")):
+            values[i] = leaf.value * scale
+    changed: Plant = tree.with_parameters(plant, values)
+    return changed
 
 
 def at_record(plant: Plant, record: CampaignRecord, volume: float) -> Plant:

@@ -12,7 +12,7 @@ from ....physics.pneumatics import Circuit, Tank, Valve, WithTubes
 from ...baselines import ARX, PERSISTENCE, TimedRecord, baseline_errors, skill
 from .. import dynamic
 from ..result import Estimate
-from .fill_plants import HEAT_TRANSFER_BOUNDS, sensor_of, valves_of
+from .fill_plants import HEAT_TRANSFER, HEAT_TRANSFER_BOUNDS, sensor_of, valves_of
 from .record import CampaignRecord
 from .transient import thin
 
@@ -105,7 +105,6 @@ FIT_ROWS = 250
 """Maximum number of rows of a fill (chosen)."""
 MIN_DEVIATION = 100.0
 """Least standard deviation of the pressure sensor [Pa] (chosen)."""
-HEAT_TRANSFER = "gas.heat_transfer"
 
 
 def pressure_deviation(records: Sequence[CampaignRecord]) -> float:
