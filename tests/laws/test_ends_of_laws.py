@@ -199,9 +199,7 @@ def test_a_polynomial_volume_has_a_range_without_infinite_slopes_and_without_zer
     for tube in (StraightFibre(0.2, 0.02), PleatedTube(0.2, 0.02)):
         with pytest.raises(GeometryLimitError, match=r"is infinite at a contraction of 0 %. .* such as \(0.01, 0.5\)"):
             as_polynomial(tube)
-    with pytest.raises(
-        ParameterError, match=r"min_contraction -0.1\d* must be less than max_contraction 1, and this less than 1"
-    ):
+    with pytest.raises(ParameterError, match="max_contraction must be less than 1, where the length is zero"):
         as_polynomial(Braid(0.01, 0.43632, 0.2))
     with pytest.raises(ParameterError, match="1 coefficients; at least two are required"):
         ChebyshevGeometry((1e-4,), 0.0, 0.2, 0.2)

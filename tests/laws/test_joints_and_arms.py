@@ -171,14 +171,14 @@ def test_the_tip_of_a_stretched_arm_is_at_its_length():
 @pytest.mark.parametrize(
     ("build", "message"),
     [
-        (lambda: replace(JOINT, min_angle=1.0, max_angle=0.5), "min_angle is 1; it must be less than max_angle, 0.5"),
+        (lambda: replace(JOINT, min_angle=1.0, max_angle=0.5), "min_angle 1 must be less than max_angle 0.5"),
         (lambda: replace(JOINT, profile=CrankProfile(0.0), max_angle=2.0), "allowed range: greater than 0 from -2 to 2 rad"),
         (lambda: PolynomialProfile(()), "coefficients is empty"),
         (lambda: JointWithFriction(SpringLoad(1.0, 1.0), 0.1), "SpringLoad has no angle"),
         (lambda: JointWithFriction(ARM, 0.1), "2 angles; set coordinate .* joint1.angle or joint2.angle"),
         (lambda: JointWithFriction(ARM, 0.1, coordinate="angle"), "its coordinate is 'angle'"),
         (lambda: ArmLink(0.3, 1.0, 0.0), "moment of inertia about the joint is zero"),
-        (lambda: ArmLink(0.3, 1.0, 0.1, min_angle=1.0, max_angle=0.0), "min_angle is 1; it must be less than max_angle, 0"),
+        (lambda: ArmLink(0.3, 1.0, 0.1, min_angle=1.0, max_angle=0.0), "min_angle 1 must be less than max_angle 0"),
         (lambda: MuscleRoute((0,), (0.1,)), "different joint numbers, counted from 1"),
         (lambda: MuscleRoute((1, 1), (0.1, 0.1)), "different joint numbers"),
         (lambda: MuscleRoute((1, 2), (0.1,)), "one radius for each joint"),

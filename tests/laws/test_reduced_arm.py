@@ -231,7 +231,7 @@ def test_a_driven_plant_counts_its_muscles_lags_and_pressures():
     [
         ({"axis": (1, 1, 0)}, r"axis is \(1, 1, 0\); it must be"),
         ({"centre": (0.0, 0.0)}, "centre has 2 numbers; give x, y and z"),
-        ({"min_angle": 1.0, "max_angle": 0.0}, "min_angle is 1; it must be less than max_angle, 0"),
+        ({"min_angle": 1.0, "max_angle": 0.0}, "min_angle 1 must be less than max_angle 0"),
         ({"rotor_inertia": 0.0}, "mass and rotor_inertia are 0; give at least one of them"),
     ],
 )

@@ -299,7 +299,7 @@ def test_a_file_that_cannot_be_written_leaves_nothing(tmp_path: Path):
             '"1.2 kN"',
             '"-1 N"',
             ParameterError,
-            r"\[characteristic\]: Clamped: min_force 0 N must be less than max_force",
+            r"\[characteristic\]: Clamped: min_force 0 must be less than max_force",
         ),
         (
             '"6 bar"',

@@ -50,9 +50,10 @@ def parameter(
 ) -> Any:  # fmt: skip
     """Declare a parameter as a dataclass field; documentation, fits, TOML files and the command line read it from here.
 
-    `bounds` are closed and physical. `fitted=False` excludes the parameter from fits by default (a length measured
-    with a ruler, a clamp). A value other than zero whose magnitude is below `plausible` causes an AirmuscleWarning.
-    Values are in SI units, in `unit`, or texts with a unit, such as "300 mm".
+    `bounds` are closed and physical; of `min_x` and `max_x` of one model the first must be less. `fitted=False`
+    excludes the parameter from fits by default (a length measured with a ruler, a clamp). A value other than zero whose
+    magnitude is below `plausible` causes an AirmuscleWarning. Values are in SI units, in `unit`, or texts with a unit,
+    such as "300 mm".
     """
     return dataclasses.field(
         metadata={
@@ -101,8 +102,16 @@ def _depths_of(cls: type[Any]) -> dict[str, int]:
     return {f.name: str(f.type).count("tuple[") for f in dataclasses.fields(cls)}
 
 
+@functools.cache
+def _limits_of(cls: type[Any]) -> list[tuple[str, str]]:
+    """The pairs of declared parameters `min_...` and `max_...`, of which the first must be less than the second."""
+    names = [declared.name for declared in _parameters_of(cls)]
+    pairs = [(name, f"max_{name[4:]}") for name in names if name.startswith("min_")]
+    return [pair for pair in pairs if pair[1] in names]
+
+
 def _validate(obj: Any) -> None:
-    """Check every field, then the conditions of `check`. Raises ParameterError or UnitError."""
+    """Check every field, the order of limits, then the conditions of `check`. Raises ParameterError or UnitError."""
     if not getattr(obj, "checks_structure", False):
         _check_annotations(obj)
     kind: Any = type(obj)
@@ -116,6 +125,10 @@ def _validate(obj: Any) -> None:
                 f"{abridged(value)}; it must be {expected}."
             )
         object.__setattr__(obj, declared.name, _check_value(type(obj).__name__, declared, value))
+    for low, high in _limits_of(kind):
+        least, most = getattr(obj, low), getattr(obj, high)
+        if not least < most:
+            raise ParameterError(f"{kind.__name__}: {low} {least:g} must be less than {high} {most:g}.")
     if hasattr(obj, "check"):
         obj.check()
 

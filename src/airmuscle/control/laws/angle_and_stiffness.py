@@ -54,11 +54,6 @@ class AntagonisticInverse:
                 f"AntagonisticInverse: {len(self.muscles)} muscles and {len(coordinates)} coordinates; it needs two "
                 "muscles and one joint angle."
             )
-        if self.min_pressure >= self.max_pressure:
-            raise ParameterError(
-                f"AntagonisticInverse: min_pressure is {self.min_pressure:g} Pa; allowed range: below max_pressure, "
-                f"{self.max_pressure:g} Pa."
-            )
         if not 1 <= self.steps <= 20:
             raise ParameterError(f"AntagonisticInverse: steps is {self.steps}; allowed range: 1 to 20.")
         for muscle in self.muscles:

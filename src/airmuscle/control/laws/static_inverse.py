@@ -43,11 +43,6 @@ class StaticInverse:
     steps: int = 10
 
     def check(self) -> None:
-        if self.min_pressure >= self.max_pressure:
-            raise ParameterError(
-                f"StaticInverse: min_pressure is {self.min_pressure:g} Pa; allowed range: below max_pressure, "
-                f"{self.max_pressure:g} Pa."
-            )
         if not 1 <= self.steps <= 40:
             raise ParameterError(f"StaticInverse: steps is {self.steps}; allowed range: 1 to 40.")
         check_invertible("StaticInverse", self.law)

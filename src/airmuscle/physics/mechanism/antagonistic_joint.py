@@ -134,10 +134,7 @@ class AntagonisticJoint(Mechanism):
 
     def check(self) -> None:
         check_structure(self)
-        low, high = self.min_angle, self.max_angle
-        if not low < high:
-            raise ParameterError(f"AntagonisticJoint: min_angle is {low:g}; it must be less than max_angle, {high:g}.")
-        reach = max(abs(low), abs(high))  # the profile of the second muscle is mirrored
+        reach = max(abs(self.min_angle), abs(self.max_angle))  # the profile of the second muscle is mirrored
         check_profile("AntagonisticJoint", self.profile, -reach, reach)
 
     @property

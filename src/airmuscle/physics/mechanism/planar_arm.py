@@ -137,10 +137,6 @@ class ArmLink:
     )
 
     def check(self) -> None:
-        if not self.min_angle < self.max_angle:
-            raise ParameterError(
-                f"ArmLink: min_angle is {self.min_angle:g}; it must be less than max_angle, {self.max_angle:g}."
-            )
         if not self.inertia + self.mass * self.centre**2 > 0.0:
             raise ParameterError("ArmLink: the moment of inertia about the joint is zero; give centre or inertia.")
 

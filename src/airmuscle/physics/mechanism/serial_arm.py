@@ -53,10 +53,6 @@ class SpatialLink:
         for name in ("position", "centre"):
             if len(getattr(self, name)) != 3:
                 raise ParameterError(f"SpatialLink: {name} has {len(getattr(self, name))} numbers; give x, y and z.")
-        if not self.min_angle < self.max_angle:
-            raise ParameterError(
-                f"SpatialLink: min_angle is {self.min_angle:g}; it must be less than max_angle, {self.max_angle:g}."
-            )
         if self.mass == 0.0 and self.rotor_inertia == 0.0:
             raise ParameterError("SpatialLink: mass and rotor_inertia are 0; give at least one of them.")
 

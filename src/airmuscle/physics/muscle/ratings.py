@@ -73,12 +73,6 @@ class Ratings:
     min_temperature: float = _lower_limit("K", "T_min", "minimum permitted ambient temperature", TEMPERATURE_BOUNDS)
     max_temperature: float = _upper_limit("K", "T_max", "maximum permitted ambient temperature", TEMPERATURE_BOUNDS)
 
-    def check(self) -> None:
-        for name in ("pressure", "length", "temperature"):
-            low, high = getattr(self, f"min_{name}"), getattr(self, f"max_{name}")
-            if not low < high:
-                raise ParameterError(f"Ratings: min_{name} {low:g} must be less than max_{name} {high:g}.")
-
     @property
     def stated(self) -> tuple[str, ...]:
         """Names of the values that are stated."""

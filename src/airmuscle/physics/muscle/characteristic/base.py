@@ -9,7 +9,7 @@ import abc
 from collections.abc import Callable
 from typing import Any, ClassVar, NamedTuple, Self
 
-from ....core import IdentificationError, ParameterError, Reference, Value, autodiff, model, ops, parameter
+from ....core import IdentificationError, Reference, Value, autodiff, model, ops, parameter
 from ..quantity_arguments import accept_quantities_in
 from .solve import describe_range, find_first_root, warn_above_whole_length
 from .validity_range import MeasuredPoints
@@ -249,12 +249,6 @@ class Clamped(ForceLaw):
     inner: ForceLaw
     min_force: float = parameter("N", "F_min", "lower limit of the force", fitted=False, default=0.0)
     max_force: float = parameter("N", "F_max", "upper limit of the force", fitted=False, default=1.0e5)
-
-    def check(self) -> None:
-        if not self.min_force < self.max_force:
-            raise ParameterError(
-                f"Clamped: min_force {self.min_force:g} N must be less than max_force {self.max_force:g} N."
-            )
 
     @property
     def contraction_range(self) -> tuple[float, float]:

@@ -134,12 +134,6 @@ class _PolynomialSurface(ContractionLaw):
                 f"{name} with pressure_degree {self.pressure_degree} and force_degree {self.force_degree} needs "
                 f"{expected} coefficients, not {len(self.coefficients)}."
             )
-        for quantity, low, high in (
-            ("pressure", self.min_pressure, self.max_pressure),
-            ("force", self.min_force, self.max_force),
-        ):
-            if not low < high:
-                raise ParameterError(f"{name}: min_{quantity} {low:g} must be less than max_{quantity} {high:g}.")
 
     @property
     def pressure_range(self) -> tuple[float, float]:

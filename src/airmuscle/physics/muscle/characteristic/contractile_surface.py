@@ -58,13 +58,6 @@ class ContractileSurface(ForceLaw):
                 f"ContractileSurface: degree {self.degree} requires {expected} coefficients, not "
                 f"{len(self.coefficients)}."
             )
-        for name, low, high in (
-            ("pressure", self.min_pressure, self.max_pressure),
-            ("contraction", self.min_contraction, self.max_contraction),
-            ("force", self.min_force, self.max_force),
-        ):
-            if not low < high:
-                raise ParameterError(f"ContractileSurface: min_{name} {low:g} must be less than max_{name} {high:g}.")
 
     @classmethod
     def blank(cls, degree: int = 5, *, min_force: float = 0.0, max_force: float = 1e5) -> "ContractileSurface":

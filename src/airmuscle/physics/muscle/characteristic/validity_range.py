@@ -7,7 +7,7 @@ from typing import Any, NoReturn, Self
 
 import numpy as np
 
-from ....core import IdentificationError, ParameterError, Value, model, parameter
+from ....core import IdentificationError, Value, model, parameter
 from ....recording import Recording
 from ..geometry.braid import Braid
 
@@ -32,12 +32,6 @@ class ValidityRange:
     max_contraction: float = parameter(
         "1", "eps_high", "upper limit of the validity range in contraction", bounds=CONTRACTION_BOUNDS, fitted=False
     )
-
-    def check(self) -> None:
-        for name in ("pressure", "contraction"):
-            low, high = getattr(self, name)
-            if not low < high:
-                raise ParameterError(f"ValidityRange: min_{name} {low:g} must be less than max_{name} {high:g}.")
 
     @property
     def pressure(self) -> tuple[float, float]:

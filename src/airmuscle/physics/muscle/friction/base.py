@@ -3,7 +3,7 @@
 import abc
 from typing import Any, ClassVar, NamedTuple, Self
 
-from ....core import ParameterError, Reference, StateVariable, Value, Values, model, ops, parameter, published
+from ....core import Reference, StateVariable, Value, Values, model, ops, parameter, published
 from .path import LoopScales
 
 
@@ -150,13 +150,6 @@ class IdentifiedFriction(FrictionWrapper):
         "m/s", "v_high", "maximum speed in the data; 100 m/s where it is not known", bounds=(1e-9, 100.0),
         fitted=False, default=100.0,
     )  # fmt: skip
-
-    def check(self) -> None:
-        if not self.min_pressure < self.max_pressure:
-            raise ParameterError(
-                f"IdentifiedFriction: min_pressure {self.min_pressure:g} must be less than max_pressure "
-                f"{self.max_pressure:g}."
-            )
 
     @property
     def identified_range(self) -> IdentifiedRange | None:

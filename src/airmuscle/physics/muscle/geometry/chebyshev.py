@@ -119,11 +119,8 @@ class ChebyshevGeometry(Geometry):
             raise ParameterError(
                 f"ChebyshevGeometry: {len(self.coefficients)} coefficients; at least two are required (degree 1)."
             )
-        if not self.min_contraction < self.max_contraction < 1.0:
-            raise ParameterError(
-                f"ChebyshevGeometry: min_contraction {self.min_contraction:g} must be less than max_contraction "
-                f"{self.max_contraction:g}, and this less than 1, where the length is zero."
-            )
+        if not self.max_contraction < 1.0:
+            raise ParameterError("ChebyshevGeometry: max_contraction must be less than 1, where the length is zero.")
 
     @property
     def contraction_range(self) -> tuple[float, float]:
