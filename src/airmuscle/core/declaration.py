@@ -103,7 +103,7 @@ def _depths_of(cls: type[Any]) -> dict[str, int]:
 
 
 @functools.cache
-def _limits_of(cls: type[Any]) -> list[tuple[str, str]]:
+def _limits_of(cls: Any) -> list[tuple[str, str]]:
     """The pairs of declared parameters `min_...` and `max_...`, of which the first must be less than the second."""
     names = [declared.name for declared in _parameters_of(cls)]
     pairs = [(name, f"max_{name[4:]}") for name in names if name.startswith("min_")]
