@@ -11,10 +11,11 @@ from dynamic_study import plant_table
 from airmuscle import load
 from airmuscle.bench import Campaign, ColumnMapping, LeftOutStage, RowReader, classify_records, read
 from airmuscle.bench.identify.campaign import fit_fill_stage
+from airmuscle.engine import Schedule, simulate
 from airmuscle.errors import ColumnError, ParameterError, UnitError
 from airmuscle.files import load_dynamic_fit, load_plant_model, load_scenario
 from airmuscle.files.scenario import campaign_scenarios
-from airmuscle.physics import Ambient
+from airmuscle.physics import Ambient, Braid, EnergyBalance, FillDischarge, Isometric, Muscle, Plant, Supply, Valve
 from airmuscle.recording import Recording
 
 PLANT = 'title = "rig"' + plant_table('model = "Isometric"\ncontraction = 0.1', exponent=1.2, conductance=3e-9)
@@ -118,7 +119,12 @@ def test_a_prediction_has_the_ambient_air_of_its_record_and_says_so(tmp_path):
 
 def test_the_scenarios_of_a_campaign_have_the_ambient_air_of_their_records(tmp_path, monkeypatch):
     muscle = load("dmsp-20-300").muscle
-    (filled,) = read(write(tmp_path), ColumnMapping(constants={"contraction": "0.1", "resting_length": "300 mm"}))
+    ambient, step = Ambient(8e4, 303.15), Schedule({"fill": ((0.2, 1.0),)})
+    valves = FillDischarge(Supply(5e5), Valve(3e-9, 0.35), Valve(3e-9, 0.35))
+    plant = Plant(Muscle.ideal(Braid(0.01, 0.44, 0.3)), valves, Isometric(0.1), EnergyBalance(0.4), ambient)
+    run = simulate(plant, step, duration=3.0, initial_state=plant.state_at(pressure=0.0), output_times=0.01)
+    stated = {"resting_length": 0.3, "ambient": ambient.pressure, "ambient_temperature": ambient.temperature}
+    filled = Recording({name: run[name] for name in ("time", "pressure", "contraction")}, "r.csv", stated)
     columns = {"time": np.linspace(0.0, 60.0, 200), "pressure": np.full(200, 2e5)}
     columns |= {"contraction": np.linspace(0.0, 0.1, 200), "force": np.linspace(500.0, 100.0, 200)}
     slow = Recording(columns, "slow.csv", {"resting_length": 0.3, "ambient": 9e4})

@@ -5,6 +5,7 @@ The reduced arm has not the form of the plant that made the record: gravity ente
 
 from __future__ import annotations
 
+import importlib
 from dataclasses import replace
 
 import numpy as np
@@ -19,8 +20,18 @@ from airmuscle.errors import ParameterError
 EPISODES = made_episodes(30)
 
 
+@pytest.fixture(scope="module", autouse=True)
+def short_search():
+    """Few iterations, because the episodes are few and made."""
+    module = importlib.import_module("airmuscle.bench.joint.fit")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "TRIALS", tuple(replace(each, iterations=25, batch=60) for each in module.TRIALS))
+        patch.setattr(module, "SEARCH", replace(module.SEARCH, iterations=60, batch=80))
+        yield
+
+
 @pytest.fixture(scope="module")
-def fitted():
+def fitted(short_search):
     lines = []
     return fit_joint(EPISODES, left_out=0.2, progress=lines.append), lines
 
