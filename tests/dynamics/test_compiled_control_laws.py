@@ -199,7 +199,7 @@ def test_lqg_gains_are_those_of_python_control():
         ({"permitted_integral": {"position": -1.0}}, "'position' is -1.0; it must be positive"),
         ({"permitted_integral": None}, "give either permitted_integral, for integral action, or disturbed"),
         ({"disturbed": ("speed",)}, "give either permitted_integral, for integral action, or disturbed"),
-        ({"disturbed": ("sped",)}, "disturbed names 'sped'.*Did you mean 'speed'"),
+        ({"disturbed": ("sped",), "permitted_integral": None}, "disturbed names 'sped'.*Did you mean 'speed'"),
         ({"disturbed": ("speed",), "permitted_integral": None}, "process_noise has no number for 'speed.disturbance'"),
         (
             {"measured": ("mass_flow", "position"), "measurement_noise": {"mass_flow": 1.0, "position": 1.0}},

@@ -46,11 +46,11 @@ def design_lqg(
     References: Franklin, Powell and Workman (1998), chapters 8 and 9; Rawlings, Mayne and Diehl (2017), chapter 1, for
     the disturbances.
     """
+    _check_integral(controlled, permitted_integral, disturbed)
     names, scale = checked_scale(
         "design_lqg", model, {"measured": measured, "controlled": controlled}, disturbed, permitted,
         (process_noise, measurement_noise),
     )  # fmt: skip
-    _check_integral(controlled, permitted_integral, disturbed)
     n = len(model.states)
     a, b, by_disturbance = sampled_plant(model, sample_time, scale, np.ones(len(model.inputs)), disturbed)
     c = model.select(outputs=list(measured)).C * scale
