@@ -84,7 +84,7 @@ def test_accelerations_are_those_of_the_library(name, writer, tmp_path, monkeypa
     text = written.path.read_text(encoding="utf-8")
     if writer is write_mjcf:
         root = ET.fromstring(text)
-        for part in ("extension", "actuator"):
+        for part in ("extension", "actuator", "keyframe"):
             root.remove(root.find(part))
         text = ET.tostring(root, encoding="unicode")
     model = mujoco.MjModel.from_xml_string(text)
@@ -101,6 +101,25 @@ def test_accelerations_are_those_of_the_library(name, writer, tmp_path, monkeypa
         v = dict(zip((c.speed for c in coordinates), speeds, strict=True))
         found = mechanism.acceleration(q, v, dict(zip(q, torques, strict=True)), {})
         np.testing.assert_allclose(data.qacc, [found[c.name] for c in coordinates], rtol=1e-7, atol=1e-7)
+
+
+@pytest.mark.tool
+def test_the_keyframe_of_an_mjcf_begins_at_ambient_pressure_and_runs(tmp_path):
+    mujoco = pytest.importorskip("mujoco")
+    written = write_mjcf(plant_of(SERIAL), tmp_path, name="beginning_arm")
+    for plugin in written.plugins:
+        mujoco.mj_loadPluginLibrary(str(plugin.library))
+    model = mujoco.MjModel.from_xml_path(str(written.path))
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, model.key("ambient").id)
+    begin = data.act.copy()
+    for k, plugin in enumerate(written.plugins):
+        plugin.initialise(model, data, f"m{k}", pressure=0.0)
+    np.testing.assert_allclose(data.act, begin, rtol=1e-12)
+    data.ctrl[0] = 1.0
+    for _ in range(100):
+        mujoco.mj_step(model, data)
+    assert np.ptp(data.qpos) > 1e-3
 
 
 @pytest.mark.tool

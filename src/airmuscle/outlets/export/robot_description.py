@@ -11,7 +11,7 @@ from xml.etree import ElementTree as ET
 from ...core import STANDARD_GRAVITY, ParameterError, atomic_folder
 from ...physics.mechanism import AntagonisticJoint, Mechanism, MuscleRoute, PlanarArm, SerialArm
 from ...physics.mechanism.antagonistic_joint import ConstantRadius
-from ...physics.plant import Plant
+from ...physics.plant import Plant, open_plant
 from .identifiers import provenance
 from .mujoco_plugin import REST_LENGTH, MuscleActuator, write_mujoco_plugin
 from .targets import program_name
@@ -136,7 +136,8 @@ def write_mjcf(plant: Plant, folder: str | Path, *, name: str = "robot") -> Writ
     """Write `NAME.xml`, a MuJoCo model of a joint or an arm, and a plugin for each of its muscles beside it.
 
     Each muscle is a tendon with a plugin actuator that contains its valves, gas and friction (`write_mujoco_plugin`).
-    The qpos of the joints are the angles of the plant. Raises ParameterError for a plant whose mechanism is no joint or
+    The qpos of the joints are the angles of the plant; the keyframe `ambient` has zero angles and muscles at ambient
+    pressure. Raises ParameterError for a plant whose mechanism is no joint or
     arm, whose pulleys are not circular, or whose muscles share a circuit, and FileError.
     """
     program = checked_name(name) or program_name(name)
@@ -154,6 +155,7 @@ def write_mjcf(plant: Plant, folder: str | Path, *, name: str = "robot") -> Writ
     for number, link in enumerate(robot.links, start=1):
         body = _mjcf_body(body, link, f"link{number}")
     tendons, actuators = ET.SubElement(root, "tendon"), ET.SubElement(root, "actuator")
+    states: list[float] = []
     for muscle, plugin, route in zip(plant.muscles, made, robot.routes, strict=True):
         rest = route.offset * muscle.geometry.resting_length
         element = ET.SubElement(extension, "plugin", plugin=plugin.plugin_name)
@@ -167,6 +169,9 @@ def write_mjcf(plant: Plant, folder: str | Path, *, name: str = "robot") -> Writ
             actuators, "plugin", name=muscle.name, tendon=muscle.name, plugin=plugin.plugin_name, instance=muscle.name,
             actdim=str(len(plugin.plant.states) + 1), dyntype="user", ctrlrange=f"{low!r} {high!r}",
         )  # fmt: skip
+        states += [*open_plant(plugin.plant, (rest,)).state_at(pressure=0.0).values(), 0.0]
+    keyframe = ET.SubElement(root, "keyframe")
+    ET.SubElement(keyframe, "key", name="ambient", qpos=_numbers((0.0,) * len(robot.links)), act=_numbers(states))
     return WrittenRobot(_written(root, folder, f"{program}.xml"), tuple(made))
 
 
