@@ -346,3 +346,12 @@ def test_no_more_steps_are_taken_than_allowed(method):
     assert (left.status, left.steps) == (Status.TOO_MANY_STEPS, whole.steps - 1)
     enough = method.run(compile_system(plant), segments, 0.0, start, times, whole.steps)
     np.testing.assert_array_equal(enough.rows, whole.rows)
+
+
+@pytest.mark.parametrize("shortest", [1e-309, 1e-320])
+def test_a_time_whose_inverse_is_infinite_ends_the_run(shortest):
+    begin = isothermal().state_at(pressure=1e5)
+    jump = Schedule({"fill": ((0.0, 0.0), (shortest, 1.0))})
+    for signal, duration in ((FILL, shortest), (jump, 0.1)):
+        with pytest.raises(SimulationError, match="is not finite, after 0 steps"):
+            simulate(isothermal(), signal, duration=duration, initial_state=begin)

@@ -152,7 +152,7 @@ def take_step(
             break
         rejections += 1
         h *= ratio
-        if h < 1e-14 * max(abs(t), end - start):
+        if h <= 1e-14 * max(abs(t), end - start):
             status = STEP_TOO_SMALL if error < 1e300 else NOT_FINITE
             break
     if rejections > 0:
