@@ -97,7 +97,7 @@ def _constant_text(value: float | str) -> str:
 
 def _write_hdf5(recording: Recording, temporary: Path, path: Path, comments: bool) -> None:
     h5py = import_lab_package("h5py", path)
-    with h5py.File(temporary, "w") as file:
+    with h5py.File(temporary, "w", track_order=True) as file:
         file.attrs.update(dict(recording.constants))
         for name, unit, values in _columns(recording):
             file.create_dataset(name.replace("/", "_"), data=values).attrs["unit"] = unit
