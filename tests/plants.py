@@ -222,7 +222,7 @@ EXAMPLES = {
                  SpatialLink((0, 1, 0), (0.0, 0.0, 0.1), 1.0, (0.1, 0.0, 0.02), 0.01)),
                 (MuscleRoute((1,), (0.03,), 0.1), MuscleRoute((2,), (-0.03,), 0.1)),
             ),
-            (StickSlip(0.5, (1e-3, 0.0)), StickSlip(0.3, (), 0.5)),
+            (StickSlip(0.5, (1e-3, 0.0)), StickSlip(0.3, (), 0.5, bearing_arms=(0.02, 0.01))),
             GaussianResidual(("m0.pressure", "m1.pressure"), (0.5, 0.4), (1e5, 1e5), (0.1, -0.2, 2.0, 1.0, -0.3, 0.2, 3.0, 1.5),
                              (0.6, -0.4), (0.3, -0.2, 0.1, 0.4)),
         ), 2

@@ -164,6 +164,54 @@ def test_a_joint_holds_below_its_friction_and_slides_above_it():
     assert abs(joint_on(2.2)[-1]) < 0.004
 
 
+BEAM = SerialArm(
+    (
+        SpatialLink((0, 0, 1), rotor_inertia=0.02),
+        SpatialLink((1, 0, 0), (0.3, 0.0, 0.0), 1.5, (0.1, 0.0, 0.0), 0.01, 0.02),
+    ),
+    PAIR,
+)
+"""A link whose centre of mass is on its axis, 0.4 m from the vertical axis of the joint before."""
+
+
+@given(angle=angles, speed=speeds, acceleration=st.floats(-50.0, 50.0))
+def test_a_bearing_carries_its_links_and_accelerates_them(angle, speed, acceleration):
+    """m sqrt((L alpha)^2 + g^2) across the axis, m L w^2 along it; the first joint, the other way round."""
+    motion_of_both = {"joint1.angle": 0.3, "joint2.angle": angle, "joint1.angular_speed": speed}
+    rates = {"joint1.angle": acceleration, "joint2.angle": 7.0}
+    rotation = {**motion_of_both, "joint2.angular_speed": 1.0}
+    first, second = (BEAM.bearing_force(joint, motion_of_both, rotation, rates) for joint in (0, 1))
+    turned, turning = 1.5 * 0.4 * speed**2, 1.5 * 0.4 * acceleration
+    weight = 1.5 * BEAM.gravity
+    assert second == pytest.approx((np.hypot(turning, weight), turned), rel=1e-4, abs=1e-9)
+    assert first == pytest.approx((np.hypot(turning, turned), weight), rel=1e-4, abs=0.101)
+
+
+@given(torque=st.floats(-20.0, 20.0), speed=st.floats(0.5, 4.0), turning=speeds)
+def test_the_friction_grows_with_the_load_of_the_bearing(torque, speed, turning):
+    """T_c + r_1 R_r + r_2 R_a at the accelerations of the arm, in whose power that leaves it this friction is."""
+    element = StickSlip(0.4, (), presliding_angle=0.004, bearing_arms=(0.02, 0.03))
+    arm = WithStickSlip(BEAM, (StickSlip(0.1, presliding_angle=0.004), element))
+    q = {"joint1.angle": 0.2, "joint2.angle": -0.4, "joint1.friction_bristle": 0.0, "joint2.friction_bristle": 1.0}
+    v = {"joint1.angular_speed": turning, "joint2.angular_speed": speed}
+    forces = {"joint1.angle": torque, "joint2.angle": 3.0}
+    moved = arm.acceleration(q, v, forces, {})
+    across, along = BEAM.bearing_force(1, q, v, moved)
+    friction = 3.0 - BEAM.inverse_dynamics(q, v, moved)["joint2.angle"]
+    assert friction == pytest.approx(0.4 + 0.02 * across + 0.03 * along, rel=1e-9)
+    without = replace(arm, elements=(arm.elements[0], replace(element, bearing_arms=())))
+    lost = [each.dissipated_power(q, v, forces, {}) for each in (arm, without)]
+    assert lost[0] - lost[1] == pytest.approx((friction - 0.4) * speed, rel=1e-9)
+
+
+@pytest.mark.parametrize(("inner", "arms"), [(BEAM, (0.1,) * 3), (AntagonisticJoint(0.03, 0.05), (0.1,))])
+def test_bearing_arms_are_those_of_a_serial_arm(inner, arms):
+    name = f"{len(arms)} bearing_arms are given for a joint of {type(inner).__name__}; a SerialArm takes one or two"
+    elements = (replace(SLIP, load_arms=(), bearing_arms=arms),) * len(inner.coordinates)
+    with pytest.raises(ParameterError, match=name):
+        WithStickSlip(inner, elements)
+
+
 def test_friction_needs_an_element_for_each_angle_and_a_load_for_each_muscle():
     with pytest.raises(
         ParameterError, match="SerialArm has 3 angles and 1 elements are given; give one for each angle"

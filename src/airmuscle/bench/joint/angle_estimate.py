@@ -11,7 +11,7 @@ from .episodes import COVERAGE, Episode, Episodes, in_pairs
 from .free_run import angles
 from .result import ArmFit
 
-MEMBERS, CALIBRATED, EARLIER = 12, 400, 10
+MEMBERS, CALIBRATED, EARLIER = 12, 800, 10
 """Poses from which every episode is run, episodes of the fit whose errors make correction and band, and rows before a
 row whose pressures the correction sees, too (chosen)."""
 UNSEEN = 0.5

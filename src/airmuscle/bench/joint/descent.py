@@ -17,8 +17,9 @@ SUBSTEPS = 3
 """Steps of the integrator in a row."""
 CLIP, OUTLIER = 0.3, 3.0
 """Errors [rad] from which a residual counts less, and not at all: contact or a lost sensor (chosen)."""
-MEMORY, RATE, DAMPING, MAX_CHANGE = 0.9, 0.3, 1e-2, 0.4
-"""Share of the past in the running averages, step, damping, greatest relative change of a parameter (chosen)."""
+MEMORY, RATE, DAMPING, LATE_DAMPING, MAX_CHANGE = 0.9, 0.3, 1e-2, 1e-3, 0.4
+"""Share of the past in the running averages, step, damping and that of the second half of a stage, without which a
+search stops far up a valley of two parameters that act alike; greatest relative change of a parameter (chosen)."""
 CHECKED, LOST, SAMPLE = 10, 1.5, 400
 """Iterations after which the cost of their mean is checked, its ratio to the best one from which the search has lost
 its way, and windows from which it is computed (chosen)."""
@@ -30,6 +31,7 @@ SIZES = {
     "damping": 0.3, "coulomb_torque": 0.5, "load_arms": 4e-3, "presliding_angle": 2e-3, "lags": 0.01, "mass": 1.0,
     "static_excess": 0.3, "stribeck_speed": 1.0, "zero_angle": 1.0, "rotor_inertia": 0.03, "centre": 0.2,
     "slack_width": 5.0, "inertia": 0.03, "energies": 1.0, "friction_logs": 0.3,
+    "bearing_arms": 0.05,
 }  # fmt: skip
 """Typical sizes [SI] of parameters that may start at 0 (chosen)."""
 
@@ -45,11 +47,12 @@ class SearchStage:
 
 @dataclasses.dataclass(eq=False)
 class Descent:
-    """Search for the parameters of an arm; `paths` are, for some of the joints, those that their motion depends on."""
+    """Search for the parameters of an arm, by their paths in it, on which the motion of one joint depends."""
 
     arm: PressureDriven
     windows: Windows
-    paths: Mapping[int, Sequence[str]]
+    joint: int
+    names: Sequence[str]
     seed: int = 0
     prior: Mapping[str, float] = dataclasses.field(default_factory=dict)
     """Values towards which parameters are drawn that the record hardly determines, by path; with `ridge` as weight."""
@@ -57,13 +60,12 @@ class Descent:
 
     def __post_init__(self) -> None:
         leaves = {leaf.path: leaf for leaf in tree.leaves(self.arm)}
-        self.names = list(dict.fromkeys(path for own in self.paths.values() for path in own))
         self.values = np.array([float(leaves[path].value) for path in self.names])
         self.sizes = np.array([typical_size(path, leaves) for path in self.names])
         self.low = np.array([max(leaves[p].declared.bounds[0], LOW.get(_field(p), -np.inf)) for p in self.names])
         self.high = np.array([leaves[p].declared.bounds[1] for p in self.names])
         self.rng = np.random.default_rng(self.seed)
-        self.spread = np.full(len(self.paths), 0.1)
+        self.spread = 0.1
 
     def run(self, schedule: SearchStage) -> float:
         """Descend; afterwards `arm` is the mean of CHECKED iterates in turn with the smallest cost, which is returned.
@@ -77,13 +79,11 @@ class Descent:
         for step in range(1, schedule.iterations + 1):
             which = self.rng.permutation(len(self.windows))[: schedule.batch]
             batch = self.windows.part(np.sort(which), rows)
-            found = [self._of_joint(joint, batch) for joint in self.paths]
-            self.spread = np.array(
-                [0.9 * s + 0.1 * max(e, 1e-3) for s, (*_, e) in zip(self.spread, found, strict=True)]
-            )
-            new_normal, new_slope = self._sum(found)
+            new_normal, new_slope = self._equations(batch)
             normal, slope = MEMORY * normal + (1 - MEMORY) * new_normal, MEMORY * slope + (1 - MEMORY) * new_slope
-            self._step(normal, slope, 0.4 * rate if step > 0.7 * schedule.iterations else rate)
+            late = step / schedule.iterations
+            damping = DAMPING if late <= 0.5 else LATE_DAMPING
+            self._step(normal, slope, 0.4 * rate if late > 0.7 else rate, damping)
             tail.append(self.values.copy())
             if step % CHECKED == 0:
                 mean = np.mean(tail[-CHECKED:], axis=0)
@@ -97,39 +97,30 @@ class Descent:
         return cost
 
     def _cost(self, values: Array, rows: int) -> float:
-        """Robust mean square error [rad^2] of the free run of these joints over a fixed sample of the windows."""
+        """Robust mean square error [rad^2] of the free run of the joint over a fixed sample of the windows."""
         arm = with_values(self.arm, self.names, values)
         some = self.windows.part(
             np.linspace(0, len(self.windows) - 1, min(SAMPLE, len(self.windows))).astype(int), rows
         )
-        errors = np.stack([joint_errors(arm, joint, some) for joint in self.paths])
+        errors = joint_errors(arm, self.joint, some)
         errors = np.where(np.isfinite(errors), np.clip(np.abs(errors), 0.0, OUTLIER), OUTLIER)
         return float(np.mean(2 * CLIP**2 * (np.sqrt(1 + (errors / CLIP) ** 2) - 1)))
 
-    def _of_joint(self, joint: int, batch: Windows) -> tuple[Array, Array, float]:
-        """Normal matrix and slope of one joint in its own parameters, and its rms error [rad]."""
-        error, gradient = gradients(self.arm, joint, self.paths[joint], batch)
-        weighted = gradient / np.sqrt(1.0 + (error / CLIP) ** 2)[..., None]
-        count = gradient.shape[-1]
+    def _equations(self, batch: Windows) -> tuple[Array, Array]:
+        """Normal matrix and slope over some windows, relative to the running mean square error."""
+        error, gradient = gradients(self.arm, self.joint, self.names, batch)
+        self.spread = 0.9 * self.spread + 0.1 * max(float(np.sqrt(np.mean(error**2))), 1e-3)
+        weighted, count = gradient / np.sqrt(1.0 + (error / CLIP) ** 2)[..., None], gradient.shape[-1]
         flat = weighted.reshape(-1, count).T
-        return flat @ gradient.reshape(-1, count), flat @ error.ravel(), float(np.sqrt(np.mean(error**2)))
+        return flat @ gradient.reshape(-1, count) / self.spread**2, flat @ error.ravel() / self.spread**2
 
-    def _sum(self, found: Sequence[tuple[Array, Array, float]]) -> tuple[Array, Array]:
-        place = {name: i for i, name in enumerate(self.names)}
-        normal, slope = np.zeros((len(place), len(place))), np.zeros(len(place))
-        for own, (matrix, vector, _), spread in zip(self.paths.values(), found, self.spread, strict=True):
-            which = [place[path] for path in own]
-            normal[np.ix_(which, which)] += matrix / spread**2
-            slope[which] += vector / spread**2
-        return normal, slope
-
-    def _step(self, normal: Array, slope: Array, rate: float) -> None:
+    def _step(self, normal: Array, slope: Array, rate: float, damping: float) -> None:
         pull = np.array([self.ridge * (name in self.prior) for name in self.names]) / self.sizes**2
         slope = slope + pull * (self.values - [self.prior.get(name, 0.0) for name in self.names])
         normal = normal + np.diag(pull)
         scale = np.sqrt(np.diag(normal))
         scale = scale + 1e-6 * np.max(scale * self.sizes) / self.sizes
-        change = -np.linalg.solve(normal / np.outer(scale, scale) + DAMPING * np.eye(len(slope)), slope / scale) / scale
+        change = -np.linalg.solve(normal / np.outer(scale, scale) + damping * np.eye(len(slope)), slope / scale) / scale
         limit = MAX_CHANGE * np.maximum(np.abs(self.values), self.sizes)
         self.values = np.clip(self.values + np.clip(rate * change, -limit, limit), self.low, self.high)
         self.arm = with_values(self.arm, self.names, self.values)
@@ -276,6 +267,8 @@ class OneJoint(System):
         forces = outer.generalised_forces({**place, **read}, tensions, lengths)
         torque, load, element = forces[c.name], forces[friction_load(c)], outer.elements[self.joint]
         bristle = state[self.states[2].name]
+        if element.bearing_arms:
+            load += outer.bearing_load(self.joint, place, place, others)
         friction = element.torque(bristle, load, state[c.speed])
         rates = {
             c.name: state[c.speed],

@@ -159,12 +159,10 @@ class Windows:
     @functools.cached_property
     def acceleration(self) -> Array:
         """Accelerations [rad/s^2] of the joints (N, R, J): smoothed differences."""
-        slope = np.gradient(self.rate, self.sample_time, axis=1)
-        padded = np.pad(slope, ((0, 0), (2, 2), (0, 0)), mode="edge")
-        weights = (1 / 9, 2 / 9, 3 / 9, 2 / 9, 1 / 9)
-        count = self.angle.shape[1]
-        pieces = [w * padded[:, i : i + count] for i, w in enumerate(weights)]
-        return np.asarray(np.sum(pieces, axis=0))
+        from scipy.ndimage import convolve1d
+
+        slope, weights = np.gradient(self.rate, self.sample_time, axis=1), np.array([1, 2, 3, 2, 1]) / 9
+        return np.asarray(convolve1d(slope, weights, axis=1, mode="nearest"))
 
     def part(self, which: Sequence[int] | Array, rows: int | None = None) -> "Windows":
         """Some of the windows, with the first `rows` rows of their predictions."""

@@ -1,6 +1,7 @@
 """Identification of an arm from episodes of pressures and angles, by multiple shooting of its free run."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 import numpy as np
 from scipy.linalg import block_diag
@@ -44,9 +45,10 @@ def fit_joint(
     progress  called with one line after each stage
 
     Forces are linear in pressure with polynomials of the angle (LinearInPressure), friction sticks and grows with the
-    tensions (StickSlip), a lag of each muscle and a common delay of the sensors are found; zero and gain of a pressure
-    are absorbed. Where episodes have commands, a regulator of each muscle is identified, too. The objective is the
-    robust error of the free run over windows of 40 rows, with exact gradients.
+    tensions, that of the last of coupled joints also with the load of its bearing (StickSlip); a lag of each muscle and
+    a common delay of the sensors are found; zero and gain of a pressure are absorbed. Where episodes have commands, a
+    regulator of each muscle is identified, too. The objective is the robust error of the free run over windows of 40
+    rows, with exact gradients.
     Raises IdentificationError for episodes that `inspect_episodes` refuses, ParameterError for impossible arguments.
     """
     episodes, short = long_enough(episodes, rows)
@@ -104,12 +106,9 @@ def _search(
     prior = {leaf.path: float(leaf.value) for leaf in tree.leaves(arm) if leaf.path in shared}
     paths: dict[int, list[str]] = {}
     for joint in _by_coupling(axes, episodes.joints):
-        paths[joint] = [*own_parameters(joint), *(shared if not paths else [])]
-        trials = [
-            _trial(Descent(stronger(arm, joint, factor), windows, {joint: paths[joint]}, seed, prior))
-            for factor in STRENGTHS
-        ]
-        best = min(trials, key=lambda trial: trial[0])[1]
+        paths[joint] = [*own_parameters(arm, joint), *(shared if not paths else [])]
+        trials = [Descent(stronger(arm, joint, f), windows, joint, paths[joint], seed, prior) for f in STRENGTHS]
+        best = trials[int(np.argmin([[trial.run(stage) for stage in TRIALS][-1] for trial in trials]))]
         cost = best.run(SEARCH)
         arm = best.arm
         progress(f"joint {joint + 1}: {np.degrees(np.sqrt(cost)):.3g} deg, robust mean over the windows")
@@ -120,12 +119,6 @@ def _by_coupling(axes: tuple[tuple[int, int, int], ...], joints: int) -> list[in
     """The joints, first the one with the most joints beyond it about a parallel axis, whose inertia acts on it."""
     parallel = [[abs(np.dot(a, b)) for b in axes[j + 1 :]] for j, a in enumerate(axes)] or [[]] * joints
     return sorted(range(joints), key=lambda joint: -sum(parallel[joint]))
-
-
-def _trial(descent: Descent) -> tuple[float, Descent]:
-    for schedule in TRIALS:
-        cost = descent.run(schedule)
-    return cost, descent
 
 
 def _contacts(episodes: Episodes, errors: np.ndarray, windows: Windows, split: int) -> list[str]:
@@ -145,7 +138,8 @@ WINDOWS = 300
 WORDS = {
     "area": "effective area", "passive_force": "force without pressure", "slack_width": "width of slackening",
     "lags": "lag of the pressure", "coulomb_torque": "dry friction", "presliding_angle": "presliding angle",
-    "load_arms": "growth of friction with tension", "static_excess": "stiction", "stribeck_speed": "Stribeck speed",
+    "load_arms": "growth of friction with tension", "bearing_arms": "growth of friction with the load of the bearing",
+    "static_excess": "stiction", "stribeck_speed": "Stribeck speed",
     "damping": "viscous friction", "rotor_inertia": "inertia", "inertia": "inertia of a link",
     "mass": "mass of a link", "centre": "centre of mass",
     "zero_angle": "direction of gravity",
@@ -169,7 +163,7 @@ def separate(
         np.einsum("nrp,nr,nrq->pq", scaled, weight, scaled) * (len(windows) / len(some)) / max(scale, 1e-9) ** 2
     )
     estimates, covariance, shares = separated(information, paths, values, sizes)
-    return estimates, _words(joint, paths, shares), covariance
+    return estimates, not_separated(f"joint {joint + 1}: ", [_name(path) for path in paths], shares), covariance
 
 
 def separated(
@@ -185,15 +179,15 @@ def separated(
     return [ArmParameter(*row) for row in rows], known @ known.T, np.sum(directions[:, weak] ** 2, axis=1)
 
 
-def _words(joint: int, paths: Sequence[str], shares: Array) -> list[str]:
+def not_separated(where: str, names: Sequence[str], shares: Array) -> list[str]:
     """The parameters of the directions that are not separated, first those that have the least information."""
-    names = list(dict.fromkeys(_name(paths[i]) for i in np.argsort(-shares) if shares[i] > SHARE))
-    further = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
+    weak = list(dict.fromkeys(names[i] for i in np.argsort(-shares) if shares[i] > SHARE))
+    further = f" and {len(weak) - NAMED} more" if len(weak) > NAMED else ""
     text = (
-        f"joint {joint + 1}: the record does not separate {', '.join(names[:NAMED])}{further}: combinations of them "
-        "may have any value; fix or measure them before they are read as properties of the arm"
+        f"{where}the record does not separate {', '.join(weak[:NAMED])}{further}: combinations of them may have any "
+        "value; fix or measure them before they are read as properties of the arm"
     )
-    return [text] if names else []
+    return [text] if weak else []
 
 
 def _name(path: str) -> str:
@@ -231,7 +225,8 @@ def reduced_arm(middle: Array, axes: Sequence[tuple[int, int, int]] = ()) -> Pre
     )
     links = tuple(_link(j, axes[j] if axes else (0, 0, 1), LENGTH if axes and j else 0.0) for j in range(count))
     loads = 0.1 * RADIUS * np.kron(np.eye(count), np.ones(2))
-    elements = tuple(StickSlip(0.5, tuple(row.tolist()), presliding_angle=4e-3) for row in loads)
+    *inner, last = (StickSlip(0.5, tuple(row.tolist()), presliding_angle=4e-3) for row in loads)
+    elements = (*inner, replace(last, bearing_arms=(0.0,) if axes else ()))
     return PressureDriven(muscles, WithStickSlip(SerialArm(links, routes), elements), (0.02,) * (2 * count))
 
 
@@ -251,14 +246,14 @@ def _link(number: int, axis: tuple[int, int, int], distance: float) -> SpatialLi
 def stronger(arm: PressureDriven, joint: int, factor: float) -> PressureDriven:
     """The arm with forces, dry friction and damping of one joint multiplied: another initial guess of its inertia."""
     fields = ("area", "passive_force", "slack_width", "coulomb_torque", "damping")
-    own = {path for path in own_parameters(joint) if path.rsplit(".")[-1].startswith(fields)}
+    own = {path for path in own_parameters(arm, joint) if path.rsplit(".")[-1].startswith(fields)}
     values = [float(leaf.value) * (factor if leaf.path in own else 1.0) for leaf in tree.leaves(arm)]
     changed: PressureDriven = tree.unflatten(arm, values)
     return changed
 
 
-def own_parameters(joint: int) -> list[str]:
-    """Paths of what a fit changes for one joint and its pair of muscles, in a `PressureDriven` of `reduced_arm`."""
+def own_parameters(arm: PressureDriven, joint: int) -> list[str]:
+    """Paths of what a fit changes for one joint and its pair of muscles, in an arm of `reduced_arm`."""
     pair = (2 * joint, 2 * joint + 1)
     laws = [f"muscle[{m}].contractile." for m in pair]
     paths = [f"{law}{name}[{k}]" for law in laws for name in ("area", "passive_force") for k in range(3)]
@@ -266,6 +261,7 @@ def own_parameters(joint: int) -> list[str]:
     element, link = f"mechanism.elements[{joint}].", f"mechanism.inner.links[{joint}]."
     paths += [f"{element}{name}" for name in ("coulomb_torque", "presliding_angle")]
     paths += [f"{element}load_arms[{m}]" for m in pair]
+    paths += [leaf.path for leaf in tree.leaves(arm) if leaf.path.startswith(f"{element}bearing_arms")]
     return [*paths, f"{element}static_excess", f"{element}stribeck_speed", f"{link}damping"]
 
 

@@ -119,14 +119,16 @@ def fit_residual(
     """
     split = max(1, round((1.0 - HELD_BACK) * len(episodes)))
     train, held = cut(episodes[:split], delay, rows, stride=max(1, rows // 2)), cut(episodes[split:], delay, rows)
-    found, accepted = with_residual(arm, _gaussian_residual(arm, episodes[:split], centres, seed)), list[int]()
+    residual, accepted = _gaussian_residual(arm, episodes[:split], centres, seed), list[int]()
+    hybrid_mechanism = dataclasses.replace(cast(WithStickSlip, arm.mechanism), residual=residual)
+    found = dataclasses.replace(arm, mechanism=hybrid_mechanism)
     far = distance(found, held)
     for joint in range(episodes.joints):
         before = _errors(found, held)
         trials = []
-        paths = _paths(joint, len(residual_of(found).energies))
+        paths = _paths(joint, len(residual.energies))
         values = {leaf.path: float(leaf.value) for leaf in tree.leaves(found)}
-        descent = Descent(found, train, {joint: paths}, seed, {path: values[path] for path in paths})
+        descent = Descent(found, train, joint, paths, seed, {path: values[path] for path in paths})
         for ridge in RIDGES:
             descent.ridge = ridge
             descent.run(SEARCH_OF_RESIDUAL)
@@ -174,21 +176,9 @@ def _gaussian_residual(arm: PressureDriven, episodes: Episodes, centres: int, se
     )  # fmt: skip
 
 
-def with_residual(arm: PressureDriven, residual: GaussianResidual) -> PressureDriven:
-    """The arm whose mechanism has this residual."""
-    return dataclasses.replace(
-        arm, mechanism=dataclasses.replace(cast(WithStickSlip, arm.mechanism), residual=residual)
-    )
-
-
-def residual_of(arm: PressureDriven) -> GaussianResidual:
-    """The residual of an arm that has one."""
-    return cast(GaussianResidual, cast(WithStickSlip, arm.mechanism).residual)
-
-
 def distance(arm: PressureDriven, windows: Windows) -> Array:
     """Distance (N,) of the episode of each window from the nearest centres, rms over rows and coordinates."""
-    residual = residual_of(arm)
+    residual = cast(GaussianResidual, cast(WithStickSlip, arm.mechanism).residual)
     scales = np.array([*residual.angle_scales, *residual.pressure_scales])
     centres = np.array(residual.centres).reshape(-1, len(scales))
     x = np.concatenate([windows.angle[:, HISTORY:], windows.pressure[:, HISTORY:]], axis=-1) / scales

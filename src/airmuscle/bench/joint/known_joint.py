@@ -11,7 +11,7 @@ from ...physics import PressureDriven
 from .descent import CLIP, OUTLIER, over, with_values
 from .episode_inspection import check_episodes, inspect_episodes
 from .episodes import HISTORY, ROWS, Episodes, Windows, WindowSignal, band, count_fitted, cut, lagged, long_enough
-from .fit import NAMED, SHARE, separated
+from .fit import not_separated, separated
 from .free_run import baseline_errors
 from .result import ArmFit, ArmParameter
 
@@ -201,10 +201,4 @@ class KnownSearch:
             f"{float(f'{each.standard_error:.2g}'):g}{READINGS[field]}"
             for each in estimates for field, _, number in [each.path.partition("[")] if field in READINGS
         ]  # fmt: skip
-        weak = [names[i] for i in np.argsort(-shares) if shares[i] > SHARE]
-        if weak:
-            remarks.append(
-                f"the record does not separate {', '.join(weak[:NAMED])}: combinations of them may have any value; "
-                "fix or measure one of them"
-            )
-        return estimates, covariance, remarks
+        return estimates, covariance, remarks + not_separated("", names, shares)

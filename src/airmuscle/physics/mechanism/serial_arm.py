@@ -6,6 +6,8 @@ from ...core import STANDARD_GRAVITY, ParameterError, Value, Values, model, ops,
 from .planar_arm import Arm, Matrix, MuscleRoute, solve_positive_definite
 
 Vector = tuple[Value, Value, Value]
+ROUNDING = 0.1
+"""Force [N] across an axis below which its size is rounded (chosen)."""
 AXES = {(1, 0, 0), (0, 1, 0), (0, 0, 1), (-1, 0, 0), (0, -1, 0), (0, 0, -1)}
 
 
@@ -99,6 +101,16 @@ class SerialArm(Arm):
         speeds = [v[c.speed] for c in self.coordinates]
         torques = self._torques(self._posture(q), speeds, [accelerations[c.name] for c in self.coordinates])
         return {c.name: torque for c, torque in zip(self.coordinates, torques, strict=True)}
+
+    def bearing_force(self, joint: int, q: Values, v: Values, accelerations: Values) -> tuple[Value, Value]:
+        """Force [N] across and along the axis of a joint, from 0, that carries and accelerates the links beyond it."""
+        at, total = self._posture(q), (0.0, 0.0, 0.0)
+        columns = [(v[c.speed], accelerations[c.name]) for c in self.coordinates]
+        moving, _ = self._accelerations(at, *map(list, zip(*columns, strict=True)))
+        for link, acceleration in zip(self.links[joint:], moving[joint:], strict=True):
+            total = _plus(total, _scaled(link.mass, _plus(acceleration, (0.0, 0.0, self.gravity))))
+        across, axis = _cross(at.axes[joint], total), at.axes[joint]
+        return ops.sqrt(_dot(across, across) + ROUNDING**2), ops.absolute_value(_dot(axis, total))
 
     def _torques(self, at: _Posture, speeds: list[Value], joint_accelerations: list[Value]) -> list[Value]:
         """Torques on the joints: inertia, weight and viscous friction."""

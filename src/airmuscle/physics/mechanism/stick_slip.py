@@ -1,9 +1,11 @@
 """Stick-slip of joints: dry friction that holds at rest and grows with the tensions of the muscles."""
 
 from collections.abc import Sequence
+from typing import cast
 
 from ...core import ParameterError, StateVariable, Value, Values, check_structure, model, ops, parameter
 from .base import Coordinate, Mechanism
+from .serial_arm import SerialArm
 from .wrapper import MechanismWrapper
 
 
@@ -11,11 +13,14 @@ from .wrapper import MechanismWrapper
 class StickSlip:
     """Dry friction of one joint: Q_f = -T (z + w/w_1)/(1 + |w|/w_1),   z' = (w - |w| z)/(theta_s (1 + |w|/w_1)).
 
-        T = (T_c + sum_i mu_i F_i) (1 + s/(1 + (w/w_s)^2)),   w_1 = theta_s/tau
+        T = (T_c + sum_i mu_i F_i + r_1 R_r + r_2 R_a) (1 + s/(1 + (w/w_s)^2)),   w_1 = theta_s/tau
 
     w angular speed, z deflection of the bristle relative to its sliding value, F_i tension of muscle i. At rest the
     bristle holds like a spring up to T_c (1 + s); sliding faster than w_s, the friction is T_c. The friction of
-    tendons, sheaths and bearings grows with their load: mu_i is a moment arm of the friction of tendon i. Above w_1 the
+    tendons, sheaths and bearings grows with their load: mu_i is a moment arm of the friction of tendon i, r_1 and r_2
+    are those of the bearing, which carries and accelerates the links beyond the joint with the forces R_r across its
+    axis and R_a along it. They are computed at the accelerations of the other joints without this share of friction,
+    and at none of the joint's own: what holds at rest is exact, and so is a link balanced about its axis. Above w_1 the
     torque follows the sign of the speed itself, so that the rate of z is bounded by 1/tau and a step of that length is
     stable. For constant tension and s = 0 the energy T theta_s z^2/2 of the bristle never grows by more than the work
     done on it. The normalised form of Dahl's model (Dahl 1968) with these additions, which are chosen.
@@ -34,6 +39,10 @@ class StickSlip:
     presliding_angle: float = parameter(
         "rad", "theta_s", "angle over which the bristle deflects before sliding", bounds=(1e-5, 1.0), default=2e-3
     )
+    bearing_arms: tuple[float, ...] = parameter(
+        "m", "r_k", "friction torque per force across the axis of the joint, and along it", bounds=(0.0, 10.0),
+        default=(),
+    )  # fmt: skip
     turnover_time: float = parameter(
         "s", "tau", "shortest time in which the bristle turns over", bounds=(1e-5, 0.1), fitted=False, default=2e-3
     )
@@ -138,6 +147,11 @@ class WithStickSlip(MechanismWrapper):
                 "give one scale for each angle."
             )
         for element in self.elements:
+            if len(element.bearing_arms) > 2 * isinstance(self.inner, SerialArm):
+                raise ParameterError(
+                    f"WithStickSlip: {len(element.bearing_arms)} bearing_arms are given for a joint of {owner}; a "
+                    "SerialArm takes one or two, across and along the axis, any other mechanism none."
+                )
             if element.load_arms and self.muscle_count not in (None, len(element.load_arms)):
                 raise ParameterError(
                     f"WithStickSlip: {owner} takes {self.muscle_count} muscles, and {len(element.load_arms)} load_arms "
@@ -177,7 +191,23 @@ class WithStickSlip(MechanismWrapper):
         return forces
 
     def acceleration(self, q: Values, v: Values, forces: Values, inputs: Values) -> Values:
+        forces = self._with_bearings(q, v, forces, inputs)
         return self.inner.acceleration(q, v, {**forces, **self._with_friction(q, v, forces)}, inputs)
+
+    def bearing_load(self, joint: int, q: Values, v: Values, accelerations: Values) -> Value:
+        """Friction torque [N m] of a joint, from 0, by its bearing, at the accelerations of the other joints."""
+        others = {**accelerations, self._angles[joint].name: 0.0}
+        forces = cast(SerialArm, self.inner).bearing_force(joint, q, v, others)
+        return sum(r * force for r, force in zip(self.elements[joint].bearing_arms, forces, strict=False))
+
+    def _with_bearings(self, q: Values, v: Values, forces: Values, inputs: Values) -> Values:
+        """The forces, in whose friction loads are those of the bearings."""
+        loaded = {j: friction_load(c) for j, c in enumerate(self._angles) if self.elements[j].bearing_arms}
+        if not loaded:
+            return forces
+        free = self.inner.acceleration(q, v, {**forces, **self._with_friction(q, v, forces)}, inputs)
+        loads = {name: forces.get(name, 0.0) + self.bearing_load(j, q, v, free) for j, name in loaded.items()}
+        return {**forces, **loads}
 
     def _with_friction(self, q: Values, v: Values, forces: Values) -> dict[str, Value]:
         return {c.name: forces[c.name] + torque for c, torque in self._friction(q, v, forces)}
@@ -189,6 +219,7 @@ class WithStickSlip(MechanismWrapper):
         ]
 
     def dissipated_power(self, q: Values, v: Values, forces: Values, inputs: Values) -> Value:
+        forces = self._with_bearings(q, v, forces, inputs)
         inner = self.inner.dissipated_power(q, v, {**forces, **self._with_friction(q, v, forces)}, inputs)
         return inner - sum(torque * v[c.speed] for c, torque in self._friction(q, v, forces))
 
