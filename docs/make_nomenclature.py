@@ -26,6 +26,7 @@ ARGUMENTS = {
     "first": "gauge pressure of the first of two muscles [Pa]",
     "second": "gauge pressure of the second of two muscles [Pa]",
     "index": "number of an item, from 0",
+    "joint": "number of a joint of an arm, from 0",
     "outer": "control law whose commands are set points of an inner one",
     "every": "samples of the loop between those of a law",
     "jitter": "greatest random delay beyond the constant one [samples]",
