@@ -112,3 +112,12 @@ def test_a_contender_takes_the_gains_of_another_one_by_the_ends_of_their_paths()
         "gain": "actuation.inner.gain",
     }  # fmt: skip
     assert {leaf.path for leaf in leaves(lqg)} >= set(tuned)
+
+
+def test_the_integral_of_super_twisting_does_not_take_up_what_the_valves_attain():
+    """With tracking the integral becomes the whole command at each saturation, and the loop oscillates."""
+    followed = {each.name: each.tracking for each in standard_contenders(JOINT)}
+    assert not followed.pop("feed-forward + super-twisting")
+    assert all(followed.values())
+    twisting = next(each for each in standard_contenders(JOINT) if "twisting" in each.name)
+    assert "tracking=True" not in repr(complete(JOINT, twisting, 1).law)

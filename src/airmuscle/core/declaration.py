@@ -125,6 +125,12 @@ def _validate(obj: Any) -> None:
                 f"{abridged(value)}; it must be {expected}."
             )
         object.__setattr__(obj, declared.name, _check_value(type(obj).__name__, declared, value))
+    check_together(obj)
+
+
+def check_together(obj: Any) -> None:
+    """Check what parameters of a model must fulfil together: the order of limits, the conditions of its `check`."""
+    kind: Any = type(obj)
     for low, high in _limits_of(kind):
         least, most = getattr(obj, low), getattr(obj, high)
         if not least < most:

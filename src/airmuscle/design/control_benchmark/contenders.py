@@ -152,6 +152,8 @@ class Contender:
     commissioned  the same of the gains that are sought afterwards on each truth, by the same routine and number of runs
              for all contenders; none: the contender is not commissioned
     tuned_as  a contender whose tuned gains it takes, by the ends of their paths, in place of its own tuning
+    tracking  whether the law goes on from what proportional valves attain; not for an integral that would take up the
+              whole of it
     """
 
     name: str
@@ -159,6 +161,7 @@ class Contender:
     bounds: Bounds = dataclasses.field(default_factory=dict)
     commissioned: Bounds = dataclasses.field(default_factory=dict)
     tuned_as: "Contender | None" = None
+    tracking: bool = True
 
     def __post_init__(self) -> None:
         if not isinstance(self.law, Controller):
@@ -193,12 +196,12 @@ def complete(joint: BenchmarkJoint, contender: Contender, seed: int = 1) -> Comp
     _check_columns(joint, contender)
     ranges, known = (contender.bounds, contender.commissioned), {sensor.column: sensor for sensor in joint.sensors}
     if isinstance(contender.law, ControlLaw):
-        law, prefix, own = _actuated(joint, contender.law, contender.name)
+        law, prefix, own = _actuated(joint, contender.law, contender)
         sensors = tuple(known[name] for name in law.measured_columns)
         tuned, commissioned = (_within(f"law.{prefix}", bounds) for bounds in ranges)
         return CompleteLaw(WithSensors(law, sensors, float(seed)), {**tuned, **_within("law.", own)}, commissioned)
     inputs = contender.law.inputs
-    law, _, own = _actuated(joint, PassedSignals((), inputs), contender.name)
+    law, _, own = _actuated(joint, PassedSignals((), inputs), contender)
     tuned, commissioned = (_within("controller.", bounds) for bounds in ranges)
     span = joint.pressure_span
     limits = dict.fromkeys(joint.pressures, (joint.min_pressure, joint.max_pressure)) | {DIFFERENCE: (-span, span)}
@@ -218,9 +221,10 @@ def _check_columns(joint: BenchmarkJoint, contender: Contender) -> None:
         )
 
 
-def _actuated(joint: BenchmarkJoint, law: ControlLaw, name: str) -> tuple[ControlLaw, str, Bounds]:
+def _actuated(joint: BenchmarkJoint, law: ControlLaw, contender: Contender) -> tuple[ControlLaw, str, Bounds]:
     """A law with the parts from its commands to the valves, the prefix of its parameters, and ranges of the parts."""
-    prefix, ranges, tracking = "", dict[str, tuple[float, float]](), not joint.switching
+    prefix, ranges = "", dict[str, tuple[float, float]]()
+    tracking = contender.tracking and not joint.switching
     if law.inputs == (DIFFERENCE,):
         span = (joint.pressure_span,)
         law = Cascade(law, CoContraction(joint.pressures, 0.0, "mean_pressure"), (-span[0],), span, tracking)
@@ -236,7 +240,7 @@ def _actuated(joint: BenchmarkJoint, law: ControlLaw, name: str) -> tuple[Contro
             prefix, ranges = f"law.{prefix}", _within("law.", {**ranges, "inner.zone": ZONE})
     if set(law.inputs) != set(joint.model.inputs) - {"external_torque"}:
         raise ParameterError(
-            f"contender '{name}' commands {', '.join(law.inputs)}; allowed are '{DIFFERENCE}', the pressures "
+            f"contender '{contender.name}' commands {', '.join(law.inputs)}; allowed are '{DIFFERENCE}', the pressures "
             f"{', '.join(joint.pressures)}, or all valves."
         )
     return law, prefix, ranges

@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ....core import AirmuscleError, Array, ParameterError, PhysicsError, System, check_known, one_line, tree
+from ....core.declaration import check_together
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -59,7 +60,7 @@ class Variations:
             if not _has_column(part):
                 continue
             try:
-                part.check()
+                check_together(part)
             except (TypeError, ValueError, AirmuscleError):  # rows differ, or one of them is impossible: row by row
                 of_row = _rows_of(part)
                 for row in range(len(self.values)):
@@ -78,19 +79,18 @@ class Column(np.ndarray):
 
 def _check_row(row: int, part: Any) -> None:
     try:
-        part.check()
+        check_together(part)
     except ParameterError as error:
         raise error.located(f"variations, row {row}") from None
 
 
 def _checking(thing: Any) -> Iterator[Any]:
-    """Every model within a model, itself too, that checks several of its parameters together."""
+    """Every model within a model, itself too, whose parameters must fulfil something together."""
     if isinstance(thing, tuple):
         for item in thing:
             yield from _checking(item)
     elif dataclasses.is_dataclass(thing):
-        if hasattr(thing, "check"):
-            yield thing
+        yield thing
         for field in dataclasses.fields(thing):
             yield from _checking(getattr(thing, field.name))
 
