@@ -5,13 +5,24 @@ called cannot be handled.
 """
 
 import importlib
+import os
 import sys
+
+_BLAS_THREADS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+"""Environment variables of the threads of linear algebra. By default a command uses one: its matrices are small, and
+threads that wait for each other take the cores from its processes and from other programs."""
 
 
 def main() -> None:
-    """Run the command line and exit with its exit code; an interruption exits with 130 (128 + SIGINT)."""
+    """Run the command line and exit with its exit code; an interruption, also of an import, exits with 130."""
+    for name in _BLAS_THREADS:
+        os.environ.setdefault(name, "1")
     try:
-        importlib.import_module("airmuscle.outlets.cli.entry_point").main()
+        interruption = importlib.import_module("airmuscle.outlets.cli.interruption")
+        with interruption.deferred_sigint():
+            app = importlib.import_module("airmuscle.outlets.cli.commands").app
+            interruption.check_interrupted()
+            app(prog_name="airmuscle")
     except KeyboardInterrupt:
         sys.stderr.write("interrupted\n")
         raise SystemExit(130) from None

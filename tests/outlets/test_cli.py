@@ -666,7 +666,7 @@ def test_an_interrupted_import_is_one_line_and_exit_code_130(module: str, kind: 
 
 
 @pytest.mark.skipif(os.name == "nt", reason="SIGINT cannot be sent to one process")
-@pytest.mark.parametrize("module", ["airmuscle.outlets.cli", "airmuscle.outlets.cli.entry_point"])
+@pytest.mark.parametrize("module", ["airmuscle.outlets.cli", "airmuscle.outlets.cli.interruption"])
 def test_an_interruption_before_the_handler_is_installed_is_no_traceback(module: str):
     assert_interrupted(module, "module")
 

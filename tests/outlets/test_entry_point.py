@@ -6,8 +6,8 @@ import os
 
 import pytest
 
+from airmuscle import __main__ as entry_point
 from airmuscle.core import arrays
-from airmuscle.outlets.cli import entry_point
 
 
 @pytest.mark.parametrize(("given", "threads"), [(None, "1"), ("4", "4")])

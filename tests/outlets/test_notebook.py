@@ -22,7 +22,7 @@ from airmuscle.core.short_repr import MAX_LINES, ShortRepr
 from airmuscle.errors import ParameterError
 from airmuscle.physics import ContractileSurface
 from airmuscle.physics.muscle import compute_isobars
-from airmuscle.physics.muscle.isobar_plot import isobar_plot
+from airmuscle.physics.muscle.isobar_plot import isobar_figure
 from airmuscle.recording.notebook import MAX_NOTES, MAX_ROWS, Card, NotebookDisplay, render_card
 from airmuscle.recording.plot import panels_of
 
@@ -257,8 +257,9 @@ def test_the_lines_of_a_model_are_over_the_points_of_many_rows(recording: am.Rec
     law = am.load("dmsp-20-300").characteristic
     for rows in (32, 2720):
         given = recording.rows(np.tile(np.arange(32), rows // 32))
-        plot = isobar_plot(law, "isobars", compute_isobars(law, pressures=np.unique(given["pressure"])), measured=given)
-        lines = [line for line in plot.draw().axes[0].get_lines() if len(line.get_xdata())]
+        curves = compute_isobars(law, pressures=np.unique(given["pressure"]))
+        figure = isobar_figure(law, "isobars", curves, measured=given)
+        lines = [line for line in figure.axes[0].get_lines() if len(line.get_xdata())]
         points = max(line.get_zorder() for line in lines if line.get_linestyle() == "None")
         curves = min(line.get_zorder() for line in lines if line.get_linestyle() != "None")
         assert (curves > points) == (rows > 500)

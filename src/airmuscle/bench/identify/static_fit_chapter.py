@@ -11,7 +11,7 @@ from ...core import AirmuscleError, Reference, cite, plotting
 from ...physics.muscle.characteristic import Characteristic, PooledLengthLaw, ValidityRange
 from ...physics.muscle.characteristic.energy_defect import EnergyDefect, maxwell_defect
 from ...physics.muscle.geometry import Geometry
-from ...physics.muscle.isobar_plot import isobar_plot
+from ...physics.muscle.isobar_plot import isobar_figure
 from ...physics.muscle.isobars import compute_isobars
 from ...report.chapter import BY_ROW, Chapter, DisplayedEquation, NamedValue, Plot, Table, TableColumn
 from ...report.equation import LawEquation, law_equation
@@ -206,7 +206,11 @@ def _isobars(fit: Fit, entry: MuscleDescription) -> Plot:
     ramp = is_pressure_ramp(fit.recording["pressure"], fit.recording["contraction"])
     pressures = None if ramp else levels_of(fit.recording["pressure"], MAX_CURVES)
     curves = compute_isobars(fit.model, entry.validity_range, pressures=pressures)
-    return isobar_plot(fit.model, entry.title, curves, entry.validity_range, measured=fit.recording)
+    return Plot(
+        "isobars",
+        f"{entry.title}: force over contraction at constant gauge pressure.",
+        partial(isobar_figure, fit.model, entry.title, curves, entry.validity_range, measured=fit.recording),
+    )
 
 
 def _violations(fit: Fit) -> list[Table]:

@@ -10,9 +10,9 @@ from ...bench.reported import Reported
 from ...core import check_above_vacuum, contraction_text, leaves, quantity, quantity_text
 from ...core.errors import AirmuscleWarning, GeometryLimitError, ParameterError, PhysicsError, RatingError, SolveError
 from ...physics.muscle.characteristic import Characteristic, ForceLaw, ValidityRange, validity_range_of
-from ...physics.muscle.isobar_plot import describe_point, isobar_plot
+from ...physics.muscle.isobar_plot import describe_point, isobar_figure
 from ...physics.muscle.isobars import Isobars, WorkingPoint, compute_isobars
-from ...report.chapter import Chapter, NamedValue
+from ...report.chapter import Chapter, NamedValue, Plot, Table, TableColumn
 from .entry import Entry
 
 UNITS = {"pressure": "Pa", "contraction": "1", "force": "N"}
@@ -71,6 +71,8 @@ class Evaluation(Reported):
             values.append(NamedValue("stiffness per contraction", stiffness, "N", "N/%", remark="at constant pressure"))
         if stiffness is not None and length:
             values.append(NamedValue("stiffness per contraction", stiffness, "N", brief=False))
+        caption = f"{self.entry.title}: force over contraction at constant gauge pressure."
+        caption += f" Working point: {describe_point(point)}."
         inside = None if limits is None else bool(limits.contains(point.pressure, point.contraction))
         return Chapter(
             name="evaluation",
@@ -85,12 +87,27 @@ class Evaluation(Reported):
                     "permitted", None if ratings is None else not ratings.excesses(**point._asdict()), brief=False
                 ),
             ),
-            plots=(isobar_plot(self.entry.characteristic, self.entry.title, self.isobars, limits, point),),
+            plots=(Plot("isobars", caption, self._figure),),
         )
+
+    def _figure(self) -> Any:
+        """The isobars with the point and the validity range."""
+        law, title = self.entry.characteristic, self.entry.title
+        return isobar_figure(law, title, self.isobars(), self.validity_range, self.point)
 
     def isobars(self) -> Isobars:
         """The isobars of the law, with that of the point."""
         return compute_isobars(self.entry.characteristic, self.validity_range, self.point)
+
+    def isobar_table(self) -> Table:
+        """The isobars as a table with one column of tensions per pressure."""
+        curves = self.isobars()
+        columns = {
+            f"force at {pressure / 1e3:.6g} kPa": TableColumn(forces, "N")
+            for pressure, forces in zip(curves.pressures, curves.forces, strict=True)
+        }
+        first = {"contraction": TableColumn(curves.contractions, "1")}
+        return Table("isobars", "Isobars", first | columns, "Gauge pressures.", series=True)
 
 
 def evaluate(entry: Entry, given: Mapping[str, Any]) -> Evaluation:

@@ -1,9 +1,8 @@
 from .campaign import KeptStages as KeptStages
 from .commands import COMMANDS as COMMANDS
 from .commands import app as app
-from .entry_point import check_interrupted as check_interrupted
-from .entry_point import deferred_sigint as deferred_sigint
-from .entry_point import main as main
+from .interruption import check_interrupted as check_interrupted
+from .interruption import deferred_sigint as deferred_sigint
 from .library import as_bibtex as as_bibtex
 from .options import SHELLS as SHELLS
 from .options import complete_data as complete_data

@@ -14,7 +14,7 @@ import typer
 from typer.core import TyperGroup
 
 from ...core import AirmuscleError, AirmuscleWarning, exclusive_folders, quotable, suggestion
-from .entry_point import INTERRUPTED, check_interrupted, deferred_sigint
+from .interruption import INTERRUPTED, check_interrupted, deferred_sigint
 from .options import install_completion_classes, print_completion_script
 from .terminal import echo, in_options, show_warning
 

@@ -24,7 +24,7 @@ from ...files.library.files import (  # fmt: skip
     list_valves,
 )
 from ...physics.muscle.characteristic import ForceLaw
-from ...physics.muscle.isobar_plot import describe_point, isobar_table
+from ...physics.muscle.isobar_plot import describe_point
 from ...report.write import rendered_figure, save_table
 from ..requests import EntryRequest, RequestError, Where, option, request
 from .delivery import print_result, write_result
@@ -78,7 +78,7 @@ def evaluate(
     print_result([chapter], {}, json)
     if out is not None:
         files = {
-            "isobars.csv": lambda path: save_table(isobar_table(found.isobars()), path),
+            "isobars.csv": lambda path: save_table(found.isobar_table(), path),
             "isobars.png": lambda path: path.write_bytes(rendered_figure(chapter.plots[0])["png"]),
         }
         write_result(out, [], "", files)

@@ -16,7 +16,7 @@ from ...core import Hint, HintedText, printable
 from ...report.chapter import Table
 from ...report.data import as_json
 from ...report.text import table_lines
-from .entry_point import check_interrupted
+from .interruption import check_interrupted
 
 TIME_BASE_NAMES = {base: name for name, base in TIME_BASES.items()}
 """Names of the time bases of the option --time."""

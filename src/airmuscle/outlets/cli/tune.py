@@ -19,8 +19,8 @@ from ...files.scenario.controller import signal_units
 from ...report.write import save_table
 from ..requests.declaration import RequestError, option, request
 from .delivery import deliver
-from .entry_point import check_interrupted
 from .execution import Execution
+from .interruption import check_interrupted
 from .options import Folder, Json, with_requests
 from .terminal import computation_progress, echo
 

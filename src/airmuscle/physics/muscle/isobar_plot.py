@@ -2,14 +2,12 @@
 
 import dataclasses
 import textwrap
-from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from ...core import Array, contraction_text, given_axes, legend_outside, new_figure, plotting, quantity_text
 from ...recording import Recording
-from ...report.chapter import Plot, Table, TableColumn
 from .characteristic import Characteristic, ValidityRange, validity_range_of
 from .isobars import Isobars, WorkingPoint, axis_scales, compute_isobars, draw_isobars, forces_along, mask_slack
 
@@ -21,36 +19,6 @@ CHART_MAX_PRESSURE = 6e5
 """Maximum gauge pressure [Pa] in the chart of a law without a validity range (chosen)."""
 MAX_TITLE_LINES = 3
 """Maximum number of lines of a title; the rest is left out."""
-
-
-def isobar_table(curves: Isobars, name: str = "isobars") -> Table:
-    """Return the isobars as a table with one column of tensions per pressure."""
-    columns = {
-        f"force at {pressure / 1e3:.6g} kPa": TableColumn(forces, "N")
-        for pressure, forces in zip(curves.pressures, curves.forces, strict=True)
-    }
-    first = {"contraction": TableColumn(curves.contractions, "1")}
-    return Table(name, "Isobars", {**first, **columns}, "Gauge pressures.", series=True)
-
-
-def isobar_plot(
-    characteristic: Characteristic,
-    title: str,
-    curves: Isobars | Callable[[], Isobars],
-    validity_range: ValidityRange | None = None,
-    point: WorkingPoint | None = None,
-    measured: Recording | None = None,
-) -> Plot:
-    """Return the plot of the isobars, or of those that a function computes when it is drawn."""
-
-    def draw() -> Any:
-        drawn = curves() if callable(curves) else curves
-        return isobar_figure(characteristic, title, drawn, validity_range, point, measured)
-
-    caption = f"{title}: force over contraction at constant gauge pressure."
-    if point is not None:
-        caption += f" Working point: {describe_point(point)}."
-    return Plot("isobars", caption, draw)
 
 
 def isobar_figure(
