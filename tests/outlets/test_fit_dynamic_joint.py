@@ -210,6 +210,26 @@ def test_a_plant_without_equilibrium_at_the_recorded_pressures_begins_at_the_rec
         build_initial_conditions({}, slack, Recording(pressures, "run"), place)
 
 
+def test_a_joint_whose_slack_muscles_leave_it_at_rest_anywhere_begins_at_the_recorded_angle(folder):
+    """Two unequal muscles without a weight, at pressures at which neither pulls; at higher ones they hold an angle."""
+    plant, other = load_scenario(folder / "truth.toml").plant, am.load("dmsp-10-250").muscle
+    muscles = plant.muscles[0], dataclasses.replace(other, name="right")
+    loose = dataclasses.replace(
+        plant, muscle=muscles, mechanism=dataclasses.replace(plant.mechanism, weight_torque=0.0)
+    )
+    place = Location("study.toml", "", folder)
+    for pressures, stationary in (((5e4, 1e5), False), ((1.6e5, 4e5), True)):
+        columns = {
+            f"{side}.pressure": np.full(5, value) for side, value in zip(("left", "right"), pressures, strict=True)
+        }
+        begun = build_initial_conditions({}, loose, Recording({**columns, "angle": np.full(5, 0.02)}, "run"), place)
+        assert begun.known.get("angle") == (None if stationary else 0.02)
+        assert ("angular_speed" in begun.stationary) is stationary
+    slack = Recording({"left.pressure": np.full(5, 5e4), "right.pressure": np.full(5, 1e5)}, "run")
+    with pytest.raises(EquilibriumError, match=r"every angle near \S+ rad is an equilibrium: no muscle pulls\. Record"):
+        build_initial_conditions({}, loose, slack, place)
+
+
 def test_two_muscles_that_lift_one_load_begin_at_their_own_pressures(folder):
     plant = load_scenario(folder / "truth.toml").plant
     lift = dataclasses.replace(plant, mechanism=HangingMass(20.0))

@@ -13,6 +13,7 @@ import numpy as np
 from ...bench.identify.dynamic import InitialConditions
 from ...core import EquilibriumError, HintedText, ParameterError, abridged
 from ...physics.equilibrium import find_equilibrium
+from ...physics.mechanism.base import Coordinate
 from ...physics.plant.plant import Plant
 from ...recording import Recording
 from ..library.files import Location, check_keys, located_errors, read_finite_number
@@ -21,6 +22,8 @@ PRESSURE = "pressure"
 """Key of the gauge pressure of all muscles whose own pressure is not stated."""
 FIRST_ROWS = 3
 """Number of first rows whose median is the default initial value of a record (chosen)."""
+LOOSE = 1e-3
+"""Part of its nominal value by which a coordinate is moved to see whether anything holds it (chosen)."""
 START_REMEDY = (
     ' In [run], initial_state = { pressure = "2 bar" } is the equilibrium at another pressure, and '
     '{ position = "0 mm" } a state at rest that need not be one; a load that rests on a stop is a '
@@ -84,23 +87,42 @@ def build_initial_conditions(
     """The initial conditions of a record: what the table states, else the first rows of the recorded pressures.
 
     A lone muscle without a recorded pressure begins at ambient pressure.
-    Without a stated value of another state it is the equilibrium at these pressures; where there is none, the recorded
-    coordinates of the first rows. Raises ParameterError, UnitError or EquilibriumError with the location.
+    Without a stated value of another state it is the equilibrium at these pressures; where there is none, or slack
+    muscles leave the plant at rest in any position, the recorded coordinates of the first rows. Raises ParameterError,
+    UnitError or EquilibriumError with the location.
     """
     stated, values = read_initial_values(table, plant, location)
     ambient = {PRESSURE: 0.0} if len(plant.muscles) == 1 else {}
     pressures = _complete({**ambient, **recorded_pressures(plant, recording), **stated}, plant, location)
+    names = [c.name for c in plant.mechanism.coordinates]
     with located_errors(location):
         if values:
             return InitialConditions.at_coordinates(plant, pressures, **values)
         try:
-            return InitialConditions.at_rest(plant, pressures)
+            at_rest = InitialConditions.at_rest(plant, pressures)
+            if (loose := _loose_coordinate(plant, pressures, at_rest.guess)) is None:
+                return at_rest
+            raise EquilibriumError(
+                f"at these pressures every {loose.name} near {at_rest.guess[loose.name]:.3g} {loose.unit} is an "
+                f"equilibrium: no muscle pulls. Record the {loose.name}, or state it in initial_state."
+            )
         except EquilibriumError:
-            coordinates = [c.name for c in plant.mechanism.coordinates]
-            if not all(name in recording for name in coordinates):
+            if not all(name in recording for name in names):
                 raise
-            measured = {name: first_value(recording, name) for name in coordinates}
+            measured = {name: first_value(recording, name) for name in names}
             return InitialConditions.at_coordinates(plant, pressures, **measured)
+
+
+def _loose_coordinate(plant: Plant, pressures: list[float], state: Mapping[str, float]) -> Coordinate | None:
+    """A coordinate of which no acceleration depends in either direction; None if there is none."""
+    coordinates, still = plant.mechanism.coordinates, dict.fromkeys(plant.inputs, 0.0)
+    for c in coordinates:
+        moved = [{each.name: state[each.name] + part * c.nominal * (each is c) for each in coordinates}
+                 for part in (-LOOSE, 0.0, LOOSE)]  # fmt: skip
+        rates = [plant.rates(plant.state_at(pressure=pressures, **place), still) for place in moved]
+        if all(rate[each.speed] == rates[0][each.speed] for rate in rates for each in coordinates):
+            return c
+    return None
 
 
 def first_value(recording: Recording, name: str) -> float:
