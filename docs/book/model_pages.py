@@ -31,6 +31,7 @@ ROOMS = {
     "pneumatics": "Air, valves, tubes and circuits",
     "mechanism": "Mechanisms",
     "laws": "Controllers",
+    "estimation": "Controllers of a linearised plant",
     "loop": "Sensors, drivers and interfaces of controllers",
     "plant": "Plant",
     "run": "Integrators",

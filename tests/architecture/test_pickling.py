@@ -128,6 +128,7 @@ RESULTS: dict[str, Callable[[], Any]] = {
     "a study": lambda: design.load_study(EXAMPLE_FILES / "valve_study.toml"),
     "a learning law": lambda: control.IterativeLearning(0.01, (1.0, 0.5)),
     "a predictive law": predictive,
+    "predictive control of a file": lambda: files.load_scenario(EXAMPLE_FILES / "predictive_lift.toml").problem.input,
     "tasks of an arm and of a lift": lambda: (*arm_task(), *lift_task()),
     "a plant along measured pressures": lambda: physics.PressureDriven(
         control_plants.JOINT.muscles, control_plants.JOINT.mechanism, (0.02, 0.02)

@@ -27,7 +27,7 @@ NOT_IN_A_PLANT = {
     "commands, what drives valves by them, and methods": (
         "Schedule", "SampledSignal", "SolenoidDriver", "PWM", "Rodas4", "DormandPrince8", "RungeKutta4"),
     "controllers, which look at a plant from outside": (
-        "PID", "OnOffController", "SplitRange", "DeadZoneController", "CoContraction", "Decentralised", "SetpointCommand",
+        "PID", "PredictiveControl", "OnOffController", "SplitRange", "DeadZoneController", "CoContraction", "Decentralised", "SetpointCommand",
         "SetpointLead", "SigmaDelta", "SlidingMode", "StaticFeedForward", "StaticInverse", "WithFeedForward",
         "AngleAndStiffness", "AntagonisticInverse", "Cascade", "ColumnSensor", "ComputedTorque", "FrictionFeedForward", "MotionFeedForward",
         "GainSchedule", "HysteresisCompensation", "HysteresisOperator", "InverseHysteresisOperator",

@@ -324,6 +324,7 @@ def test_the_schema_knows_every_controller():
         "Multirate",
         "OnOffController",
         "PID",
+        "PredictiveControl",
         "ProportionalFeedback",
         "RepetitiveControl",
         "SetpointCommand",

@@ -13,7 +13,7 @@ from command_line import airmuscle
 
 import airmuscle as am
 from airmuscle.errors import ParameterError, UnknownNameError
-from airmuscle.files import PlantEntry, list_plants, load_law, load_scenario
+from airmuscle.files import PlantEntry, list_plants, load_law, load_plant_model, load_scenario
 from airmuscle.files.library import PLANTS
 
 pytestmark = pytest.mark.filterwarnings("ignore::airmuscle.core.errors.AirmuscleWarning")
@@ -54,6 +54,19 @@ def test_every_number_of_a_plant_has_its_source_or_is_labelled_chosen(name):
     unused = [s for s in sources if not any(p == s or p.startswith(f"{s}.") for p in paths)]
     assert unused == []
     assert all(text.strip() for text in sources.values())
+
+
+def test_a_copied_file_of_a_plant_is_a_scenario_and_remains_an_entry(tmp_path):
+    """Its provenance, sources and references stand in the file and do not disturb a run or a prediction."""
+    path = tmp_path / "mine.toml"
+    path.write_bytes((PLANTS / "joint-dmsp-20-itv2050.toml").read_bytes())
+    scenario, own = load_scenario(path), load_scenario("joint-dmsp-20-itv2050")
+    assert (scenario.plant, scenario.initial_state) == (own.plant, own.initial_state)
+    assert am.load(path).references == am.load("joint-dmsp-20-itv2050").references != ()
+    assert load_plant_model(path).scenario.plant == own.plant
+    path.write_text(path.read_text(encoding="utf-8").replace("provenance =", "provenence ="), encoding="utf-8")
+    with pytest.raises(ParameterError, match=r"unknown key 'provenence'.*Did you mean 'provenance'"):
+        load_scenario(path)
 
 
 @each

@@ -26,6 +26,7 @@ from airmuscle.control import (
     MotionFeedForward,
     Multirate,
     OnOffController,
+    PredictiveControl,
     ProportionalFeedback,
     RepetitiveControl,
     SetpointCommand,
@@ -47,7 +48,6 @@ from airmuscle.control import (
 from airmuscle.design import load_scenario_loop, proportional_joint, scenario_contender
 from airmuscle.engine import (
     ColumnSensor,
-    ControlLaw,
     Controller,
     ControlLoop,
     Periodic,
@@ -77,7 +77,7 @@ def regulated() -> Scenario:
 
 
 @pytest.fixture(scope="module")
-def laws(regulated: Scenario) -> dict[str, ControlLaw]:
+def laws(regulated: Scenario) -> dict[str, Controller]:
     """A law of each class, with the regulators of the joint as inputs."""
     plant, (first, second) = regulated.plant, SETPOINTS
     inverse = AntagonisticInverse(plant.muscles, plant.mechanism, 1e4, 5e5, steps=2)
@@ -101,6 +101,11 @@ def laws(regulated: Scenario) -> dict[str, ControlLaw]:
         Multirate(pid, 4), WithCommandDelay(pid, 2, 1, 0.1, 3.0), WithRateLimit(pid, (1e6,)), WithManual(pid, 0.3),
         WithFilter.notch(pid, "angle", 5.0), SmithPredictor(pid, "angle", first, 3, 2e-6, 0.1),
         RepetitiveControl(pid, "angle", 20, 2),
+        PredictiveControl(
+            plant, ("angle",), ("angle",), SETPOINTS, ("angular_speed",), ("angle", *SETPOINTS),
+            ("angular_speed", "angular_speed.disturbance"), (2.5e5, 2.5e5), (2.5e5, 2.5e5), (0.02, 1e5, 1e5), (0.1, 5.0),
+            (1e-4,), 5e-3, horizon=4,
+        ),
     )  # fmt: skip
     return {type(law).__name__: law for law in found}
 

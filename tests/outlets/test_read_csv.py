@@ -6,6 +6,7 @@ or absolute. An error message names file, line, value and remedy.
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -175,6 +176,15 @@ def test_unknown_numeric_columns_are_kept_and_texts_ignored_with_a_note(bench):
     notes = " ".join(recording.notes)
     assert "'presure [bar]' is not a known quantity and is kept without conversion. Did you mean 'pressure'?" in notes
     assert "Column 'operator' contains text and is ignored." in notes
+
+
+def test_all_unknown_columns_of_which_nothing_more_is_known_have_one_note(bench):
+    heads = [f"adc{i}" for i in range(200)]
+    recording = read_csv(bench(f"pressure [barg],{','.join(heads)},Weg\n" + 2 * f"{','.join(['0.5'] * 202)}\n"))
+    kept = [note for note in recording.notes if "kept without conversion" in note]
+    assert len(kept) == 2
+    assert kept[0].startswith("Column 'Weg' is not a known quantity and is kept without conversion. If it is the")
+    assert re.fullmatch(r"Columns 'adc0', 'adc1', .* and \d+ more are not known quantities and are kept .*", kept[1])
 
 
 def test_a_resting_length_gives_the_contraction(bench):

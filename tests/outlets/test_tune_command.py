@@ -182,7 +182,7 @@ def test_a_scenario_that_cannot_be_tuned_is_refused(scenario):
     without = SCENARIO[: SCENARIO.index("[input.controller]")] + SCENARIO[SCENARIO.index("[run]") :]
     scenario.write_text(without, encoding="utf-8")
     assert "there is no [input.controller]; tune needs a controller with its gains" in refused(scenario)
-    assert "'joint-dmsp-20-matrix' is a plant of the library without a controller" in refused("joint-dmsp-20-matrix")
+    assert "Of a plant of the library write a scenario file with [plant] library and" in refused("joint-dmsp-20-matrix")
     assert "there is no such file" in refused(scenario.with_name("missing.toml"))
     zero = SCENARIO.replace('"1.5 1/bar"', "0.0").replace("integral_time = 0.6\n", "")
     scenario.write_text(zero, encoding="utf-8")

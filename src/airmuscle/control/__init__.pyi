@@ -3,6 +3,7 @@ from .estimation import FiniteControlSet as FiniteControlSet
 from .estimation import Innovation as Innovation
 from .estimation import MovingHorizonEstimator as MovingHorizonEstimator
 from .estimation import NonlinearModelPredictive as NonlinearModelPredictive
+from .estimation import PredictiveControl as PredictiveControl
 from .estimation import StateEstimate as StateEstimate
 from .estimation import StateEstimator as StateEstimator
 from .estimation import UnscentedKalmanFilter as UnscentedKalmanFilter

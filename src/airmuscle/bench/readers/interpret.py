@@ -66,13 +66,17 @@ def interpret(table: RawTable, mapping: ColumnMapping, constants: Mapping[str, f
     check_constants(table.origin, run_constants)
     ambient = float(run_constants.get("ambient", AMBIENT_PRESSURE))
     columns: dict[str, Array] = {}
-    notes: list[str] = [*table.notes, *_override_notes(table, headings)]
+    notes, unknown = [*table.notes, *_override_notes(table, headings)], list[str]()
     for heading, cells in zip(headings, table.columns, strict=True):
         if heading.known:
             columns[heading.name], note = _convert_column(table, heading, cells, ambient)
         else:
-            note = _keep_unknown_column(table, heading, cells, columns)
+            note = _keep_unknown_column(table, heading, cells, columns, unknown)
         notes += [note] if note and note not in notes else []
+    if unknown:
+        one = len(unknown) == 1
+        what = "Column {} is not a known quantity and is" if one else "Columns {} are not known quantities and are"
+        notes.append(f"{what.format(listed(unknown))} kept without conversion.")
     notes += _standard_atmosphere(table, headings) if "ambient" not in run_constants else []
     notes += _add_held(table, columns, held, ambient)
     columns, displaced = displacement_columns(columns, run_constants)
@@ -240,8 +244,13 @@ def _is_mass(unit: str) -> bool:
         return False
 
 
-def _keep_unknown_column(table: RawTable, heading: Heading, cells: Cells, columns: dict[str, Array]) -> str:
-    """Keep an unknown numeric column without conversion, and return the note on the column, if any."""
+def _keep_unknown_column(
+    table: RawTable, heading: Heading, cells: Cells, columns: dict[str, Array], unknown: list[str]
+) -> str:
+    """Keep an unknown numeric column without conversion, and return what there is to say of this column alone, if any.
+
+    A column of which nothing else is known is added to `unknown`, for one note on all.
+    """
     if isinstance(cells, list):
         if not any(cells):
             return ""
@@ -254,7 +263,9 @@ def _keep_unknown_column(table: RawTable, heading: Heading, cells: Cells, column
         return _field_note(heading)
     near = difflib.get_close_matches(heading.text.partition(" ")[0].lower(), QUANTITIES, n=1)
     hint = proposal(heading.text) or (f" Did you mean '{near[0]}'?" if near else "")
-    return f"Column '{heading.text}' is not a known quantity and is kept without conversion.{hint}"
+    if not hint:
+        unknown.append(f"'{heading.text}'")
+    return hint and f"Column '{heading.text}' is not a known quantity and is kept without conversion.{hint}"
 
 
 def _field_note(heading: Heading) -> str:

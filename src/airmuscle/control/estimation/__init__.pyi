@@ -9,5 +9,6 @@ from .lqg import design_adrc as design_adrc
 from .lqg import design_lqg as design_lqg
 from .moving_horizon import MovingHorizonEstimator as MovingHorizonEstimator
 from .nonlinear_model_predictive import NonlinearModelPredictive as NonlinearModelPredictive
+from .predictive_design import PredictiveControl as PredictiveControl
 from .predictive_design import design_predictive as design_predictive
 from .state_estimator import StateEstimator as StateEstimator

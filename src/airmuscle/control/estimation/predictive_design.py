@@ -1,14 +1,30 @@
 """Design of linear model predictive control for a linearised plant."""
 
+import functools
 from collections.abc import Mapping, Sequence
+from typing import Any, ClassVar
 
 import numpy as np
 
-from ...core import Array, ParameterError
-from ...physics.analysis.linear_model import LinearModel
-from ..laws.linear_model_predictive import CondensedProblem, LinearModelPredictive, ObserverModel, TargetMap
+from ...core import Array, Parameter, ParameterError, Reference, model, parameter
+from ...engine.loop.controller import Measurement, MultivariableController, relative_unit
+from ...physics.analysis.linear_model import LinearModel, linearise
+from ...physics.equilibrium import find_equilibrium
+from ...physics.plant.plant import Plant
+from ..laws.linear_model_predictive import (
+    CHISCI2001,
+    RAWLINGS2017,
+    CondensedProblem,
+    LinearModelPredictive,
+    ObserverModel,
+    PredictiveMemory,
+    TargetMap,
+)
+from .predictive_program import MAX_HORIZON
 from .riccati import (
+    DISTURBANCE,
     check_numbers,
+    check_sample_time,
     checked_scale,
     disturbance_observer,
     regulator,
@@ -16,8 +32,6 @@ from .riccati import (
     steady_target,
 )
 
-MAX_HORIZON = 200
-"""Maximum number of samples of a horizon, whose matrices have the square of it (chosen)."""
 SLACK_WEIGHT = 1e4
 """Weight of the slack of a limited column, relative to the permitted deviation of 1 (chosen)."""
 
@@ -84,6 +98,101 @@ def design_predictive(
     ends = [(np.array([pair[i] for pair in limits.values()]) - at[2]) / ranges for i in (0, 1)]
     maps = TargetMap(*steady_target(where, a, b, by_disturbance, z), at[1], columns, *ends)
     return LinearModelPredictive(tuple(measured), tuple(controlled), model.inputs, observer, maps, problem)
+
+
+@model
+class PredictiveControl(MultivariableController):
+    """Linear model predictive control as declared: `law` is what `design_predictive` designs from these numbers.
+
+    The plant is linearised at the equilibrium at `pressures`, with the commanded inputs `operating_inputs` and 0 for
+    the others. Numbers are in the order of the names to which they belong: `permitted` of the states and inputs
+    `weighted`, `process_noise` of the states and disturbances `noisy` ("speed.disturbance"), the limits of the columns
+    `limited`, `bounds` of the disturbances of the rates of the states `bounded`; they are those of `design_predictive`.
+    In a file, plant and sample time are those of the scenario.
+    """
+
+    references: ClassVar[tuple[Reference, ...]] = (RAWLINGS2017, CHISCI2001)
+    named: ClassVar[Mapping[str, str]] = {
+        "operating_inputs": "commanded", "permitted": "weighted", "process_noise": "noisy",
+        "measurement_noise": "measured", "minimum": "limited", "maximum": "limited", "max_rate": "commanded",
+        "bounds": "bounded",
+    }  # fmt: skip
+
+    plant: Plant
+    measured: tuple[str, ...]
+    controlled: tuple[str, ...]
+    commanded: tuple[str, ...]
+    disturbed: tuple[str, ...]
+    weighted: tuple[str, ...]
+    noisy: tuple[str, ...]
+    pressures: tuple[float, ...] = parameter("Pa", "p_0", "gauge pressure of each muscle there", fitted=False)
+    operating_inputs: tuple[float, ...] = parameter("SI", "u_0", "commanded inputs there", fitted=False)
+    permitted: tuple[float, ...] = parameter("SI", "d", "permitted deviations of states and inputs")
+    process_noise: tuple[float, ...] = parameter("SI", "q", "standard deviations after 1 s of noise")
+    measurement_noise: tuple[float, ...] = parameter("SI", "r", "standard deviations of the measured columns")
+    sample_time: float = parameter("s", "h", "sample time", bounds=(1e-6, 10.0), fitted=False)
+    limited: tuple[str, ...] = ()
+    bounded: tuple[str, ...] = ()
+    minimum: tuple[float, ...] = parameter("SI", "z_min", "lower limits of columns", default=())
+    maximum: tuple[float, ...] = parameter("SI", "z_max", "upper limits of columns", default=())
+    max_rate: tuple[float, ...] = parameter("SI", "R", "maximum rate of each input; empty: no limit", default=())
+    bounds: tuple[float, ...] = parameter("SI", "w", "greatest disturbances of rates", default=())
+    slack_weight: float = parameter("1", "rho", "weight of a violated limit", bounds=(1e-6, 1e12), default=SLACK_WEIGHT)
+    horizon: int = 20
+    blocks: tuple[int, ...] = ()
+
+    def check(self) -> None:
+        for name in self.named:
+            self._names(name, len(getattr(self, name)))
+        assert self.law
+
+    def _names(self, numbers: str, count: int) -> tuple[str, ...]:
+        """The names to which so many numbers belong. Raises ParameterError where there is not one for each."""
+        names: tuple[str, ...] = getattr(self, self.named[numbers])
+        if count != len(names) and (count or numbers != "max_rate"):
+            raise ParameterError(
+                f"PredictiveControl: {numbers} has {count} numbers; it must have {len(names)}, one for each of "
+                f"'{self.named[numbers]}': {', '.join(names) or 'none'}."
+            )
+        return names
+
+    @functools.cached_property
+    def law(self) -> LinearModelPredictive:
+        """The designed law."""
+        numbers: dict[str, Any] = {
+            name: dict(zip(getattr(self, names), getattr(self, name), strict=False))
+            for name, names in self.named.items()
+        }
+        lower, upper = numbers["minimum"], numbers["maximum"]
+        state = find_equilibrium(self.plant, pressure=self.pressures, inputs=numbers["operating_inputs"])
+        linear = linearise(self.plant, state, numbers["operating_inputs"]).select(inputs=self.commanded)
+        return design_predictive(
+            linear, self.sample_time, measured=self.measured, controlled=self.controlled, disturbed=self.disturbed,
+            limits={name: (lower[name], upper[name]) for name in self.limited}, horizon=self.horizon,
+            blocks=self.blocks, slack_weight=self.slack_weight, bounded=numbers["bounds"],
+            **{name: numbers[name] for name in ("permitted", "process_noise", "measurement_noise", "max_rate")},
+        )  # fmt: skip
+
+    def unit_of(self, declared: Parameter, index: int, units: Mapping[str, str]) -> str:
+        if declared.unit != "SI":
+            return declared.unit
+        names = getattr(self, self.named[declared.name])
+        name = names[index] if index < len(names) else self._names(declared.name, index + 1)[0]
+        unit = units[name.removesuffix(DISTURBANCE)] or "1"
+        rate = declared.name in ("max_rate", "bounds") or name.endswith(DISTURBANCE)
+        return relative_unit("u/s", "", unit) if rate else unit
+
+    def init(self) -> PredictiveMemory:
+        return self.law.init()
+
+    def notes(self, memory: PredictiveMemory) -> tuple[str, ...]:
+        return self.law.notes(memory)
+
+    def step(
+        self, memory: PredictiveMemory, measurement: Measurement, dt: float
+    ) -> tuple[Mapping[str, float], PredictiveMemory]:
+        check_sample_time("PredictiveControl", dt, self.sample_time)
+        return self.law.step(memory, measurement, dt)
 
 
 def _check(

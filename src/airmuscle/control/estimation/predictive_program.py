@@ -9,7 +9,7 @@ import numpy as np
 from ...core import Array, System
 
 MAX_HORIZON = 200
-"""Maximum number of samples of a horizon, and of steps of a sample (chosen)."""
+"""Maximum number of samples of a horizon, whose matrices have the square of it, and of steps of a sample (chosen)."""
 MAX_ITERATIONS = 100
 """Iterations after which a search has no solution (chosen)."""
 TARGET_WEIGHT = 1e8

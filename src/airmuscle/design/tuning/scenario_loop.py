@@ -13,9 +13,8 @@ from ...core import Leaf, ShortRepr, conversion, leaves, quantity
 from ...core.errors import AirmuscleWarning, FileError, ParameterError, check_known
 from ...engine.loop import ControlLoop, parameter_units
 from ...files.library import Location, ParameterUncertainty, load_law, located_errors, write_text
-from ...files.library.files import is_path, list_plants, read_toml
 from ...files.scenario.controller import path_keys, signal_units
-from ...files.scenario.scenario import Scenario, build_scenario
+from ...files.scenario.scenario import Scenario, build_scenario, scenario_tables
 from ...physics.plant.plant import Plant
 from .case import with_gains as controller_with_gains
 from .perturbations import Perturbations, PerturbedFamily, muscle_paths, perturbed_family
@@ -167,20 +166,14 @@ def load_scenario_loop(path: str | Path) -> ScenarioLoop:
     Raises FileError, ParameterError, UnitError or UnknownNameError with the location; ParameterError for a plant of the
     library, which is no file, and for a scenario without a controller.
     """
-    file = Path(path)
-    if str(path) in list_plants() and not is_path(str(path)) and not file.exists():
-        raise ParameterError(
-            f"'{path}' is a plant of the library without a controller; write a scenario file with "
-            f'[plant] library = "{path}" and [input.controller].'
-        )
-    tables = read_toml(file)
-    location = Location(str(file), "", file.parent)
+    tables, location = scenario_tables(path)
     scenario = build_scenario(tables, location)
     if not isinstance(scenario.problem.input, ControlLoop):
         raise ParameterError(
             f"{location}: there is no [input.controller]; tune needs a controller with its gains, sample_time and "
-            "setpoint."
+            "setpoint. Of a plant of the library write a scenario file with [plant] library and [input.controller]."
         )
+    file = Path(path)
     text = file.read_bytes().decode("utf-8-sig")
     return ScenarioLoop(file, text, tables, scenario)
 

@@ -17,14 +17,14 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from ...bench.readers import read_csv
-from ...control import laws
+from ...control import estimation, laws
 from ...core import Hint, HintedText, Parameter, ParameterError, UnknownNameError, abridged, one_line, suggestion
 from ...engine import loop, run
 from ...physics import mechanism, muscle, plant, pneumatics
 from ...physics.muscle import characteristic, friction, geometry
 from .files import Location, located_errors, read_number, with_article
 
-PACKAGES = (characteristic, friction, geometry, laws, loop, mechanism, muscle, plant, pneumatics, run)
+PACKAGES = (characteristic, estimation, friction, geometry, laws, loop, mechanism, muscle, plant, pneumatics, run)
 
 
 @functools.cache

@@ -48,7 +48,7 @@ from .inputs import build_input_signal, read_drivers
 from .values import Number
 
 
-def build_law(table: Any, plant: Plant, units: Mapping[str, str], location: Location) -> Controller:
+def build_law(table: Any, plant: Plant, units: Mapping[str, str], location: Location, sample_time: float) -> Controller:
     """The controller of a table, with the laws inside it; `units` are those of the signals of the plant by name.
 
     The table is read twice: the first time without its numbers, to find the signals that determine their units.
@@ -56,7 +56,7 @@ def build_law(table: Any, plant: Plant, units: Mapping[str, str], location: Loca
     """
 
     def built(known: Mapping[str, str] | None) -> Controller:
-        reader = dataclasses.replace(PLANT_READER, signals=PlantSignals(plant, known))
+        reader = dataclasses.replace(PLANT_READER, signals=PlantSignals(plant, sample_time, known))
         controller: Controller = reader.build(table, location, kind=Controller)
         return controller
 
@@ -72,6 +72,7 @@ class PlantSignals:
     """Signals of a plant with their units; without units, of the models that depend on them no numbers are read."""
 
     plant: Plant
+    sample_time: float
     units: Mapping[str, str] | None
 
     def concerns(self, cls: type[Any]) -> bool:
@@ -80,9 +81,9 @@ class PlantSignals:
         return issubclass(cls, SignalRelated) or any(_has(h, kind) for h in hints for kind in (Muscle, Mechanism))
 
     def parts(self, cls: type[Any], hints: Mapping[str, Any]) -> dict[str, Any]:
-        """Muscles and mechanism of the plant, for the fields of a static inverse that need them."""
-        own = {tuple[Muscle, ...]: self.plant.muscles, Mechanism: self.plant.mechanism}
-        return {name: own[hints[name]] for name in plant_fields(cls)}
+        """Muscles and mechanism of the plant, itself and the sample time, for the fields that need them."""
+        own = {tuple[Muscle, ...]: self.plant.muscles, Mechanism: self.plant.mechanism, Plant: self.plant}
+        return {name: own.get(hints[name], self.sample_time) for name in plant_fields(cls)}
 
     def make(self, cls: type[Any], parts: Mapping[str, Any], numbers: Mapping[str, Any], location: Location) -> Any:
         """The model of a class; its numbers are read in the units of the signals that its parts name."""
@@ -115,7 +116,8 @@ class PlantSignals:
     def _unit(self, value: Any, declared: Parameter, index: int, outline: Any, location: Location) -> str:
         """The unit of a parameter; "1" for a number without a unit where that of a signal is not known."""
         try:
-            return unit_of(outline, declared, index, self.units or {})
+            with located_errors(location):
+                return unit_of(outline, declared, index, self.units or {})
         except KeyError as error:
             if isinstance(value, str):
                 raise ParameterError(
@@ -146,10 +148,10 @@ def _outline(cls: type[Any], parts: Mapping[str, Any]) -> Any:
 
 def plant_fields(cls: type[Any]) -> tuple[str, ...]:
     """The fields of a model that are those of the plant where a table does not give them."""
-    hints = typing.get_type_hints(cls)
-    if tuple[Muscle, ...] not in hints.values():
+    hints, known = typing.get_type_hints(cls), (tuple[Muscle, ...], Mechanism, Plant)
+    if not {tuple[Muscle, ...], Plant} & set(hints.values()):
         return ()
-    return tuple(f.name for f in dataclasses.fields(cls) if hints[f.name] in (tuple[Muscle, ...], Mechanism))
+    return tuple(f.name for f in dataclasses.fields(cls) if hints[f.name] in known or f.name == "sample_time")
 
 
 def _has(hint: Any, kind: type[Any]) -> bool:
@@ -196,9 +198,9 @@ def build_control_loop(
             "sample_time and setpoint in it."
         )
     own = {key: value for key, value in controller_table.items() if key not in LOOP_KEYS}
-    controller = build_law(own, plant, units, inner)
     stated = {key: value for key, value in controller_table.items() if key in LOOP_KEYS}
     keys: LoopTable = build(stated, inner, kind=LoopTable)
+    controller = build_law(own, plant, units, inner, keys.sample_time)
     setpoint = _build_setpoint(keys.setpoint, controller, units, inner.inside("setpoint"))
     other_inputs = {key: value for key, value in table.items() if key not in ("controller", "drivers")}
     other_signal = build_input_signal(other_inputs, plant.input_variables, location)

@@ -35,11 +35,11 @@ from ...physics.muscle.characteristic.base import ForceLaw
 from ...physics.muscle.muscle import LENGTH_TOLERANCE
 from ...recording import Recording
 from ...recording.columns import split_unit
-from ..library import Entry, is_path, list_plants, plant_tables, read_toml, scale_to_length
+from ..library import Entry, read_toml, scale_to_length
 from ..library.files import Location, check_keys, located_errors
 from .identification import Record, build_records, with_observed
 from .initial_state import first_value, pressure_names, recorded_pressures
-from .scenario import TABLES, Scenario, build_scenario
+from .scenario import Scenario, build_scenario, scenario_tables
 from .values import FitTable, optional_table, read_observed, table_reader
 
 UNKNOWN = "not known for a specimen that was not measured"
@@ -153,13 +153,8 @@ def load_plant_model(path: str | Path) -> PlantModel:
 
     Raises FileError, ParameterError, UnitError or UnknownNameError with the location.
     """
-    file = Path(path)
-    if str(path) in list_plants() and not is_path(str(path)) and not file.exists():
-        tables, location = plant_tables(str(path))
-    else:
-        tables, location = read_toml(file), Location.of_file(file)
-    kept = {key: tables[key] for key in TABLES if key in tables} if "sources" in tables else tables
-    scenario = build_scenario(kept, location)
+    tables, location = scenario_tables(path)
+    scenario = build_scenario(tables, location)
     if "controller" in tables.get("input", {}):
         raise ParameterError(
             f"{location}, [input]: the plant of a prediction has no controller; give the commands that were applied as "

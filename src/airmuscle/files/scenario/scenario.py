@@ -29,7 +29,7 @@ from types import MappingProxyType
 from typing import Any
 
 from ...bench.identify.prediction import PlantUncertainty
-from ...core import FileError, ParameterError, ShortRepr, ambient_pressure, check_known
+from ...core import FileError, ParameterError, Reference, ShortRepr, ambient_pressure, check_known
 from ...engine.loop import ControlLoop, InputSignal
 from ...engine.run import Integrator, Problem, solve
 from ...physics.plant.plant import Plant
@@ -87,6 +87,12 @@ class ScenarioTables:
     output: OutputTable = OutputTable()
     observed: Mapping[str, tuple[float, str]] = custom_field(read_observed, "of a fit", default_factory=dict)
     uncertainty: PlantUncertainty | None = custom_field(read_plant_uncertainty, "of a fit", default=None)
+    # of an entry of the library, so that its copy is a scenario; a simulation does not use them
+    provenance: str = ""
+    note: str = ""
+    warning: str = ""
+    sources: Mapping[str, str] = custom_field(read_table, "source of each number, by its path", default_factory=dict)
+    reference: tuple[Reference, ...] = ()
 
 
 TABLES = ("title", *SCENARIO_TABLES, "observed", "uncertainty")
@@ -143,8 +149,7 @@ def scenario_tables(path: str | Path) -> tuple[Mapping[str, Any], Location]:
     """The tables of a scenario with their location. Raises as `load_scenario`."""
     file = Path(path)
     if str(path) in list_plants() and not is_path(str(path)) and not file.exists():
-        tables, location = plant_tables(str(path))
-        return {key: tables[key] for key in TABLES if key in tables}, location
+        return plant_tables(str(path))
     if not is_path(str(path)) and not file.exists():
         raise FileError(f"{path}: there is no such file, and no such plant; plants are {', '.join(list_plants())}.")
     return read_toml(file), Location.of_file(file)
@@ -161,7 +166,7 @@ def build_scenario(
     `plant` replaces the table [plant], `equilibrium` replaces the computed initial equilibrium. Raises FileError,
     ParameterError, UnitError or UnknownNameError with the location.
     """
-    check_keys(tables, TABLES, location)
+    check_keys(tables, [field.name for field in dataclasses.fields(ScenarioTables)], location)
     for key in ("plant", "run"):
         required_table(tables, key, location)
     plant = plant or build_plant(tables["plant"], location.inside("plant"))

@@ -6,7 +6,8 @@ from pathlib import Path
 from typing import Any
 
 from ...core import ParameterError
-from ...engine.loop import ControlLaw, ControlLoop, InputSignal, Periodic, SampledSignal, Schedule, WithDrivers
+from ...engine.loop import ControlLoop, InputSignal, Periodic, SampledSignal, Schedule, WithDrivers
+from ...physics.plant.plant import Plant
 from ..library import Location, model_table, tables_toml, write_text
 from .scenario import Scenario, build_scenario
 
@@ -53,21 +54,20 @@ def _tables(scenario: Scenario) -> dict[str, Any]:
     return {
         "title": scenario.title,
         "plant": {key: value for key, value in model_table(scenario.plant).items() if key != "model"},
-        "input": _loop_table(signal) if isinstance(signal, ControlLoop) else _signal_table(signal),
+        "input": _loop_table(signal, scenario.plant) if isinstance(signal, ControlLoop) else _signal_table(signal),
         "run": run,
         **({"output": {"columns": list(scenario.columns)}} if scenario.columns else {}),
     }
 
 
-def _loop_table(loop: ControlLoop) -> dict[str, Any]:
-    """The table [input] of a control loop."""
-    if not isinstance(loop.controller, ControlLaw):
+def _loop_table(loop: ControlLoop, plant: Plant) -> dict[str, Any]:
+    """The table [input] of a control loop; a controller that contains the plant has it from [plant]."""
+    if not getattr(loop.controller, "from_file", False):
         raise ParameterError(
-            f"scenario: {type(loop.controller).__name__} is no ControlLaw, so that no file describes it; write the "
-            "loop as a program in Python."
+            f"scenario: {type(loop.controller).__name__} has no form in a file; write the loop as a program in Python."
         )
     controller = {
-        **model_table(loop.controller),
+        **{name: value for name, value in model_table(loop.controller).items() if value != plant},
         "sample_time": loop.sample_time,
         "setpoint": _signal_table(loop.setpoint),
     }

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...control import LinearModelPredictive
+from ...control import LinearModelPredictive, PredictiveControl
 from ...core import Array, ParameterError, atomic_folder, check_known
 from ...engine.compile.kernel_text import CKernels, plain_kernels
 from ...engine.loop import MEASURED, Controller, ControlLoop, EnclosingLaw, WithSensors, without_simulated
@@ -253,6 +253,9 @@ def write_controller(
     LinearModelPredictive, and one that single precision changes by more; SimulationError if the run fails, and
     FileError.
     """
+    if isinstance(problem.input, ControlLoop) and isinstance(problem.input.controller, PredictiveControl):
+        designed = dataclasses.replace(problem.input, controller=problem.input.controller.law)
+        problem = dataclasses.replace(problem, input=designed)
     loop = check_control_law(problem, also=LinearModelPredictive)
     prepared = prepare_loop(problem, loop.init(problem.start_time))
     law = without_simulated(loop.controller)
