@@ -115,7 +115,7 @@ def test_samples_outside_the_limits_are_counted_and_left_out():
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"degree": 12}, "the degree is 12; allowed range: 0 to 9"),
+        ({"degree": 12}, "degree is 12; allowed range: 0 to 9"),
         ({"forgetting": 0.2}, "forgetting 0.2 .*; allowed range: sigma and force above 0, forgetting 0.5 to 1"),
         ({"sigma": 0.0}, "sigma is 0"),
     ],

@@ -332,7 +332,7 @@ def test_a_manifold_books_what_its_branches_draw():
         (lambda: ProportionalValve(Supply(6e5), VALVE, VALVE, SPOOL, 0.0, 3), "muscle_count is 3; it must be 1 or 2"),
         (lambda: ProportionalValve(Supply(6e5), VALVE, VALVE, SPOOL, 0.0, True), "muscle_count must be an integer; it is True"),
         (lambda: ProportionalValve(Supply(6e5), VALVE, VALVE, SPOOL, 1.0), r"overlap .* allowed range: -0.5 to 0.9"),
-        (lambda: Tube(VALVE, 1e-5, 0), "Tube: segment_count is 0; give an integer from 1 to 200"),
+        (lambda: Tube(VALVE, 1e-5, 0), "Tube: segment_count is 0; allowed range: 1 to 200"),
         (lambda: DistributedTube(1.0, 4e-3, 2.5), "DistributedTube: segment_count must be an integer; it is 2.5"),
         (lambda: plant(FillDischarge(Supply(5e5), VALVE, VALVE), count=2), "circuits feed 1 muscles; 2 are given"),
     ],

@@ -112,7 +112,7 @@ def test_decentralised_laws_do_not_influence_each_other():
             "allowed range: 0 to",
         ),
         (lambda: DeadZoneController("y", "u", 1.0), "needs two, SplitRange"),
-        (lambda: ColumnSensor("y", delay=2000), "delay is 2000 samples; allowed range: 0 to 1000"),
+        (lambda: ColumnSensor("y", delay=2000), "delay is 2000; allowed range: 0 to 1000"),
         (lambda: WithSensors(PID("y", "u", 1.0), (ColumnSensor("z"),)), "the law does not measure 'z'"),
         (lambda: WithSensors(PID("y", "u", 1.0), (ColumnSensor("y"), ColumnSensor("y"))), "'y' has two sensors"),
         (lambda: WithSensors(PID("y", "u", 1.0), (), 0.5), "seed is 0.5; it must be a whole number"),

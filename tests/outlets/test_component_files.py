@@ -92,7 +92,7 @@ def test_components_nest_in_a_file_with_units_as_text(tmp_path):
 @pytest.mark.parametrize(
     ("right", "wrong", "message"),
     [
-        ('segment_count = 5', 'segment_count = 0', r"DistributedTube: segment_count is 0; give an integer from 1 to 200"),
+        ('segment_count = 5', 'segment_count = 0', r"DistributedTube: segment_count is 0; allowed range: 1 to 200"),
         ('diameter = "4 mm"', 'diameter = "4 m"', r"diameter \(D, inner diameter of the tube\) is 4 m; allowed range: 0.0005 to 0.1 m"),
         ('tube = { model = "DistributedTube"', 'tube = { model = "Supply", pressure = "1 bar" } #', r"Supply is not allowed here; a TubeModel is required"),
         ('damper = "Serres2009Damper"', 'damper = "LinearSpring"', r"LinearSpring is not allowed here; a Damper is required"),

@@ -238,7 +238,7 @@ stiffness = [["0 s", "40 N m/rad"]]"""
         ('resolution = "2.44 mbar"', 'resolution = "2 deg"', UnitError, r"\[input.controller.sensors\[1\]\], resolution: unit 'deg' cannot be converted to 'Pa'"),
         ('resolution = "2.44 mbar"', 'resolution = "-1 mbar"', ParameterError, r"\[input.controller.sensors\[1\]\]: ColumnSensor.resolution .* is -100"),
         ("delay = 2", "delay = 2.5", ParameterError, r"\[input.controller.sensors\[0\]\]: delay is 2.5; it must be an integer"),
-        ("delay = 2", "delay = -1", ParameterError, r"ColumnSensor: delay is -1 samples; allowed range: 0 to 1000"),
+        ("delay = 2", "delay = -1", ParameterError, r"ColumnSensor: delay is -1; allowed range: 0 to 1000"),
         ('column = "angle"', 'column = "angel"', ParameterError, r"\[input.controller.sensors\[0\]\], resolution is '0.0879 deg'; the unit of the signal 'angel' is not known"),
         ("seed = 1", "seed = 1.5", ParameterError, r"WithSensors: seed is 1.5; it must be a whole number"),
         ('model = "ColumnSensor"', 'model = "PID"', ParameterError, r"\[input.controller.sensors\[0\]\]: PID is not allowed here; a ColumnSensor is required"),

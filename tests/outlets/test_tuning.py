@@ -388,8 +388,8 @@ def test_bad_cases_are_refused():
     [
         (lambda: Perturbations(loads=(1.0,)), "loads contains 1; a factor must be positive, finite and not 1"),
         (lambda: Perturbations(supplies=(float("nan"),)), "supplies contains nan"),
-        (lambda: Perturbations(leak=2.0), "leak is 2; allowed range: 0 to 1"),
-        (lambda: Perturbations(delay=0.5), "delay is 0.5; allowed range: 0 to 1000"),
+        (lambda: Perturbations(leak=2.0), "leak is 2.0; allowed range: 0 to 1"),
+        (lambda: Perturbations(delay=0.5), "delay must be an integer; it is 0.5"),
         (lambda: RobustObjective(quantile=2.0), "quantile is 2.0; allowed range: 0 to 1"),
         (lambda: RobustObjective(air_weight=-1.0), "air_weight is -1.0"),
         (lambda: RootMeanSquareError({"y": 0.0}), "scale of 'y' is 0.0; it must be positive"),

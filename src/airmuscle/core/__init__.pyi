@@ -47,6 +47,7 @@ from .annotation import abridged as abridged
 from .annotation import check_field_types as check_field_types
 from .annotation import check_whole as check_whole
 from .annotation import one_line as one_line
+from .annotation import within as within
 from .arrays import BLAS_THREADS as BLAS_THREADS
 from .arrays import FEW as FEW
 from .arrays import NUMBERS as NUMBERS

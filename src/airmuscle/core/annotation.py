@@ -153,6 +153,20 @@ def _shortened(write: Callable[[Any], str], value: Any) -> str:
     return text if len(text) <= 80 else f"{text[:77]}..."
 
 
+def within(low: float, high: float, **field: Any) -> Any:
+    """Declare a number without a unit, such as a number of samples, as a dataclass field with closed bounds."""
+    return dataclasses.field(metadata={"within": (low, high)}, **field)
+
+
+def check_within(obj: Any, field: "dataclasses.Field[Any]") -> None:
+    """Raise ParameterError if the number of a field is not within the bounds that it declares."""
+    if "within" not in field.metadata:
+        return
+    (low, high), value = field.metadata["within"], getattr(obj, field.name)
+    if not low <= value <= high:
+        raise ParameterError(f"{type(obj).__name__}: {field.name} is {value}; allowed range: {low} to {high}.")
+
+
 def check_field_types(obj: Any) -> None:
     """Raise ParameterError, with class and field, if a field of a dataclass does not conform to its annotation.
 
@@ -164,11 +178,12 @@ def check_field_types(obj: Any) -> None:
         hint = hints.get(field.name)
         value: Any = getattr(obj, field.name, None)
         if type(value) is hint and (hint is not int or abs(value) < _MAX_INTEGER):  # most often so, and fast
-            continue
-        if field.init and not conforms(value, hint, lists=True):
+            pass
+        elif field.init and not conforms(value, hint, lists=True):
             raise ParameterError(
                 f"{type(obj).__name__}: {field.name} must be {describe(hint)}; it is {abridged(value)}."
             )
+        check_within(obj, field)
 
 
 def check_whole(owner: str, name: str, value: Any, least: int) -> None:

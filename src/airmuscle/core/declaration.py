@@ -13,7 +13,7 @@ from typing import Any, TypeVar, dataclass_transform
 import numpy as np
 
 from .absolute_pressure import AbsolutePressure
-from .annotation import abridged, conforms, describe, one_line, type_hints
+from .annotation import abridged, check_within, conforms, describe, one_line, type_hints, within
 from .errors import AirmuscleWarning, ParameterError, check_known
 from .short_repr import ShortRepr
 from .units import is_known_unit, quantity, usual_unit
@@ -68,7 +68,7 @@ def parameter(
     )
 
 
-@dataclass_transform(frozen_default=True, field_specifiers=(parameter, dataclasses.field))
+@dataclass_transform(frozen_default=True, field_specifiers=(parameter, within, dataclasses.field))
 def model(cls: type[T]) -> type[T]:
     """Make a class a frozen dataclass whose declared parameters are validated on construction.
 
@@ -231,6 +231,7 @@ def _check_annotations(obj: Any) -> None:
                 f"{type(obj).__name__}: {field.name} must be {describe(hint)}; it is {abridged(component)}."
                 f"{attribute_hint(component, hint) if isinstance(hint, type) else ''}"
             )
+        check_within(obj, field)
 
 
 def _check_size(label: str, value: int | str) -> None:

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core import Array, IdentificationError, ParameterError, ShortRepr, abridged, check_field_types
+from ...core import Array, IdentificationError, ParameterError, ShortRepr, abridged, check_field_types, within
 from ...physics.muscle.characteristic import ContractileSurface, exponents
 from .experiment_design import LEVEL_COUNT, BenchLimits
 
@@ -45,7 +45,7 @@ class RecursiveFit(ShortRepr):
     """
 
     limits: BenchLimits
-    degree: int = 5
+    degree: int = within(0, 9, default=5)
     sigma: float = 1.0
     forgetting: float = 1.0
     samples: int = 0
@@ -62,8 +62,6 @@ class RecursiveFit(ShortRepr):
         for name in ("factor", "squared_factor"):
             if not isinstance(getattr(self, name), np.ndarray):
                 raise ParameterError(f"RecursiveFit: {name} must be an array; it is {abridged(getattr(self, name))}.")
-        if not 0 <= self.degree <= 9:
-            raise ParameterError(f"RecursiveFit: the degree is {self.degree}; allowed range: 0 to 9.")
         if not self.sigma > 0 or not 0.5 < self.forgetting <= 1.0 or not self.limits.max_force > 0:
             raise ParameterError(
                 f"RecursiveFit: sigma is {self.sigma:g}, forgetting {self.forgetting:g} and the maximum force "

@@ -7,6 +7,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from ...core import Array, ParameterError, Reference, ShortRepr, SolveError, Status, check_field_types, published
+from ...core.annotation import within
 from ...core.errors import check_known
 from ...engine.compile.cache.kernel import Kernel
 from ...recording.recording import Recording
@@ -61,16 +62,12 @@ class MovingHorizonEstimator(ShortRepr):
     references: ClassVar[tuple[Reference, ...]] = (RAO2003,)
 
     filter: ExtendedKalmanFilter
-    horizon: int = 10
+    horizon: int = within(1, MAX_HORIZON, default=10)
     bounds: Mapping[str, tuple[float, float]] = dataclasses.field(default_factory=dict)
 
     def __post_init__(self) -> None:
         check_field_types(self)
         check_known("MovingHorizonEstimator: bounds names", self.bounds, self.filter.states)
-        if not 1 <= self.horizon <= MAX_HORIZON:
-            raise ParameterError(
-                f"MovingHorizonEstimator: horizon is {self.horizon}; allowed range: 1 to {MAX_HORIZON} samples."
-            )
         for name, (low, high) in self.bounds.items():
             if not low < high:
                 raise ParameterError(

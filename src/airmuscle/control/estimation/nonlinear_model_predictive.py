@@ -6,14 +6,14 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from ...core import Array, ParameterError, Reference, ShortRepr, check_field_types, check_known
+from ...core import Array, ParameterError, Reference, ShortRepr, check_field_types, check_known, within
 from ...engine.compile.program import compile_system
 from ...engine.loop.controller import Measurement, MultivariableController, failure_notes
 from ...physics.analysis.linear_model import linearise
 from ...physics.analysis.sampled_model import held
 from ..laws.linear_model_predictive import RAWLINGS2017
 from .estimates import StateEstimate
-from .predictive_program import MAX_HORIZON, PredictiveProgram, Programs
+from .predictive_program import MAX_HORIZON, PredictiveProgram, Programs, check_limits
 from .riccati import check_numbers, check_sample_time, regulator
 from .state_estimator import StateEstimator
 
@@ -73,8 +73,8 @@ class NonlinearModelPredictive(ShortRepr, MultivariableController):
     permitted: Mapping[str, float]
     limits: Mapping[str, tuple[float, float]] = dataclasses.field(default_factory=dict)
     slack_weight: float = 1e4
-    horizon: int = 20
-    substeps: int = 2
+    horizon: int = within(1, MAX_HORIZON, default=20)
+    substeps: int = within(1, MAX_HORIZON, default=2)
     _programs: list[Programs] = dataclasses.field(init=False, repr=False, default_factory=list)
 
     def __post_init__(self) -> None:
@@ -90,17 +90,7 @@ class NonlinearModelPredictive(ShortRepr, MultivariableController):
         if self.estimator.parameters:
             estimated = ", ".join(self.estimator.parameters)
             raise ParameterError(f"{owner}: the estimator has the parameters {estimated}; give one without parameters.")
-        for name, (low, high) in self.limits.items():
-            if not -np.inf < low < high < np.inf:
-                raise ParameterError(
-                    f"{owner}: the limits of '{name}' are {low:g} and {high:g}; the minimum must be below the maximum, "
-                    "and both finite."
-                )
-        for name, value in (("horizon", self.horizon), ("substeps", self.substeps)):
-            if not 1 <= value <= MAX_HORIZON:
-                raise ParameterError(f"{owner}: {name} is {value}; allowed range: 1 to {MAX_HORIZON}.")
-        if not self.slack_weight > 0.0:
-            raise ParameterError(f"{owner}: slack_weight is {self.slack_weight!r}; it must be positive.")
+        check_limits(owner, self.limits, self.slack_weight)
 
     def __getstate__(self) -> dict[str, Any]:
         """The fields without the programs of the solver, which belong to one process."""

@@ -20,7 +20,7 @@ from ..laws.linear_model_predictive import (
     PredictiveMemory,
     TargetMap,
 )
-from .predictive_program import MAX_HORIZON
+from .predictive_program import MAX_HORIZON, check_limits
 from .riccati import (
     DISTURBANCE,
     check_numbers,
@@ -69,7 +69,8 @@ def design_predictive(
     """
     where, limits, max_rate, bounded = "design_predictive", limits or {}, max_rate or {}, bounded or {}
     states, blocks = model.states, tuple(blocks) or (1,) * horizon
-    _check(measured, disturbed, limits, blocks, slack_weight)
+    check_limits(where, limits, slack_weight)
+    _check(measured, disturbed, blocks)
     names, scale = checked_scale(
         where, model, {"measured": measured, "controlled": controlled, "limits": tuple(limits)}, disturbed, permitted,
         (process_noise, measurement_noise),
@@ -195,29 +196,18 @@ class PredictiveControl(MultivariableController):
         return self.law.step(memory, measurement, dt)
 
 
-def _check(
-    measured: Sequence[str], disturbed: Sequence[str], limits: Mapping[str, tuple[float, float]],
-    blocks: Sequence[int], slack_weight: float,
-) -> None:  # fmt: skip
-    """Raise ParameterError for limits or numbers that make no problem."""
-    for name, (low, high) in limits.items():
-        if not -np.inf < low < high < np.inf:
-            raise ParameterError(
-                f"design_predictive: the limits of '{name}' are {low:g} and {high:g}; the minimum must be below the "
-                "maximum, and both finite."
-            )
+def _check(measured: Sequence[str], disturbed: Sequence[str], blocks: Sequence[int]) -> None:
+    """Raise ParameterError for a number of disturbances, or samples of a horizon, that make no problem."""
     if len(disturbed) != len(measured):
         raise ParameterError(
             f"design_predictive: {len(disturbed)} states are disturbed and {len(measured)} columns measured; there "
             "must be as many, so that no offset remains."
         )
-    if not (1 <= sum(blocks) <= MAX_HORIZON and min(blocks, default=0) >= 1):
+    if not (1 <= sum(blocks) <= MAX_HORIZON and min(blocks) >= 1):
         raise ParameterError(
             f"design_predictive: horizon is {sum(blocks)}; allowed range: 1 to {MAX_HORIZON} samples, and "
             "blocks of one or more."
         )
-    if not slack_weight > 0.0:
-        raise ParameterError(f"design_predictive: slack_weight is {slack_weight!r}; it must be positive.")
 
 
 def _reach(

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core import Array, System
+from ...core import Array, ParameterError, System
 
 MAX_HORIZON = 200
 """Maximum number of samples of a horizon, whose matrices have the square of it, and of steps of a sample (chosen)."""
@@ -16,6 +16,18 @@ TARGET_WEIGHT = 1e8
 """Weight of the set points against that of the inputs in the target, both relative to permitted deviations (chosen)."""
 TOLERANCE = 1e-9
 """Tolerance of the optimality conditions, which are scaled (chosen)."""
+
+
+def check_limits(owner: str, limits: Mapping[str, tuple[float, float]], slack_weight: float) -> None:
+    """Raise ParameterError for limits of columns, or a weight of their violation, that make no program."""
+    for name, (low, high) in limits.items():
+        if not -np.inf < low < high < np.inf:
+            raise ParameterError(
+                f"{owner}: the limits of '{name}' are {low:g} and {high:g}; the minimum must be below the maximum, and "
+                "both finite."
+            )
+    if not slack_weight > 0.0:
+        raise ParameterError(f"{owner}: slack_weight is {slack_weight!r}; it must be positive.")
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

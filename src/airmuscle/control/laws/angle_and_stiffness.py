@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import ClassVar
 
-from ...core import ParameterError, Reference, Value, autodiff, model, ops, parameter, published
+from ...core import ParameterError, Reference, Value, autodiff, model, ops, parameter, published, within
 from ...engine.loop import ControlLaw, Measurement, Memory, Sampled
 from ...physics.mechanism.base import Mechanism
 from ...physics.muscle.characteristic.tondu_lopez2000 import TONDU_LOPEZ_2000
@@ -45,7 +45,7 @@ class AntagonisticInverse:
     min_tension: float = parameter(
         "N", "F_min", "minimum tension of both muscles (default chosen)", bounds=(0.0, 1e4), fitted=False, default=5.0
     )
-    steps: int = 4
+    steps: int = within(1, 20, default=4)
 
     def check(self) -> None:
         coordinates = self.mechanism.coordinates
@@ -54,8 +54,6 @@ class AntagonisticInverse:
                 f"AntagonisticInverse: {len(self.muscles)} muscles and {len(coordinates)} coordinates; it needs two "
                 "muscles and one joint angle."
             )
-        if not 1 <= self.steps <= 20:
-            raise ParameterError(f"AntagonisticInverse: steps is {self.steps}; allowed range: 1 to 20.")
         for muscle in self.muscles:
             check_invertible("AntagonisticInverse", muscle)
 

@@ -3,6 +3,7 @@
 from typing import ClassVar
 
 from ...core import ParameterError, Reference, Value, check_known, model, ops, parameter, select_prefix, with_prefix
+from ...core.annotation import within
 from ...engine.loop import LECUYER1999, STATE, ControlLaw, EnclosingLaw, Measurement, Memory, Sampled, drawn, seeded
 from .pid import ASTROM_HAGGLUND1995
 from .state_feedback import FRANKLIN1998
@@ -24,11 +25,7 @@ class WithSetpointDelay(EnclosingLaw):
     references: ClassVar[tuple[Reference, ...]] = (ASTROM_HAGGLUND1995,)
 
     law: ControlLaw
-    samples: int
-
-    def check(self) -> None:
-        if not 0 <= self.samples <= MAX_SAMPLES:
-            raise ParameterError(f"WithSetpointDelay: samples is {self.samples}; allowed range: 0 to {MAX_SAMPLES}.")
+    samples: int = within(0, MAX_SAMPLES)
 
     @property
     def initial_memory(self) -> dict[str, float]:
@@ -62,11 +59,7 @@ class Multirate(EnclosingLaw):
     references: ClassVar[tuple[Reference, ...]] = (FRANKLIN1998,)
 
     law: ControlLaw
-    every: int
-
-    def check(self) -> None:
-        if not 1 <= self.every <= MAX_SAMPLES:
-            raise ParameterError(f"Multirate: every is {self.every}; allowed range: 1 to {MAX_SAMPLES}.")
+    every: int = within(1, MAX_SAMPLES)
 
     @property
     def initial_memory(self) -> dict[str, float]:

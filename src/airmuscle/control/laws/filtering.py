@@ -18,6 +18,7 @@ from ...core import (
     published,
     select_prefix,
     with_prefix,
+    within,
 )
 from ...engine.loop.control_law import Commanded, ControlLaw, EnclosingLaw, Memory, Sampled, SplitRange, inputs_of
 from ...engine.loop.controller import Measurement, relative_unit
@@ -119,13 +120,11 @@ class SmithPredictor(EnclosingLaw):
     law: ControlLaw
     column: str
     commanded: Commanded
-    samples: int
+    samples: int = within(0, MAX_SAMPLES)
     static_gain: float = parameter("y/u", "K", "change of the column by the command", bounds=(-1e12, 1e12))
     time_constant: float = parameter("s", "T", "time constant of the model", bounds=(1e-6, 1e6))
 
     def check(self) -> None:
-        if not 0 <= self.samples <= MAX_SAMPLES:
-            raise ParameterError(f"SmithPredictor: samples is {self.samples}; allowed range: 0 to {MAX_SAMPLES}.")
         check_measured("SmithPredictor", self.law, self.column)
         if set(inputs_of(self.commanded)) != set(self.law.inputs):
             raise ParameterError(

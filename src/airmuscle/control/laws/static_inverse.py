@@ -5,7 +5,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from ...core import ParameterError, Reference, Value, model, ops, parameter, published
+from ...core import ParameterError, Reference, Value, model, ops, parameter, published, within
 from ...physics.muscle.characteristic.base import ForceLaw
 from ...physics.muscle.geometry.meridian import SAGA_2007
 from ...physics.muscle.muscle import Muscle
@@ -40,11 +40,9 @@ class StaticInverse:
     max_pressure: float = parameter(
         "Pa", "p_max", "maximum gauge pressure of the inverse", bounds=(1.0, 1e7), fitted=False, default=6e5
     )
-    steps: int = 10
+    steps: int = within(1, 40, default=10)
 
     def check(self) -> None:
-        if not 1 <= self.steps <= 40:
-            raise ParameterError(f"StaticInverse: steps is {self.steps}; allowed range: 1 to 40.")
         check_invertible("StaticInverse", self.law)
 
     def force(self, pressure: Value, contraction: Value) -> Value:

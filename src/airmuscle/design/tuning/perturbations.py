@@ -9,7 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...bench.identify.prediction import PlantUncertainty
-from ...core import AirmuscleError, Array, Leaf, ParameterError, abridged, check_field_types, leaves, with_parameters
+from ...core import AirmuscleError, Array, Leaf, ParameterError, check_field_types, leaves, with_parameters
+from ...core.annotation import within
 from ...engine.loop import MAX_DELAY, ColumnSensor, ControlLaw, ControlLoop, WithSensors
 from ...files.library import ParameterUncertainty, located_errors
 from ...files.scenario.plant_uncertainty import SEPARATOR, parameter_uncertainty
@@ -41,15 +42,11 @@ class Perturbations:
 
     loads: tuple[float, ...] = (0.5, 2.0)
     supplies: tuple[float, ...] = (0.8,)
-    leak: float = 0.01
-    delay: int = 1
-    draws: int = 4
+    leak: float = within(0, 1, default=0.01)
+    delay: int = within(0, MAX_DELAY, default=1)
+    draws: int = within(0, 10_000, default=4)
 
     def __post_init__(self) -> None:
-        for name, greatest in (("delay", MAX_DELAY), ("draws", 10_000)):
-            value = getattr(self, name)
-            if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= greatest:
-                raise ParameterError(f"Perturbations: {name} is {abridged(value)}; allowed range: 0 to {greatest}.")
         check_field_types(self)
         for name in ("loads", "supplies"):
             for factor in getattr(self, name):
@@ -57,8 +54,6 @@ class Perturbations:
                     raise ParameterError(
                         f"Perturbations: {name} contains {factor:g}; a factor must be positive, finite and not 1."
                     )
-        if not 0 <= self.leak <= 1:
-            raise ParameterError(f"Perturbations: leak is {self.leak:g}; allowed range: 0 to 1.")
 
 
 class PerturbedFamily(NamedTuple):

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 import numpy as np
 import numpy.typing as npt
 
-from ...core import Array, ColumnError, ParameterError, Reference, ShortRepr, check_field_types, cite, published
+from ...core import Array, ColumnError, ParameterError, Reference, ShortRepr, check_field_types, cite, published, within
 from ...core.errors import check_known
 from ...engine.loop.control_loop import ControlLoop
 from .case import GainRange, LoopCase, loop_with_gains
@@ -53,15 +53,13 @@ class RobustObjective:
     w = 1 and q = 0.9 are chosen, and w_a = w_s = 0. J is infinite if a run of any case fails.
     """
 
-    quantile: float = 0.9
+    quantile: float = within(0, 1, default=0.9)
     quantile_weight: float = 1.0
     air_weight: float = 0.0
     travel_weight: float = 0.0
 
     def __post_init__(self) -> None:
         check_field_types(self)
-        if not 0 <= self.quantile <= 1:
-            raise ParameterError(f"RobustObjective: quantile is {self.quantile}; allowed range: 0 to 1.")
         for name in ("quantile_weight", "air_weight", "travel_weight"):
             if not 0 <= getattr(self, name) < math.inf:
                 raise ParameterError(f"RobustObjective: {name} is {getattr(self, name)}; it must be 0 or positive.")

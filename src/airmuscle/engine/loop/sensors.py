@@ -6,6 +6,7 @@ from typing import ClassVar
 import numpy as np
 
 from ...core import Array, ParameterError, Reference, Value, check_known, ops, published, select_prefix, with_prefix
+from ...core.annotation import within
 from ...core.declaration import Parameter, model, parameter
 from .control_law import ControlLaw, EnclosingLaw, Memory, Sampled
 from .controller import Measurement, SignalRelated
@@ -28,11 +29,7 @@ class ColumnSensor(SignalRelated):
     resolution: float = parameter("y", "q", "resolution; 0: continuous", bounds=(0.0, 1e9), fitted=False, default=0.0)
     noise: float = parameter("y", "sigma", "standard deviation of the noise", bounds=(0.0, 1e9), default=0.0)
     lag: float = parameter("s", "T", "time constant of the lag; 0: none", bounds=(0.0, 1e3), default=0.0)
-    delay: int = 0
-
-    def check(self) -> None:
-        if not 0 <= self.delay <= MAX_DELAY:
-            raise ParameterError(f"ColumnSensor: delay is {self.delay} samples; allowed range: 0 to {MAX_DELAY}.")
+    delay: int = within(0, MAX_DELAY, default=0)
 
     def unit_of(self, declared: Parameter, index: int, units: Mapping[str, str]) -> str:
         """The unit of a parameter: y is that of the column."""

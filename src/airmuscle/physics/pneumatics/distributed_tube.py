@@ -3,10 +3,10 @@
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from ...core import Reference, Value, Values, model, ops, parameter, published
+from ...core import Reference, Value, Values, model, ops, parameter, published, within
 from ...core.system import StateVariable, add_prefix, select_prefix, with_prefix
 from .gas import GAS_CONSTANT, SPECIFIC_HEAT_CONSTANT_PRESSURE, Air, Ambient, Flow, Gas, Isothermal
-from .tube import TubeModel, check_segment_count
+from .tube import MAX_SEGMENTS, TubeModel
 
 BLASIUS1913 = published("blasius-1913")
 TRANSITION_REYNOLDS_NUMBER = (64.0 / 0.3164) ** (4.0 / 3.0)
@@ -36,7 +36,7 @@ class DistributedTube(TubeModel):
 
     length: float = parameter("m", "L", "length of the tube", bounds=(1e-3, 200.0))
     diameter: float = parameter("m", "D", "inner diameter of the tube", bounds=(5e-4, 0.1))
-    segment_count: int = 20
+    segment_count: int = within(1, MAX_SEGMENTS, default=20)
     gas: Gas = Isothermal()
     viscosity: float = parameter(
         "Pa s", "mu", "dynamic viscosity of the air", bounds=(1e-6, 1e-4), fitted=False, default=1.82e-5
@@ -44,9 +44,6 @@ class DistributedTube(TubeModel):
     end_loss: float = parameter(
         "1", "zeta", "loss coefficient of both ends, in dynamic heads", bounds=(0.0, 10.0), default=1.5
     )
-
-    def check(self) -> None:
-        check_segment_count("DistributedTube", self.segment_count)
 
     @property
     def area(self) -> Value:

@@ -4,11 +4,14 @@ import abc
 from collections.abc import Mapping
 from typing import Any, ClassVar
 
-from ...core import ParameterError, Reference, Value, Values, model, ops, parameter, published, unflatten
+from ...core import Reference, Value, Values, model, ops, parameter, published, unflatten, within
 from ...core.system import StateVariable, add_prefix, select_prefix, with_prefix
 from .circuit import Circuit, CircuitFlows, CircuitWrapper, port_prefix
 from .gas import Air, Ambient, Flow, Gas, Isothermal, gauge_pressure
 from .valve import Orifice, Valve, orifice_flow
+
+MAX_SEGMENTS = 200
+"""Maximum number of segments of a tube (chosen)."""
 
 
 class TubeModel(abc.ABC):
@@ -94,16 +97,13 @@ class Tube(TubeModel):
 
     orifice: Orifice
     volume: float = parameter("m3", "V_t", "volume of the tube", bounds=(1e-9, 1e-2))
-    segment_count: int = 1
+    segment_count: int = within(1, MAX_SEGMENTS, default=1)
     gas: Gas = Isothermal()
 
     @classmethod
     def from_dimensions(cls, length: float, diameter: float, segment_count: int = 1, gas: Gas = Isothermal()) -> "Tube":
         """Tube of a length and an inner diameter [m], with the flow of a `TubeOrifice`."""
         return cls(TubeOrifice(length, diameter), ops.pi / 4.0 * diameter**2 * length, segment_count, gas)
-
-    def check(self) -> None:
-        check_segment_count("Tube", self.segment_count)
 
     def states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
         segment = self.gas.states(self.volume / self.segment_count, ambient)
@@ -127,12 +127,6 @@ class Tube(TubeModel):
             rates |= with_prefix(prefix, segment)
             flow = outflow
         return rates, flow
-
-
-def check_segment_count(owner: str, segment_count: int) -> None:
-    """Raise ParameterError unless the number of segments of a tube is an integer from 1 to 200."""
-    if isinstance(segment_count, bool) or not (isinstance(segment_count, int) and 1 <= segment_count <= 200):
-        raise ParameterError(f"{owner}: segment_count is {segment_count!r}; give an integer from 1 to 200.")
 
 
 @model
