@@ -28,8 +28,10 @@ from airmuscle.physics import (
     PolynomialProfile,
     SerialArm,
     SpatialLink,
+    StickSlip,
     Supply,
     Valve,
+    WithStickSlip,
     find_equilibrium,
 )
 
@@ -48,7 +50,7 @@ PLANAR = PlanarArm(
 )
 SERIAL = SerialArm(
     (
-        SpatialLink((0, 0, 1), (0.0, 0.0, 0.4), 1.0, (0.02, 0.0, 0.1), 0.01, 0.0, 0.3),
+        SpatialLink((0, 0, 1), (0.0, 0.0, 0.4), 1.0, (0.02, 0.0, 0.1), 0.01, 0.02, 0.3),
         SpatialLink((0, -1, 0), (0.05, 0.0, 0.2), 0.7, (0.1, 0.03, 0.0), 0.004, 0.0, 0.2, 0.3),
     ),
     ROUTES,
@@ -160,18 +162,31 @@ def test_urdf_states_links_joints_and_the_muscles_in_a_comment(tmp_path):
     assert "about joint1.angle, 0.025 m about joint2.angle" in " ".join(text.split())
 
 
+@pytest.mark.parametrize("writer", [write_mjcf, write_urdf])
+def test_of_stick_slip_the_constant_friction_is_written_and_the_rest_is_named(writer, tmp_path, unbuilt):
+    elements = (StickSlip(0.4, static_excess=0.5), StickSlip(0.7, (1e-3,) * 4, bearing_arms=(0.02,)))
+    written = writer(plant_of(WithStickSlip(SERIAL, elements)), tmp_path, name="sticking")
+    root = ET.parse(written.path).getroot()
+    if writer is write_mjcf:
+        frictions = [each.get("frictionloss") for each in root.find("worldbody").iter("joint")]
+    else:
+        frictions = [each.get("friction") for each in root.iter("dynamics")]
+    assert list(map(float, frictions)) == [0.4, 0.7]
+    assert [text.split()[-1] for text in written.left_out] == ["muscles", "bearing", "sliding"]
+    assert all(f"left out: {text}" in written.path.read_text(encoding="utf-8") for text in written.left_out)
+
+
+def test_urdf_names_a_rotor_inertia_beyond_the_first_joint(tmp_path):
+    links = (SERIAL.links[0], dataclasses.replace(SERIAL.links[1], rotor_inertia=0.1))
+    written = write_urdf(plant_of(dataclasses.replace(SERIAL, links=links)), tmp_path)
+    assert written.left_out == ("the rotor inertia of joint2.angle, 0.1 kg m2",)
+
+
 @pytest.mark.parametrize(
     ("mechanism", "writer", "message"),
     [
         (HangingMass(1.0), write_urdf, "HangingMass has no robot description"),
         (dataclasses.replace(JOINT, profile=PolynomialProfile((0.1,))), write_urdf, "is not circular"),
-        (
-            dataclasses.replace(
-                SERIAL, links=(dataclasses.replace(SERIAL.links[0], rotor_inertia=0.1), SERIAL.links[1])
-            ),
-            write_urdf,
-            "URDF cannot state a rotor inertia, 0.1 kg m2",
-        ),
     ],
 )
 def test_what_a_description_cannot_state_is_refused(mechanism, writer, message, tmp_path):

@@ -67,12 +67,14 @@ def export_robot(source: str, out: Path, name: str, to: str, json: bool) -> None
     plugins = [str(path) for each in written.plugins for path in (each.source, each.library) if path is not None]
     remarks = list(dict.fromkeys(each.remark for each in written.plugins if each.remark))
     if json:
-        print_json({"files": [str(written.path), *plugins], "remarks": remarks})
+        print_json({"files": [str(written.path), *plugins], "remarks": remarks, "left_out": list(written.left_out)})
         return
     for file in (written.path, *plugins):
         echo(f"file: {file}")
     for remark in remarks:
         echo(f"plugins, source only: {remark}")
+    if written.left_out:
+        echo(f"left out: {', '.join(written.left_out)}")
 
 
 def export_actuator(source: str, out: Path, name: str, muscle: str, stack: Stack, json: bool) -> None:

@@ -9,7 +9,7 @@ from typing import Any
 from xml.etree import ElementTree as ET
 
 from ...core import STANDARD_GRAVITY, ParameterError, atomic_folder
-from ...physics.mechanism import AntagonisticJoint, Mechanism, MuscleRoute, PlanarArm, SerialArm
+from ...physics.mechanism import AntagonisticJoint, Mechanism, MuscleRoute, PlanarArm, SerialArm, WithStickSlip
 from ...physics.mechanism.antagonistic_joint import ConstantRadius
 from ...physics.plant import Plant, open_plant
 from .identifiers import provenance
@@ -33,6 +33,7 @@ class RigidLink:
     armature      moment of inertia that turns with the joint alone [kg m2]
     damping       of the joint [N m s/rad]
     zero_angle    joint angle [rad] at which the frame has the direction of the frame before
+    friction      dry friction of the joint [N m]
     """
 
     joint: str
@@ -44,15 +45,17 @@ class RigidLink:
     armature: float = 0.0
     damping: float = 0.0
     zero_angle: float = 0.0
+    friction: float = 0.0
 
 
 @dataclasses.dataclass(frozen=True)
 class RobotModel:
-    """Links in series, the routes of the muscles over their joints, and the acceleration of gravity [m/s2]."""
+    """Links in series, routes of the muscles, acceleration of gravity [m/s2]; what else there is in the mechanism."""
 
     links: Sequence[RigidLink]
     routes: Sequence[MuscleRoute]
     gravity: float
+    left_out: tuple[str, ...] = ()
 
 
 def robot_model(mechanism: Mechanism) -> RobotModel:
@@ -70,8 +73,8 @@ def robot_model(mechanism: Mechanism) -> RobotModel:
 @functools.singledispatch
 def _robot_model(mechanism: Mechanism) -> RobotModel:
     raise ParameterError(
-        f"{type(mechanism).__name__} has no robot description; AntagonisticJoint, PlanarArm and SerialArm have one. "
-        "Export the plant with --to fmu, or one of its muscles with --to mujoco."
+        f"{type(mechanism).__name__} has no robot description; AntagonisticJoint, PlanarArm and SerialArm have one, "
+        "also in WithStickSlip. Export the plant with --to fmu, or one of its muscles with --to mujoco."
     )
 
 
@@ -119,6 +122,20 @@ def _spatial_model(mechanism: SerialArm) -> RobotModel:
     return RobotModel(links, mechanism.routes, mechanism.gravity)
 
 
+@_robot_model.register
+def _stick_slip_model(mechanism: WithStickSlip) -> RobotModel:
+    inner, elements = _robot_model(mechanism.inner), mechanism.elements
+    pairs = zip(inner.links, elements, strict=True)
+    links = [dataclasses.replace(link, friction=element.coulomb_torque) for link, element in pairs]
+    shares = {
+        "the friction by the tensions of the muscles": any(any(each.load_arms) for each in elements),
+        "the friction by the load of a bearing": any(any(each.bearing_arms) for each in elements),
+        "stiction above the friction in sliding": any(each.static_excess for each in elements),
+        "the residual law": mechanism.residual is not None,
+    }
+    return dataclasses.replace(inner, links=links, left_out=tuple(text for text, has in shares.items() if has))
+
+
 def _vector(values: Sequence[float]) -> Vector:
     x, y, z = values
     return float(x), float(y), float(z)
@@ -126,10 +143,14 @@ def _vector(values: Sequence[float]) -> Vector:
 
 @dataclasses.dataclass(frozen=True)
 class WrittenRobot:
-    """The path of a robot description; of MJCF also the plugins of its muscles, which MuJoCo loads before the file."""
+    """The path of a robot description; of MJCF also the plugins of its muscles, which MuJoCo loads before the file.
+
+    left_out  what the mechanism has and the description cannot state, in words
+    """
 
     path: Path
     plugins: tuple[MuscleActuator, ...] = ()
+    left_out: tuple[str, ...] = ()
 
 
 def write_mjcf(plant: Plant, folder: str | Path, *, name: str = "robot") -> WrittenRobot:
@@ -137,8 +158,9 @@ def write_mjcf(plant: Plant, folder: str | Path, *, name: str = "robot") -> Writ
 
     Each muscle is a tendon with a plugin actuator that contains its valves, gas and friction (`write_mujoco_plugin`).
     The qpos of the joints are the angles of the plant; the keyframe `ambient` has zero angles and muscles at ambient
-    pressure. Raises ParameterError for a plant whose mechanism is no joint or
-    arm, whose pulleys are not circular, or whose muscles share a circuit, and FileError.
+    pressure. Of the friction of `WithStickSlip` the joints have the constant share; what else it has is stated as left
+    out, in the file too. Raises ParameterError for a plant whose mechanism is no joint or arm, whose pulleys are not
+    circular, or whose muscles share a circuit, and FileError.
     """
     program = checked_name(name) or program_name(name)
     robot = robot_model(plant.mechanism)
@@ -147,7 +169,7 @@ def write_mjcf(plant: Plant, folder: str | Path, *, name: str = "robot") -> Writ
         for muscle in plant.muscles
     ]
     root = ET.Element("mujoco", model=program)
-    root.append(ET.Comment(_comment(f"Robot {program} for MuJoCo", plant)))
+    root.append(ET.Comment(_comment(f"Robot {program} for MuJoCo", plant, _named(robot))))
     ET.SubElement(root, "compiler", angle="radian", autolimits="true")
     ET.SubElement(root, "option", gravity=f"0 0 {-robot.gravity!r}")
     extension = ET.SubElement(root, "extension")
@@ -172,14 +194,14 @@ def write_mjcf(plant: Plant, folder: str | Path, *, name: str = "robot") -> Writ
         states += [*open_plant(plugin.plant, (rest,)).state_at(pressure=0.0).values(), 0.0]
     keyframe = ET.SubElement(root, "keyframe")
     ET.SubElement(keyframe, "key", name="ambient", qpos=_numbers((0.0,) * len(robot.links)), act=_numbers(states))
-    return WrittenRobot(_written(root, folder, f"{program}.xml"), tuple(made))
+    return WrittenRobot(_written(root, folder, f"{program}.xml"), tuple(made), robot.left_out)
 
 
 def _mjcf_body(parent: ET.Element, link: RigidLink, name: str) -> ET.Element:
     body = ET.SubElement(parent, "body", name=name, pos=_numbers(link.position))
     ET.SubElement(
         body, "joint", name=link.joint, type="hinge", axis=_numbers(link.axis), ref=repr(link.zero_angle),
-        damping=repr(link.damping), armature=repr(link.armature),
+        damping=repr(link.damping), armature=repr(link.armature), frictionloss=repr(link.friction),
     )  # fmt: skip
     ET.SubElement(
         body, "inertial", pos=_numbers(link.centre), mass=repr(max(link.mass, LEAST)),
@@ -198,11 +220,13 @@ def write_urdf(plant: Plant, folder: str | Path, *, name: str = "robot") -> Writ
 
     URDF has neither tendons nor pneumatics: the muscles are stated in a comment, with their joints, moment arms and
     lengths; their torques come from an exported program of the plant. The joints are continuous, because the limits of
-    the angles in the plant are no end stops. Raises ParameterError as `write_mjcf`, and for a joint with a rotor
-    inertia, which URDF cannot state.
+    the angles in the plant are no end stops. Rotor inertias beyond the first joint, which URDF cannot state, and what
+    `write_mjcf` leaves out are named. Raises ParameterError as `write_mjcf`.
     """
     program = checked_name(name) or program_name(name)
     robot = robot_model(plant.mechanism)
+    rotors = [f"the rotor inertia of {n.joint}, {n.armature:.3g} kg m2" for n in robot.links[1:] if n.armature]
+    robot = dataclasses.replace(robot, left_out=(*robot.left_out, *rotors))
     root = ET.Element("robot", name=program)
     lines = [
         f"muscle {muscle.name}: resting length {muscle.geometry.resting_length!r} m, contraction {route.offset!r} at "
@@ -213,26 +237,26 @@ def write_urdf(plant: Plant, folder: str | Path, *, name: str = "robot") -> Writ
         )
         for muscle, route in zip(plant.muscles, robot.routes, strict=True)
     ]
-    root.append(ET.Comment(_comment(f"Robot {program}", plant, lines)))
+    root.append(ET.Comment(_comment(f"Robot {program}", plant, lines + _named(robot))))
     ET.SubElement(root, "link", name="base")
     parent = "base"
     for number, link in enumerate(robot.links, start=1):
         _urdf_link(root, parent, link, f"link{number}")
         parent = f"link{number}"
-    return WrittenRobot(_written(root, folder, f"{program}.urdf"))
+    return WrittenRobot(_written(root, folder, f"{program}.urdf"), (), robot.left_out)
+
+
+def _named(robot: RobotModel) -> list[str]:
+    return [f"left out: {text}" for text in robot.left_out]
 
 
 def _urdf_link(root: ET.Element, parent: str, link: RigidLink, name: str) -> None:
-    if link.armature:
-        raise ParameterError(
-            f"{link.joint}: URDF cannot state a rotor inertia, {link.armature:g} kg m2. Use --to mjcf, or set "
-            "rotor_inertia to 0."
-        )
     body = ET.SubElement(root, "link", name=name)
     inertial = ET.SubElement(body, "inertial")
     ET.SubElement(inertial, "origin", xyz=_numbers(link.centre))
     ET.SubElement(inertial, "mass", value=repr(max(link.mass, LEAST)))
-    moment = repr(max(link.inertia, LEAST))
+    turning = link.armature if parent == "base" else 0.0  # the first link turns about its axis alone
+    moment = repr(max(link.inertia + turning, LEAST))
     ET.SubElement(inertial, "inertia", ixx=moment, iyy=moment, izz=moment, ixy="0", ixz="0", iyz="0")
     joint = ET.SubElement(root, "joint", name=link.joint, type="continuous")
     rotation = [-link.zero_angle * component for component in link.axis]  # about one axis of the frame
@@ -240,7 +264,7 @@ def _urdf_link(root: ET.Element, parent: str, link: RigidLink, name: str) -> Non
     ET.SubElement(joint, "parent", link=parent)
     ET.SubElement(joint, "child", link=name)
     ET.SubElement(joint, "axis", xyz=_numbers(link.axis))
-    ET.SubElement(joint, "dynamics", damping=repr(link.damping))
+    ET.SubElement(joint, "dynamics", damping=repr(link.damping), friction=repr(link.friction))
 
 
 def _numbers(values: Sequence[float]) -> str:
