@@ -393,10 +393,20 @@ def test_exchanged_muscles_are_named():
 
 def test_saturated_readings_and_counts_are_remarked():
     (saturated,) = inspect_episodes(changed(JOINT, pressure=lambda p: np.minimum(p, [2e5, 1e9]))).remarks
-    assert "pressure 1 is 2e+05 Pa in" in saturated
+    assert "pressure 1 is 2e+05 Pa in 752 of 1900 rows (40 %)" in saturated
     assert "its reading saturates there" in saturated
     (counts,) = inspect_episodes(changed(JOINT, pressure=lambda p: np.round(p / 10.0))).remarks
     assert "they are whole numbers, as counts" in counts
+
+
+def test_a_sample_time_that_nothing_confirms_is_remarked(tmp_path, mapping):
+    write_npz(tmp_path, JOINT.runs[0], 0)
+    stated = COLUMNS.replace('time = "t"', 'sample_time = "10 ms"')
+    with_times = read_episodes(tmp_path / "0.npz", mapping(stated))
+    assert not inspect_episodes(with_times).remarks
+    np.savez(tmp_path / "0.npz", **{n: c for n, c in by_columns(JOINT.runs[0]).items() if n != "t"})
+    (remark,) = inspect_episodes(read_episodes(tmp_path / "0.npz", mapping(stated))).remarks
+    assert remark.startswith("the sample time of 10 ms cannot be checked, because the record has neither times nor")
 
 
 def test_episodes_shorter_than_a_window_are_refused():

@@ -104,6 +104,7 @@ class Descent:
         )
         errors = joint_errors(arm, self.joint, some)
         errors = np.where(np.isfinite(errors), np.clip(np.abs(errors), 0.0, OUTLIER), OUTLIER)
+        errors = errors[some.counts[:, HISTORY + 1 :]]
         return float(np.mean(2 * CLIP**2 * (np.sqrt(1 + (errors / CLIP) ** 2) - 1)))
 
     def _equations(self, batch: Windows) -> tuple[Array, Array]:
@@ -165,6 +166,7 @@ def gradients(arm: PressureDriven, joint: int, paths: Sequence[str], windows: Wi
     error = run[angle][:, 1:] - windows.angle[:, HISTORY + 1 :, joint]
     gradient = np.stack([run[name][:, 1:] for name in keep[1:]], axis=-1)
     lost = ~np.isfinite(error) | (np.abs(error) > OUTLIER) | ~np.isfinite(gradient).all(axis=-1)
+    lost |= np.logical_not(windows.counts[:, HISTORY + 1 :])
     return np.where(lost, 0.0, error), np.where(lost[..., None], 0.0, gradient)
 
 

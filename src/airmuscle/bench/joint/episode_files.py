@@ -183,7 +183,8 @@ def _episodes_of(path: Path, mapping: EpisodeMapping) -> Episodes:
         whole, step = _episode(name, arrays, mapping)
         times.append(step)
         runs += _split(whole, arrays, mapping, step)
-    return Episodes(tuple(runs), float(np.median(times)), notes)
+    known = mapping.speeds is not None or mapping.time is not None or all(_times(arrays) for arrays in tables)
+    return Episodes(tuple(runs), float(np.median(times)), notes, known)
 
 
 def _split(whole: Episode, arrays: Arrays, mapping: EpisodeMapping, step: float) -> list[Episode]:
@@ -231,9 +232,13 @@ def _episode(name: str, arrays: Arrays, mapping: EpisodeMapping) -> tuple[Episod
     return Episode(angle, speed, pressure, command, name), step
 
 
+def _times(arrays: Arrays) -> list[str]:
+    return [each for each in arrays if each.lower() in TIMES and arrays[each].size > 1]
+
+
 def _check_times(name: str, arrays: Arrays, step: float) -> None:
     """Raise ColumnError for a column of times that contradicts a sample time [s], in whatever unit it is."""
-    for column in (each for each in arrays if each.lower() in TIMES and arrays[each].size > 1):
+    for column in _times(arrays):
         ratio = float(np.median(np.diff(arrays[column].ravel()))) / step
         if ratio > 0.0 and abs(np.log10(ratio) / 3 - round(np.log10(ratio) / 3)) > SAME_TIME:
             raise ColumnError(

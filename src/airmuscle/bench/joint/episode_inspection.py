@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...core import Array, IdentificationError
-from .episodes import Episode, Episodes, speed_of
+from .episodes import HISTORY, Episode, Episodes, Windows, speed_of
 
 MAX_DELAY = 8
 """Greatest delay of the pressure sensors that is looked for [rows] (chosen)."""
@@ -23,6 +23,8 @@ SPEED_RATIO = 1.15
 """Ratio of the slope of the angles to the speeds, or of its inverse, that a wrong sample time explains (chosen)."""
 SATURATED = 0.02
 """Share of rows exactly at an end of the range of a reading that counts as saturation (chosen)."""
+SETTLED, LEAST = 3, 0.2
+"""Rows after which a wrong reading is forgotten before the start of a window; least share of rows of a fit (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -83,7 +85,8 @@ class EpisodeInspection:
         total, rows = sum(lengths) * e.sample_time, " to ".join(dict.fromkeys(map(str, (min(lengths), max(lengths)))))
         lines = [
             f"{len(e)} episodes of {rows} rows at {1 / e.sample_time:.4g} Hz, {total:.4g} s; "
-            f"{e.joints} joint{'s' * (e.joints > 1)}, {e.muscles} pressures that lag the motion by {self.delay} rows",
+            f"{e.joints} joint{'s' * (e.joints > 1)}, {e.muscles} pressures that lag the motion by {self.delay} rows "
+            f"({1e3 * self.delay * e.sample_time:.3g} ms)",
             *e.notes,
             *(_range_line(f"angle {i}", np.degrees(x), "deg") for i, x in enumerate(e.rows("angle").T, 1)),
             *(_range_line(f"pressure {i}", x / 1e3, "kPa") for i, x in enumerate(e.rows("pressure").T, 1)),
@@ -99,7 +102,8 @@ def inspect_episodes(episodes: Episodes, pairs: Sequence[tuple[int, int]] = ()) 
     errors = [*_units(episodes), *_jumps(episodes), *_constant(episodes)] or _sample_time(episodes)
     delay, actions = (0, ()) if errors else _actions(episodes)
     errors += _exchanged(actions, pairs)
-    return EpisodeInspection(episodes, delay, actions, tuple(errors), tuple(_saturated(episodes) + _scale(episodes)))
+    remarks = [*(text for *_, text in _saturated(episodes)), *_scale(episodes), *_unconfirmed(episodes)]
+    return EpisodeInspection(episodes, delay, actions, tuple(errors), tuple(remarks))
 
 
 def check_episodes(inspection: EpisodeInspection) -> None:
@@ -165,6 +169,15 @@ def _sample_time(episodes: Episodes) -> list[str]:
     ]
 
 
+def _unconfirmed(episodes: Episodes) -> list[str]:
+    if episodes.confirmed:
+        return []
+    return [
+        f"the sample time of {1e3 * episodes.sample_time:.4g} ms cannot be checked, because the record has neither "
+        "times nor speeds: with another one other inertias, dampings and lags explain the same rows"
+    ]
+
+
 def _actions(episodes: Episodes) -> tuple[int, tuple[PressureAction, ...]]:
     """Delay of the pressures, and what each acts on: regression of accelerations on pressures, angles and speeds."""
     blocks = [b for b in map(functools.partial(_block, step=episodes.sample_time), episodes.runs) if b is not None]
@@ -225,17 +238,38 @@ def _exchanged(actions: Sequence[PressureAction], pairs: Sequence[tuple[int, int
     return found
 
 
-def _saturated(episodes: Episodes) -> list[str]:
-    found = []
-    for i, values in enumerate(episodes.rows("pressure").T, start=1):
-        for edge, cause in ((values.min(), "the muscle is empty"), (values.max(), "it has the pressure of its supply")):
-            share = float(np.mean(values == edge))
-            if share > SATURATED and np.ptp(values) > 0.0:
-                found.append(
-                    f"pressure {i} is {edge:.4g} Pa in {100 * share:.0f} % of the rows: its reading saturates there, "
-                    f"or {cause}"
+def _saturated(episodes: Episodes) -> list[tuple[int, float, str]]:
+    """Muscle, from 0, end of its readings at which they saturate, and a remark on it."""
+    found, pressure = [], episodes.rows("pressure")
+    causes = ("the muscle is empty", "it has the pressure of its supply")
+    for i, values in enumerate(pressure.T):
+        for edge, cause in zip((values.min(), values.max()), causes, strict=True):
+            count = int(np.sum(values == edge))
+            if count > SATURATED * len(values) and np.ptp(values) > 0.0:
+                text = (
+                    f"pressure {i + 1} is {edge:.4g} Pa in {count} of {len(values)} rows "
+                    f"({100 * count / len(values):.0f} %): its reading saturates there, or {cause}"
                 )
+                found.append((i, float(edge), text))
     return found
+
+
+def without_saturated(windows: Windows, episodes: Episodes) -> tuple[Windows, list[str]]:
+    """The windows of a fit, in which rows after a reading at an upper end at which it saturates do not count, and a
+    remark on these; all rows count where less than LEAST would be left."""
+    top = np.full(episodes.muscles, np.inf)
+    for muscle, edge, _ in _saturated(episodes):
+        if edge == episodes.rows("pressure")[:, muscle].max():
+            top[muscle] = edge
+    ends = np.any(windows.pressure[:, HISTORY - SETTLED :] >= top, axis=-1)
+    hit = np.cumsum(ends, axis=1)[:, SETTLED:] > 0
+    few = hit[:, 1:].mean() <= 1.0 - LEAST
+    text = (
+        f"{hit[:, 1:].sum()} of {hit[:, 1:].size} rows of the fit follow a pressure reading at its upper end, whose "
+        f"true value is unknown: they {'do not count' if few else 'are too many to leave out'}"
+    )
+    counts = np.concatenate([windows.counts[:, :HISTORY], ~hit], axis=1)
+    return dataclasses.replace(windows, counts=counts) if few else windows, [text] if hit.any() else []
 
 
 def _scale(episodes: Episodes) -> list[str]:

@@ -31,7 +31,8 @@ class Episode(ShortRepr):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Episodes:
-    """Episodes of one arm with a common sample time [s]; `notes` state what the reader has found or corrected.
+    """Episodes of one arm with a common sample time [s]; `notes` state what the reader has found or corrected,
+    `confirmed` whether times or speeds of the record confirm the sample time.
 
     A slice of it is again an Episodes: `episodes[:2400]`.
     """
@@ -39,6 +40,7 @@ class Episodes:
     runs: tuple[Episode, ...]
     sample_time: float
     notes: tuple[str, ...] = ()
+    confirmed: bool = True
 
     def __post_init__(self) -> None:
         if not self.runs or not self.sample_time > 0.0:
@@ -107,7 +109,8 @@ def join(parts: Sequence[Episodes]) -> Episodes:
     if len(times) > 1:
         raise ParameterError(f"Episodes: files have different sample times [s], {sorted(times)}; fit each alone.")
     notes = tuple(dict.fromkeys(note for each in parts for note in each.notes))
-    return Episodes(tuple(run for each in parts for run in each.runs), parts[0].sample_time, notes)
+    runs, confirmed = tuple(run for each in parts for run in each.runs), all(each.confirmed for each in parts)
+    return Episodes(runs, parts[0].sample_time, notes, confirmed)
 
 
 def in_pairs(episodes: Episodes, pairs: Sequence[tuple[int, int]]) -> Episodes:
@@ -137,7 +140,7 @@ class Windows:
     """N windows of HISTORY + 1 + `rows` rows; row HISTORY is the start.
 
     angle, speed, rate (N, R, J), pressure (N, R, M); `speed` as measured, `rate` from the angles; `episode` and
-    `first` (N,): number of the episode and its row at the start.
+    `first` (N,): number of the episode and its row at the start; `counts` (N, R): whether a row counts in a fit.
     """
 
     angle: Array
@@ -147,6 +150,7 @@ class Windows:
     episode: Array
     first: Array
     sample_time: float
+    counts: Array
 
     def __len__(self) -> int:
         return len(self.angle)
@@ -167,7 +171,7 @@ class Windows:
     def part(self, which: Sequence[int] | Array, rows: int | None = None) -> "Windows":
         """Some of the windows, with the first `rows` rows of their predictions."""
         end = None if rows is None else HISTORY + 1 + rows
-        columns = {n: getattr(self, n)[which][:, :end] for n in ("angle", "speed", "rate", "pressure")}
+        columns = {n: getattr(self, n)[which][:, :end] for n in ("angle", "speed", "rate", "pressure", "counts")}
         return dataclasses.replace(self, **columns, episode=self.episode[which], first=self.first[which])
 
 
@@ -211,8 +215,10 @@ def cut(episodes: Episodes, delay: int = 0, rows: int = ROWS, stride: int = ROWS
         "rate": np.array([piece(rates[n], k) for n, k in found]),
         "pressure": np.array([episodes.runs[n].pressure[k + later] for n, k in found]),
     }
-    numbers = np.array(found)
-    return Windows(**stacked, episode=numbers[:, 0], first=numbers[:, 1], sample_time=episodes.sample_time)
+    numbers, counts = np.array(found), np.ones((len(found), HISTORY + 1 + rows), dtype=bool)
+    return Windows(
+        **stacked, episode=numbers[:, 0], first=numbers[:, 1], sample_time=episodes.sample_time, counts=counts
+    )
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

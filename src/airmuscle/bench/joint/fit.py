@@ -10,7 +10,7 @@ from ...core import Array, ParameterError, tree
 from ...physics import Braid, Muscle, MuscleRoute, PressureDriven, SerialArm, SpatialLink, StickSlip, WithStickSlip
 from ...physics.muscle.characteristic.linear_in_pressure import LinearInPressure
 from .descent import CLIP, Descent, SearchStage, gradients, typical_size
-from .episode_inspection import EpisodeInspection, check_episodes, inspect_episodes
+from .episode_inspection import EpisodeInspection, check_episodes, inspect_episodes, without_saturated
 from .episodes import HISTORY, ROWS, Episodes, Windows, band, count_fitted, cut, in_pairs, long_enough, rms
 from .free_run import baseline_errors, fit_regulator_lags, free_run, from_commands, judged_residual
 from .result import ArmFit, ArmParameter
@@ -57,10 +57,11 @@ def fit_joint(
     progress(f"delay of the pressures: {inspection.delay} rows")
     ordered = in_pairs(episodes, found)
     fitted, left, delay = ordered[:split], ordered[split:], inspection.delay
-    train, judge = cut(fitted, delay, rows), cut(left, delay, rows)
+    judge, (train, clipped) = cut(left, delay, rows), without_saturated(cut(fitted, delay, rows), ordered)
     arm, paths = _search(fitted, train, tuple(axes), seed, progress)
     separated = [separate(arm, joint, own, train) for joint, own in paths.items()]
-    gain, remarks = None, [*short, *inspection.remarks, SCALE, *(text for _, texts, _ in separated for text in texts)]
+    gain, apart = None, [text for _, texts, _ in separated for text in texts]
+    remarks = [*short, *inspection.remarks, *clipped, SCALE, *apart]
     if residual:
         arm, gain, words = judged_residual(arm, fitted, judge, delay, seed, progress)
         remarks.append(words)

@@ -13,6 +13,7 @@ from ...physics import GaussianResidual, PressureDriven, WithStickSlip
 from .. import baselines
 from ..baselines import ARX, DEPTH, PERSISTENCE
 from .descent import SUBSTEPS, Descent, SearchStage
+from .episode_inspection import without_saturated
 from .episodes import HISTORY, ROWS, Episodes, Windows, WindowSignal, cut, rms, start_of
 
 
@@ -118,7 +119,8 @@ def fit_residual(
     smallest error of the joint on the episodes held back is taken. A residual without any joint is zero.
     """
     split = max(1, round((1.0 - HELD_BACK) * len(episodes)))
-    train, held = cut(episodes[:split], delay, rows, stride=max(1, rows // 2)), cut(episodes[split:], delay, rows)
+    every, held = cut(episodes[:split], delay, rows, stride=max(1, rows // 2)), cut(episodes[split:], delay, rows)
+    train, _ = without_saturated(every, episodes)
     residual, accepted = _gaussian_residual(arm, episodes[:split], centres, seed), list[int]()
     hybrid_mechanism = dataclasses.replace(cast(WithStickSlip, arm.mechanism), residual=residual)
     found = dataclasses.replace(arm, mechanism=hybrid_mechanism)

@@ -9,7 +9,7 @@ from ...core import Array, ParameterError, StateVariable, System, Value, Values,
 from ...engine import WithSensitivities, sensitivity
 from ...physics import PressureDriven
 from .descent import CLIP, OUTLIER, over, with_values
-from .episode_inspection import check_episodes, inspect_episodes
+from .episode_inspection import check_episodes, inspect_episodes, without_saturated
 from .episodes import HISTORY, ROWS, Episodes, Windows, WindowSignal, band, count_fitted, cut, lagged, long_enough
 from .fit import not_separated, separated
 from .free_run import baseline_errors
@@ -91,7 +91,8 @@ def fit_known_joint(
     system = ReadPressures(arm, (1.0,) * count, (0.0,) * count)
     paths = _paths(system, free)
     progress(f"{len(paths)} parameters; delay of the pressures: {inspection.delay} rows")
-    train, judge = cut(episodes[:split], inspection.delay, rows), cut(episodes[split:], inspection.delay, rows)
+    judge, whole = (cut(part, inspection.delay, rows) for part in (episodes[split:], episodes[:split]))
+    train, clipped = without_saturated(whole, episodes)
     search = KnownSearch(system, paths, train.part(range(0, len(train), -(-len(train) // SAMPLE))))
     system = search.run()
     errors = np.nan_to_num(_run(system, (), judge)[0], nan=OUTLIER)
@@ -101,7 +102,7 @@ def fit_known_joint(
     return ArmFit(
         system.arm, inspection, own, errors, judge.episode,
         baseline_errors(episodes[:split], episodes[split:], rows), band(errors), tuple(estimates[i] for i in of_arm),
-        (*short, *inspection.remarks, *remarks), split, covariance=covariance[np.ix_(of_arm, of_arm)],
+        (*short, *inspection.remarks, *clipped, *remarks), split, covariance=covariance[np.ix_(of_arm, of_arm)],
     )  # fmt: skip
 
 
@@ -152,7 +153,9 @@ def _run(system: ReadPressures, paths: Sequence[str], windows: Windows) -> tuple
         state |= {sensitivity(s, k): np.zeros(count) for s in list(state) for k in range(len(paths))}
         run = over(windows, observed, signals, state, [*names, *(each for row in columns for each in row)])
         moved = np.stack([np.stack([run[n][:, 1:] for n in row], axis=-1) for row in columns], axis=2)
-    return np.stack([run[name][:, 1:] for name in names], axis=-1) - windows.angle[:, HISTORY + 1 :], moved
+    error = np.stack([run[name][:, 1:] for name in names], axis=-1) - windows.angle[:, HISTORY + 1 :]
+    counts = windows.counts[:, HISTORY + 1 :, None]
+    return np.where(counts, error, 0.0), np.where(counts[..., None], moved, 0.0)
 
 
 class KnownSearch:
