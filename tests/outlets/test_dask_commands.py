@@ -22,8 +22,8 @@ COMMANDS = {
     "benchmark": ("benchmark", "--controller", "PID", "--task", "step", "--budget", 112, "--truths", 1, "--runs", 2),
     "campaign": ("campaign", "map.csv", "loop.csv", "--resting-length", "300 mm"),
 }
-FEW = ("compare", "study")
-"""The commands that run by default: tasks of a fit and of runs of a plant."""
+FEW = ("compare",)
+"""The command that runs by default; a plant that is sent to a cluster is a test of the studies."""
 
 
 @pytest.fixture(scope="module")

@@ -54,7 +54,7 @@ class PleatedTube(FibreTube):
     @property
     def free_contraction(self) -> float:
         """Contraction [1] of maximum volume, where the tension is zero."""
-        return float(_contraction(np.asarray(0.5), self._slenderness))
+        return _contraction_of_tube(0.5, self._slenderness)
 
     @property
     def _slenderness(self) -> float:
@@ -165,12 +165,15 @@ def _contraction(mu: Any, slenderness: float) -> Any:
     return 2 * deficit / first
 
 
-@functools.cache
+@functools.lru_cache(4096)
+def _contraction_of_tube(mu: float, slenderness: float) -> float:
+    """Return the contraction [1] of a parameter mu, which laws ask for at every point of a tube."""
+    return float(_contraction(np.asarray(mu), slenderness))
+
+
 def _max_contraction(slenderness: float) -> float:
     """Return the maximum contraction [1] of a tube of this slenderness."""
-    at_maximum_volume, at_end = (
-        float(_contraction(np.asarray(mu), slenderness)) for mu in (0.5, _ROOT_MU_BRACKET[1] ** 2)
-    )
+    at_maximum_volume, at_end = (_contraction_of_tube(mu, slenderness) for mu in (0.5, _ROOT_MU_BRACKET[1] ** 2))
     return max(at_maximum_volume, min(0.5, at_end))
 
 
