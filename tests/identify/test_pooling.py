@@ -23,7 +23,14 @@ from airmuscle.bench import (
     select_for_both,
     standard_candidates,
 )
-from airmuscle.bench.identify import EffectRows, Runs, estimate_pooled_covariance, predict_effects
+from airmuscle.bench.identify import (
+    EffectRows,
+    Runs,
+    compared_points,
+    estimate_pooled_covariance,
+    predict_effects,
+    static_fit,
+)
 from airmuscle.bench.identify.static_fit_chapter import equation_section
 from airmuscle.errors import IdentificationError, ParameterError
 from airmuscle.files import Entry, load, save
@@ -37,6 +44,7 @@ NAMES = tuple(f"muscle {i + 1}" for i in range(len(LENGTHS)))
 SCATTER, NOISE = 12.0, 2.0
 POPULATION = LogarithmicLength(ContractileSurface.blank(3), ContractileSurface.blank(1), 0.2, 0.2)
 CHANGED = LogarithmicLength(ContractileSurface.blank(3), ContractileSurface.blank(3), 0.2, 0.2)
+BLANK_1 = ContractileSurface.blank(1)
 POOLED = PooledLengthLaw(POPULATION, (ContractileSurface.blank(2),))
 CANDIDATES = [
     Candidate("complete pooling", POPULATION),
@@ -310,6 +318,24 @@ def test_scores_do_not_depend_on_the_number_of_processes():
         [m.cross_validated_rmse for m in two.ranking], rel=1e-9)  # fmt: skip
     assert one.reason == two.reason
     assert [m.candidate.name for m in one.ranking] == [m.candidate.name for m in two.ranking]
+
+
+def test_laws_of_one_population_share_its_fits_and_have_the_scores_of_each_alone(monkeypatch):
+    candidates = [CANDIDATES[2], CANDIDATES[0], Candidate("of degree 1", PooledLengthLaw(POPULATION, (BLANK_1,)))]
+    data = runs()
+    alone = [compare(data, [each], leave_out=RunSplit()).ranking[0] for each in candidates]
+    fitted, fit_law = [], static_fit._fit_law
+    monkeypatch.setattr(static_fit, "_fit_law", lambda law, *rest: fitted.append(law) or fit_law(law, *rest))
+    refitted, refits = [], compared_points.GroupRefits
+    refit = refits.refit
+    monkeypatch.setattr(refits, "refit", lambda *which: refitted.append(which) or refit(*which))
+    together = {each.candidate.name: each for each in compare(data, candidates, leave_out=RunSplit()).ranking}
+    assert fitted == [POPULATION]
+    assert len(refitted) == len(data)
+    for each in alone:
+        found = together[each.candidate.name]
+        assert found.fit.model == each.fit.model
+        assert (found.cross_validated_rmse, found.aicc) == (each.cross_validated_rmse, each.aicc)
 
 
 @pytest.mark.slow

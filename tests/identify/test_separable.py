@@ -135,9 +135,12 @@ def test_slack_rows_take_part_in_the_projection():
     again = start.copy()
     again[linear] = 0.0
     slopes = problem.jacobian(again)[:, linear]
-    assert solve_censored_least_squares(problem, slopes, problem.predict(again)) == pytest.approx(
-        start[linear], rel=1e-6
-    )
+    solution = solve_censored_least_squares(problem, slopes, problem.predict(again))
+    assert solution == pytest.approx(start[linear], rel=1e-6)
+    active = problem.active_rows(slopes @ solution + problem.predict(again))
+    for first in (active, ~active, problem.censoring == 0):  # of the first step alone
+        found = solve_censored_least_squares(problem, slopes, problem.predict(again), first)
+        assert found == pytest.approx(solution, rel=1e-9)
 
 
 def test_a_step_is_halved_until_the_sum_of_squares_is_at_most_the_limit():

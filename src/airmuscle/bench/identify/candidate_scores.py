@@ -3,6 +3,7 @@ this process or in several."""
 
 import dataclasses
 from collections.abc import Callable, Iterable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +17,7 @@ from .compared_points import ComparedPoints, cause_of, residuals_of_rows
 from .cross_validation import GroupSplit, label_folds
 from .fit_points import FitPoints
 from .model_evidence import aicc, effective_sample_size
+from .pooling import population_of
 from .problem import FORCE, fitted_quantity_of
 from .result import Fit
 from .slack import SlackPull
@@ -214,16 +216,21 @@ def score_candidates(
         if pool is not None:
             for split in splits:
                 split.points.prepare()  # before they are sent
-        distribution = DistributedCalls(pool, _score_task, (tuple(splits), loss))
+        distribution = DistributedCalls(pool, _score_tasks, (tuple(splits), loss))
         for indices in (early, late):
             lowest = _lowest_errors(scores_of.values(), len(splits)) if indices is late else ()
+            groups = _of_one_population(candidates, indices)
             if pool is not None:  # those that take longest first
-                indices.sort(key=lambda i: -sum(1 for _ in tree.leaves(candidates[i].law)))
-            tasks = [_Task(candidates[i], tuple(max_excess(candidates[i]) * each for each in lowest)) for i in indices]
+                groups.sort(key=lambda group: -sum(1 for i in group for _ in tree.leaves(candidates[i].law)))
+            tasks = [
+                [_Task(candidates[i], tuple(max_excess(candidates[i]) * each for each in lowest)) for i in group]
+                for group in groups
+            ]
             for position, scores in distribution.completed(tasks):
-                scores_of[indices[position]] = scores
-                if progress is not None:
-                    progress(candidates[indices[position]].name, (len(scores_of) - 1) / len(candidates))
+                for i, score in zip(groups[position], scores, strict=True):
+                    scores_of[i] = score
+                    if progress is not None:
+                        progress(candidates[i].name, (len(scores_of) - 1) / len(candidates))
     if progress is not None:
         progress("", 1.0)
     return [scores_of[i] for i in range(len(candidates))]
@@ -254,8 +261,16 @@ class _Task:
     limits: Sequence[float]
 
 
-def _score_task(common: tuple[Sequence[ComparedPoints], Loss], task: _Task) -> tuple[Score, ...]:
-    return score_candidate(task.candidate, common[0], common[1], task.limits)
+def _score_tasks(common: tuple[Sequence[ComparedPoints], Loss], tasks: Sequence[_Task]) -> Scores:
+    return [score_candidate(task.candidate, common[0], common[1], task.limits) for task in tasks]
+
+
+def _of_one_population(candidates: Sequence[Candidate], indices: Sequence[int]) -> list[list[int]]:
+    """The indices of the candidates, those of laws with one population together: its fits are computed once."""
+    groups: dict[Any, list[int]] = {}
+    for i in indices:
+        groups.setdefault(tree.structure(population_of(candidates[i].law)), []).append(i)
+    return list(groups.values())
 
 
 def _lowest_errors(scores: Iterable[tuple[Score, ...]], count: int) -> tuple[float, ...]:

@@ -188,17 +188,24 @@ class ComparedPoints:
 
         Raises IdentificationError where the other rows do not determine the parameters.
         """
-        models = (
-            _FoldModels(fit, self._group, len(self.folds), self.points, self._pooling(candidate, fit))
-            if isinstance(loss, LeastSquares)
-            else None
-        )
+        refits = self._refits_of(fit) if isinstance(loss, LeastSquares) else None
+        pooling = self._pooling(candidate, fit)
         for i, (fold, rows) in enumerate(zip(self.folds, self._left_out_rows, strict=True)):
-            model = None if models is None else models.without(i)
+            model = None if refits is None else refits.law_without(i, pooling)
             if model is None:
                 model = self._refit_exactly(candidate, fit, fold, loss)
             count = sum(int(np.count_nonzero(part.measured)) for part in rows)
             yield fold.name, residuals_of_rows(model, rows, self.max_force), count
+
+    def _refits_of(self, fit: Fit) -> "_FoldRefits":
+        """The refits of a population law without each fold; kept for the next law of the same population."""
+        if not self._kept_refits or self._kept_refits[0].problem is not fit.problem:
+            self._kept_refits[:] = [_FoldRefits(fit, self._group, len(self.folds), self.points)]
+        return self._kept_refits[0]
+
+    @functools.cached_property
+    def _kept_refits(self) -> "list[_FoldRefits]":
+        return []
 
     def _pooling(self, candidate: Candidate, fit: Fit) -> Pooling | None:
         law = candidate.law
@@ -218,29 +225,30 @@ class ComparedPoints:
             raise IdentificationError(message, cause=cause) from None
 
 
-class _FoldModels:
-    """The laws fitted to all groups but one, from the fit to all rows."""
+class _FoldRefits:
+    """The laws fitted to all groups but one, from the fit to all rows; of pooled laws the population."""
 
-    def __init__(
-        self, fit: Fit, group: npt.NDArray[np.intp], count: int, points: FitPoints, pooling: Pooling | None = None
-    ) -> None:
-        self._problem, self._group, self._count, self._pooling = fit.problem, group, count, pooling
-        bounded = with_slack_bounds(fit.problem, points)
-        solution = _solution(bounded.problem, fit.values)
+    def __init__(self, fit: Fit, group: npt.NDArray[np.intp], count: int, points: FitPoints) -> None:
+        self.problem, self._group = fit.problem, group
+        if points.kept.get("problem") is not fit.problem:  # not yet for another split
+            bounded = with_slack_bounds(fit.problem, points)
+            points.kept.update(problem=fit.problem, bounded=(bounded, _solution(bounded.problem, fit.values)))
+        bounded, solution = points.kept["bounded"]
         self._refits = GroupRefits(bounded.problem, solution, bounded.groups(group, points, count), count + 1)
+        self._counts, self._values = np.ones(count + 1) - np.eye(count, count + 1), dict[int, Array | None]()
 
-    def without(self, index: int) -> Characteristic | None:
+    def law_without(self, index: int, pooling: Pooling | None) -> Characteristic | None:
         """The law without one group; None where the refit is not certain."""
-        counts = np.ones(self._count + 1)
-        counts[index] = 0.0
-        values = self._refits.refit(counts)
+        if index not in self._values:
+            self._values[index] = self._refits.refit(self._counts[index])
+        values = self._values[index]
         if values is None:
             return None
-        problem, rows = self._problem, self._group != index
+        problem, rows = self.problem, self._group != index
         law: Any = tree.with_parameters(problem.law, problem.leaf_values(values))
         if hasattr(law, "rescaled"):
             law = law.rescaled(*((float(x[rows].min()), float(x[rows].max())) for x in problem.arguments))
-        model: Characteristic = law if self._pooling is None else self._pooling.law(law, values, rows)
+        model: Characteristic = law if pooling is None else pooling.law(law, values, rows)
         return model
 
 

@@ -103,6 +103,11 @@ class FitPoints:
         return self.data.with_columns(**levels)
 
     @functools.cached_property
+    def kept(self) -> dict[str, Any]:
+        """What was computed last for one law and all points, which laws with the same population share."""
+        return {}
+
+    @functools.cached_property
     def _deviations(self) -> dict[str, Array | None]:
         return {}
 

@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Collection, Sequence
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -15,7 +16,7 @@ from . import statistics as stats
 from .fit_notes import Examination, collect_notes, loss_scale_notes, weighting_notes
 from .fit_points import FitPoints
 from .gauss_newton import gauss_newton
-from .pooling import check_poolable, pool, refit_pooled
+from .pooling import check_poolable, pool, population_of, refit_pooled
 from .problem import FitProblem, evaluate
 from .result import Estimate, Fit
 from .slack import solve_bounded
@@ -93,10 +94,15 @@ def fit_to_points(
     """As `fit`, for points whose sensors and runs are estimated once for several laws."""
     if np.nanmax(points.joined["contraction"], initial=0.0) > MAX_CONTRACTION:
         _ = points.checks  # raises ColumnError where no muscle is so short
-    if not isinstance(law, PooledLengthLaw):
-        return _fit_law(law, points, loss, censoring, sigma, fixed)
-    check_poolable(law, points)
-    return pool(law, _fit_law(law.population, points, loss, censoring, sigma, fixed), points)
+    if isinstance(law, PooledLengthLaw):
+        check_poolable(law, points)
+    population = population_of(law)
+    key = tree.structure(population), tuple(leaf.value for leaf in tree.leaves(population)), loss, tuple(fixed)
+    kept: dict[str, Any] = points.kept if censoring is None and sigma is None else {}
+    if kept.get("key") != key:
+        kept.clear()
+        kept.update(fit=_fit_law(population, points, loss, censoring, sigma, fixed), key=key)
+    return pool(law, kept["fit"], points) if isinstance(law, PooledLengthLaw) else kept["fit"]
 
 
 def _fit_law(

@@ -27,12 +27,15 @@ _MAX_ITERATIONS = 200
 _RCOND = 1e-13
 
 
-def solve_censored_least_squares(problem: FitProblem, jacobian: Array, constant: Array) -> Array:
+def solve_censored_least_squares(
+    problem: FitProblem, jacobian: Array, constant: Array, active: npt.NDArray[np.bool_] | None = None
+) -> Array:
     """The parameters x that minimise the weighted residuals of `jacobian` (N, P) @ x + `constant` (N,).
 
     A censored row contributes only where the law violates its bound. The one-sided squares form a convex sum; each
     iteration is a Newton step, halved until the sum does not increase. Where the uncensored rows alone do not determine
     all parameters, the minimum is not unique: of all equally good solutions the one closest to the bounds is returned.
+    `active` (N,) is the mask of the rows that count in the first step, by default all.
     """
     norms = np.linalg.norm(jacobian, axis=0)
     norms[norms == 0] = 1.0
@@ -48,7 +51,7 @@ def solve_censored_least_squares(problem: FitProblem, jacobian: Array, constant:
     def sum_of_squares(scaled: Array) -> float:
         return float(np.sum((row_weights(scaled) * (matrix @ scaled - target)) ** 2))
 
-    weights, x = np.ones(len(target)), np.zeros(len(norms))
+    weights, x = np.ones(len(target)) if active is None else np.where(active, 1.0, inactive), np.zeros(len(norms))
     for iteration in range(_MAX_ITERATIONS):
         counted = slice(None) if weights.all() else weights > 0
         rows, right = weights[counted, None] * matrix[counted], weights[counted] * target[counted]
@@ -148,6 +151,7 @@ class _Projection:
         initial = problem.initial_values[~linear]
         self._scale = np.where(initial != 0, np.abs(initial), 1.0)
         self._last: tuple[bytes, tuple[Array, Array, Array]] | None = None
+        self._active: npt.NDArray[np.bool_] | None = None
 
     def complete(self, nonlinear: Array) -> Array:
         """All free parameters for these nonlinear ones; NaN for the linear ones where the law is not finite."""
@@ -163,8 +167,12 @@ class _Projection:
             constant = self._problem.predict(values)
             columns = self._problem.partial_jacobian(values, self._linear_indices)
             finite = np.isfinite(columns).all() and np.isfinite(constant).all()
-            values[self._linear] = solve_censored_least_squares(self._problem, columns, constant) if finite else np.nan
-            self._last = key, (values, columns @ values[self._linear] + constant, columns)
+            values[self._linear] = (
+                solve_censored_least_squares(self._problem, columns, constant, self._active) if finite else np.nan
+            )
+            modelled = columns @ values[self._linear] + constant
+            self._active = self._problem.active_rows(modelled) if finite else None
+            self._last = key, (values, modelled, columns)
         return self._last[1]
 
     def residuals(self, nonlinear: Array) -> Array:
