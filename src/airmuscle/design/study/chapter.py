@@ -237,13 +237,12 @@ def variation_table(study: Study) -> Table:
         "min": TableColumn(study.values.min(axis=0), BY_ROW),
         "max": TableColumn(study.values.max(axis=0), BY_ROW),
         "unit": [parameter.unit for parameter in study.parameters],
-        "also applied to": [_follower_paths(study, i) for i in range(len(study.parameters))],
+        "also applied to": [
+            ", ".join(parameter.path for parameter, leader in study.follow if leader == i)
+            for i in range(len(study.parameters))
+        ],
     }
     return Table("varied", "Varied parameters", columns)
-
-
-def _follower_paths(study: Study, index: int) -> str:
-    return ", ".join(parameter.path for parameter, leader in study.follow if leader == index)
 
 
 def describe_variation(variation: Variation) -> str:

@@ -82,7 +82,8 @@ def _group(cases: list[LoopCase], places: npt.NDArray[np.intp], index: TrackingI
     table = np.array([flatten(case.plant) for case in cases])
     differing = np.flatnonzero((table != table[0]).any(axis=0))
     paths = [leaf.path for leaf in leaves(first.plant)]
-    columns = (*(s.name for s in first.plant.states), *_outputs(first, starts[0]))
+    outputs = first.plant.outputs(starts[0], dict.fromkeys(first.plant.inputs, 0.0))
+    columns = (*(s.name for s in first.plant.states), *outputs)
     try:
         first.loop.check_columns(columns, first.plant.inputs)
         scales = index.scales_for(first.loop.controller.setpoints, columns)
@@ -91,10 +92,6 @@ def _group(cases: list[LoopCase], places: npt.NDArray[np.intp], index: TrackingI
     varied = {paths[i]: table[:, i] for i in differing.tolist()}
     states = {name: np.array([start[name] for start in starts]) for name in starts[0]}
     return CaseGroup(places, tuple(cases), varied, states, scales)
-
-
-def _outputs(case: LoopCase, state: Mapping[str, float]) -> tuple[str, ...]:
-    return tuple(case.plant.outputs(state, dict.fromkeys(case.plant.inputs, 0.0)))
 
 
 @dataclasses.dataclass(eq=False)

@@ -187,7 +187,9 @@ def step_experiment(
     )  # fmt: skip
     time, first = np.unique(run["time"], return_index=True)
     output = run[pid.measured][first]
-    return StepExperiment(time, output, size, _with_delay(_best_model(time, output, size), case.loop.sample_time / 2))
+    model = _best_model(time, output, size)
+    delayed = dataclasses.replace(model, dead_time=model.dead_time + case.loop.sample_time / 2)
+    return StepExperiment(time, output, size, delayed)
 
 
 def _range(case: LoopCase, pid: PID) -> tuple[float, float]:
@@ -214,10 +216,6 @@ def _best_model(time: Array, output: Array, step: float) -> ProcessModel:
     if not models:
         raise ParameterError(f"step_experiment: {' '.join(reasons)}")
     return min(models, key=lambda pair: pair[0])[1]
-
-
-def _with_delay(model: ProcessModel, delay: float) -> ProcessModel:
-    return dataclasses.replace(model, dead_time=model.dead_time + delay)
 
 
 def rule_settings(model: ProcessModel) -> tuple[RuleSettings, ...]:

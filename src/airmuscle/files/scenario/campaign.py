@@ -132,7 +132,8 @@ def _slow(record: CampaignRecord, muscle: Muscle) -> str:
     recording = record.recording
     start = float(recording["time"][0])
     time, pressure, path = _points(recording, float(muscle.geometry.resting_length))
-    table: dict[str, Any] = {"model": "SampledSignal", "setpoint": _rows(time, np.maximum(pressure, 0.0))}
+    levels = np.column_stack([time, np.maximum(pressure, 0.0)]).tolist()
+    table: dict[str, Any] = {"model": "SampledSignal", "setpoint": levels}
     initial: dict[str, float] = {"pressure": float(pressure[0])}
     mechanism: Any = Isometric(float(np.median(path)) / muscle.geometry.resting_length)
     if float(np.ptp(path)) > CONTRACTION_BAND * muscle.geometry.resting_length:
@@ -150,10 +151,6 @@ def _regulator(pressure: float) -> ProportionalRegulator:
         Supply(pressure + MARGIN), REGULATOR.fill, REGULATOR.discharge, REGULATOR.lag, REGULATOR.band,
         max(REGULATOR.max_setpoint, pressure + MARGIN),
     )  # fmt: skip
-
-
-def _rows(time: Array, values: Array) -> list[list[float]]:
-    return [[float(t), float(v)] for t, v in zip(time, values, strict=True)]
 
 
 def _points(recording: Recording, length: float) -> tuple[Array, Array, Array]:

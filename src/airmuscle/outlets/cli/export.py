@@ -25,9 +25,8 @@ from ..export.identifiers import make_identifier
 from ..export.robot_description import WRITERS
 from ..export.targets import C99, JavaScript, Octave, Target
 from ..requests.declaration import RequestError, Where, option, request
-from .export_models import export_actuator, export_fmu, export_modelica, export_mujoco, export_robot
+from .export_models import export_actuator, export_fmu, export_modelica, export_mujoco, export_robot, tell
 from .options import Folder, Json, complete_entry, with_requests
-from .terminal import echo, print_json
 
 TARGETS: dict[str, Target] = {"c": C99(), "js": JavaScript(), "octave": Octave()}
 """Languages by the names of the option --to."""
@@ -130,38 +129,30 @@ def export(source: Source, request: ExportRequest, out: Folder = DEFAULT_FOLDER,
       airmuscle export examples/pressure_loop.toml --to ssp --out loop.ssp
     """
     request = request if request.name else dataclasses.replace(request, name=make_identifier(Path(source).stem))
-    if request.to in ("fmu", "ssp"):
-        _export_fmu(source, out, request, json)
-        return
-    check_writable(out)
     if request.to not in TARGETS and request.to != "arduino":
         _export_model(source, out, request, json)
         return
+    check_writable(out)
     paths = _write(source, out, request)
     run = functools.partial(run_in_emulator, processor=request.processor) if request.processor else build_and_run
-    built = run(paths) if request.build else None
-    if json:
-        result = {} if built is None else _build_results(built)
-        print_json({"files": [str(path) for path in paths], **result})
-        return
-    for path in paths:
-        echo(f"file: {path}")
-    if built is not None:
-        _print_build(built, request.controller)
-    echo(f"run: {_instruction(request.to, paths, request.law, request.controller)}")
-
-
-def _export_fmu(source: str, out: Path, request: ExportRequest, json: bool) -> None:
-    """Write the FMU of a plant or of its controller, or both as an SSP package."""
-    targets = [find_platform(each) for each in dict.fromkeys(request.platforms)]
-    part = "ssp" if request.to == "ssp" else "controller" if request.controller else "plant"
-    fmi = 3 if request.fmi is None else request.fmi
-    export_fmu(source, out, request.name, request.tunable or None, fmi, not request.sources_only, targets, part, json)
+    lines, built = [f"run: {_instruction(request.to, paths, request.law, request.controller)}"], dict[str, Any]()
+    if request.build:
+        line, built = _build_results(run(paths), request.controller)
+        lines.insert(0, line)
+    tell(json, paths, *lines, **built)
 
 
 def _export_model(source: str, out: Path, request: ExportRequest, json: bool) -> None:
     """Write a model for a simulator or a learning stack."""
-    to, name, muscle = request.to, request.name, request.muscle
+    to, name, muscle, tunable = request.to, request.name, request.muscle, request.tunable or None
+    if to in ("fmu", "ssp"):
+        platforms = [find_platform(each) for each in dict.fromkeys(request.platforms)]
+        part, fmi = "ssp" if to == "ssp" else "controller" if request.controller else "plant", request.fmi
+        export_fmu(
+            source, out, name, tunable, 3 if fmi is None else fmi, not request.sources_only, platforms, part, json
+        )
+        return
+    check_writable(out)
     if to == "mujoco":
         export_mujoco(source, out, name, muscle, json)
     elif to in WRITERS:
@@ -169,7 +160,7 @@ def _export_model(source: str, out: Path, request: ExportRequest, json: bool) ->
     elif to in STACKS:
         export_actuator(source, out, name, muscle, STACKS[to], json)
     else:
-        export_modelica(source, out, name, request.tunable or None, json)
+        export_modelica(source, out, name, tunable, json)
 
 
 def _write(source: str, out: Path, request: ExportRequest) -> tuple[Path, ...]:
@@ -188,20 +179,16 @@ def _write(source: str, out: Path, request: ExportRequest) -> tuple[Path, ...]:
     return write_program(scenario.problem, out, target, tunable=tunable, columns=scenario.columns, **common)
 
 
-def _print_build(built: BuiltProgram, controller: bool) -> None:
-    """What the program printed; of a run, whose output is CSV, the number of its rows."""
+def _build_results(built: BuiltProgram, controller: bool) -> tuple[str, dict[str, str | int | None]]:
+    """What the program printed, of a run, whose output is CSV, the number of its rows; in a line, and for JSON."""
     text = (
         built.output.strip() if controller else f"{len(built.output.splitlines()) - 1} rows; {built.messages.strip()}"
     )
     size = "unknown" if built.code_size is None else f"{built.code_size} bytes"
-    stack = "" if built.stack_size is None else f", stack {built.stack_size} bytes, both without the C library"
-    echo(f"program: {text}; code {size}{stack}")
-
-
-def _build_results(built: BuiltProgram) -> dict[str, str | int | None]:
-    """The results of a build for JSON."""
-    stack = {} if built.stack_size is None else {"stack_bytes": built.stack_size}
-    return {"output": built.output, "code_bytes": built.code_size, **stack}
+    known = {} if built.stack_size is None else {"stack_bytes": built.stack_size}
+    stack = f", stack {built.stack_size} bytes, both without the C library" if known else ""
+    line = f"program: {text}; code {size}{stack}"
+    return line, {"output": built.output, "code_bytes": built.code_size, **known}
 
 
 def _instruction(to: str, paths: tuple[Path, ...], law: bool, controller: bool) -> str:

@@ -35,46 +35,37 @@ def export_fmu(
     else:
         write = write_ssp if part == "ssp" else write_fmu
         written = write(scenario.problem, path, tunable=tunable, **common)
-    if json:
-        print_json({"files": [str(path)], "platforms": list(written.platforms), "remark": written.remark})
-        return
-    echo(f"file: {path}")
     names = ", ".join(written.platforms)
     binaries = f"with sources and a binary for {names}" if names else f"sources without a binary: {written.remark}"
-    echo(f"FMI {fmi}.0, {'Model Exchange and ' if part == 'plant' else ''}Co-Simulation, {binaries}")
-    echo(f"run: fmpy simulate {path}" if part == "plant" else f"inputs: fmpy info {path}" if part == "controller" else
-         "open: SystemStructure.ssd joins plant and controller")  # fmt: skip
+    lines = (
+        f"FMI {fmi}.0, {'Model Exchange and ' if part == 'plant' else ''}Co-Simulation, {binaries}",
+        f"run: fmpy simulate {path}" if part == "plant" else f"inputs: fmpy info {path}" if part == "controller" else
+        "open: SystemStructure.ssd joins plant and controller",
+    )  # fmt: skip
+    tell(json, [path], *lines, platforms=list(written.platforms), remark=written.remark)
 
 
 def export_mujoco(source: str, out: Path, name: str, muscle: str, json: bool) -> None:
     """Write a MuJoCo plugin into a folder."""
     made = write_mujoco_plugin(load_scenario(source).plant, out, name=name, muscle=muscle)
-    files = [str(path) for path in (made.source, made.library) if path is not None]
-    if json:
-        print_json({"files": files, "plugin": made.plugin_name, "remark": made.remark})
-        return
-    for file in files:
-        echo(f"file: {file}")
-    echo(f"plugin: {made.plugin_name}" + (f", source only: {made.remark}" if made.remark else ""))
+    files = [path for path in (made.source, made.library) if path is not None]
     low, high = made.control_range
     size = f'actdim="{len(made.plant.states)}" dyntype="user" ctrlrange="{low:g} {high:g}"'
-    echo(f'MJCF: <plugin plugin="{made.plugin_name}" tendon="NAME" {size}/>')
+    lines = (
+        f"plugin: {made.plugin_name}" + (f", source only: {made.remark}" if made.remark else ""),
+        f'MJCF: <plugin plugin="{made.plugin_name}" tendon="NAME" {size}/>',
+    )
+    tell(json, files, *lines, plugin=made.plugin_name, remark=made.remark)
 
 
 def export_robot(source: str, out: Path, name: str, to: str, json: bool) -> None:
     """Write the robot description of a joint or an arm into a folder."""
     written = WRITERS[to](load_scenario(source).plant, out, name=name)
-    plugins = [str(path) for each in written.plugins for path in (each.source, each.library) if path is not None]
-    remarks = list(dict.fromkeys(each.remark for each in written.plugins if each.remark))
-    if json:
-        print_json({"files": [str(written.path), *plugins], "remarks": remarks, "left_out": list(written.left_out)})
-        return
-    for file in (written.path, *plugins):
-        echo(f"file: {file}")
-    for remark in remarks:
-        echo(f"plugins, source only: {remark}")
-    if written.left_out:
-        echo(f"left out: {', '.join(written.left_out)}")
+    plugins = [path for each in written.plugins for path in (each.source, each.library) if path is not None]
+    remarks, left = list(dict.fromkeys(each.remark for each in written.plugins if each.remark)), list(written.left_out)
+    lines = [f"plugins, source only: {remark}" for remark in remarks]
+    lines += [f"left out: {', '.join(left)}"] if left else []
+    tell(json, [written.path, *plugins], *lines, remarks=remarks, left_out=left)
 
 
 def export_actuator(source: str, out: Path, name: str, muscle: str, stack: Stack, json: bool) -> None:
@@ -86,11 +77,7 @@ def export_actuator(source: str, out: Path, name: str, muscle: str, stack: Stack
         paths = write_actuator(
             regulated_plant(entry.muscle), out, stack, name=name, title=entry.title, uncertainty=entry.uncertainty
         )
-    if json:
-        print_json({"files": [str(path) for path in paths]})
-        return
-    for path in paths:
-        echo(f"file: {path}")
+    tell(json, paths)
 
 
 def _is_plant(source: str) -> bool:
@@ -103,9 +90,13 @@ def export_modelica(source: str, out: Path, name: str, tunable: Sequence[str] | 
     """Write a Modelica package into a folder."""
     scenario = load_scenario(source)
     paths = write_modelica(scenario.problem, out, name=name, title=scenario.title, tunable=tunable)
+    tell(json, paths, f'Modelica: loadFile("{paths[0]}"); block {name}.Plant')
+
+
+def tell(json: bool, files: Sequence[Path], *lines: str, **more: Any) -> None:
+    """The files of an export and lines on their use, or as JSON the files and more."""
     if json:
-        print_json({"files": [str(path) for path in paths]})
+        print_json({"files": [str(file) for file in files], **more})
         return
-    for path in paths:
-        echo(f"file: {path}")
-    echo(f'Modelica: loadFile("{paths[0]}"); block {name}.Plant')
+    for line in (*(f"file: {file}" for file in files), *lines):
+        echo(line)

@@ -70,7 +70,7 @@ def _print_chapter(chapter: Chapter) -> None:
         text = f"{question} {to_plain(answer)}"
         echo(textwrap.fill(text, terminal_width(), subsequent_indent="  ", break_on_hyphens=False))
     found = [(kind, each) for kind in Kind for each in statements(chapter.claims, kind)]
-    values = [(_expected(each), _reproduced(each), _verdict(each.verdict)) for _, each in found]
+    values = [(_expected(each), _reproduced(each), f"{MARKS[each.verdict]} {each.verdict}") for _, each in found]
     columns = zip(HEADERS[1:], *values, strict=True)
     room = max(MIN_CLAIM, terminal_width() - sum(max(len(str(cell)) for cell in column) + GAP for column in columns))
     texts = (f"{PREFIXES[kind]}{to_plain(each.claim)}" for kind, each in found)
@@ -96,7 +96,3 @@ def _expected(statement: Statement) -> str:
 def _reproduced(statement: Statement) -> str:
     unit = "" if statement.cases[0].unit == "1" or not statement.reproduced else statement.cases[0].unit
     return f"{format_reproduced(statement, 3)} {unit}".rstrip()
-
-
-def _verdict(verdict: str) -> str:
-    return f"{MARKS[verdict]} {verdict}"

@@ -9,7 +9,7 @@ from typing import Any
 from xml.etree import ElementTree as ET
 
 from ...core import STANDARD_GRAVITY, ParameterError, atomic_folder
-from ...physics.mechanism import AntagonisticJoint, Mechanism, MuscleRoute, PlanarArm, SerialArm, WithStickSlip
+from ...physics import AntagonisticJoint, Mechanism, MuscleRoute, PlanarArm, SerialArm, SpatialLink, WithStickSlip
 from ...physics.mechanism.antagonistic_joint import ConstantRadius
 from ...physics.plant import Plant, open_plant
 from .identifiers import provenance
@@ -19,42 +19,22 @@ from .write import checked_name
 
 LEAST = 1e-9
 """Mass [kg] and moment of inertia [kg m2] that stand for zero, which simulators refuse (chosen)."""
-Vector = tuple[float, float, float]
-
-
-@dataclasses.dataclass(frozen=True)
-class RigidLink:
-    """Link with the joint at its origin; all vectors in the frame of the link, whose z axis points upwards at rest.
-
-    position      of the joint in the frame of the link before [m]
-    axis          unit vector of the joint
-    mass, centre  mass [kg] and centre of mass [m]
-    inertia       moment of inertia about every axis through the centre [kg m2]
-    armature      moment of inertia that turns with the joint alone [kg m2]
-    damping       of the joint [N m s/rad]
-    zero_angle    joint angle [rad] at which the frame has the direction of the frame before
-    friction      dry friction of the joint [N m]
-    """
-
-    joint: str
-    position: Vector
-    axis: Vector
-    mass: float
-    centre: Vector
-    inertia: float
-    armature: float = 0.0
-    damping: float = 0.0
-    zero_angle: float = 0.0
-    friction: float = 0.0
 
 
 @dataclasses.dataclass(frozen=True)
 class RobotModel:
-    """Links in series, routes of the muscles, acceleration of gravity [m/s2]; what else there is in the mechanism."""
+    """Links in series with the names of their joints, whose z axes point upwards at rest, and routes of the muscles.
 
-    links: Sequence[RigidLink]
+    gravity    acceleration of gravity [m/s2]
+    frictions  dry friction of each joint [N m]
+    left_out   what else the mechanism has, in words
+    """
+
+    joints: Sequence[str]
+    links: Sequence[SpatialLink]
     routes: Sequence[MuscleRoute]
     gravity: float
+    frictions: Sequence[float]
     left_out: tuple[str, ...] = ()
 
 
@@ -87,9 +67,9 @@ def _joint_model(mechanism: AntagonisticJoint) -> RobotModel:
     mass = joint.weight_torque / (STANDARD_GRAVITY * distance) if distance else 1.0
     own = joint.inertia - mass * distance**2
     centre = (distance * math.sin(joint.weight_angle), 0.0, -distance * math.cos(joint.weight_angle))
-    link = RigidLink("angle", (0.0, 0.0, 0.0), (0.0, -1.0, 0.0), mass, centre, own, damping=joint.damping)
+    link = SpatialLink((0, -1, 0), (0.0, 0.0, 0.0), mass, centre, own, 0.0, joint.damping)
     routes = [MuscleRoute((1,), (sign * joint.radius,), joint.offset, (joint.profile,)) for sign in (1.0, -1.0)]
-    return RobotModel([link], routes, STANDARD_GRAVITY)
+    return RobotModel(["angle"], [link], routes, STANDARD_GRAVITY, [0.0])
 
 
 @_robot_model.register
@@ -102,43 +82,33 @@ def _planar_model(mechanism: PlanarArm) -> RobotModel:
         inertia = (
             link.inertia + link.mass * (link.centre - centre) ** 2 + tip * (link.length - centre) ** 2
         )  # parallel axes
-        name, position = f"joint{number}.angle", (0.0, 0.0, -before)
-        links.append(
-            RigidLink(name, position, (0.0, -1.0, 0.0), mass, (0.0, 0.0, -centre), inertia, damping=link.damping)
-        )
+        position, at = (0.0, 0.0, -before), (0.0, 0.0, -centre)
+        links.append(SpatialLink((0, -1, 0), position, max(mass, LEAST), at, inertia, 0.0, link.damping))
         before = link.length
-    return RobotModel(links, mechanism.routes, mechanism.gravity)
+    return _arm_model(mechanism, links)
 
 
 @_robot_model.register
 def _spatial_model(mechanism: SerialArm) -> RobotModel:
-    links = [
-        RigidLink(
-            f"joint{number}.angle", _vector(link.position), _vector(link.axis), link.mass, _vector(link.centre),
-            link.inertia, link.rotor_inertia, link.damping, link.zero_angle,
-        )
-        for number, link in enumerate(mechanism.links, start=1)
-    ]  # fmt: skip
-    return RobotModel(links, mechanism.routes, mechanism.gravity)
+    return _arm_model(mechanism, mechanism.links)
+
+
+def _arm_model(arm: PlanarArm | SerialArm, links: Sequence[SpatialLink]) -> RobotModel:
+    names = [c.name for c in arm.coordinates]
+    return RobotModel(names, links, arm.routes, arm.gravity, [0.0] * len(links))
 
 
 @_robot_model.register
 def _stick_slip_model(mechanism: WithStickSlip) -> RobotModel:
     inner, elements = _robot_model(mechanism.inner), mechanism.elements
-    pairs = zip(inner.links, elements, strict=True)
-    links = [dataclasses.replace(link, friction=element.coulomb_torque) for link, element in pairs]
     shares = {
         "the friction by the tensions of the muscles": any(any(each.load_arms) for each in elements),
         "the friction by the load of a bearing": any(any(each.bearing_arms) for each in elements),
         "stiction above the friction in sliding": any(each.static_excess for each in elements),
         "the residual law": mechanism.residual is not None,
     }
-    return dataclasses.replace(inner, links=links, left_out=tuple(text for text, has in shares.items() if has))
-
-
-def _vector(values: Sequence[float]) -> Vector:
-    x, y, z = values
-    return float(x), float(y), float(z)
+    left_out = tuple(text for text, has in shares.items() if has)
+    return dataclasses.replace(inner, frictions=[each.coulomb_torque for each in elements], left_out=left_out)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -174,8 +144,8 @@ def write_mjcf(plant: Plant, folder: str | Path, *, name: str = "robot") -> Writ
     ET.SubElement(root, "option", gravity=f"0 0 {-robot.gravity!r}")
     extension = ET.SubElement(root, "extension")
     body = ET.SubElement(root, "worldbody")
-    for number, link in enumerate(robot.links, start=1):
-        body = _mjcf_body(body, link, f"link{number}")
+    for number, each in enumerate(zip(robot.joints, robot.links, robot.frictions, strict=True), start=1):
+        body = _mjcf_body(body, f"link{number}", *each)
     tendons, actuators = ET.SubElement(root, "tendon"), ET.SubElement(root, "actuator")
     states: list[float] = []
     for muscle, plugin, route in zip(plant.muscles, made, robot.routes, strict=True):
@@ -185,7 +155,7 @@ def write_mjcf(plant: Plant, folder: str | Path, *, name: str = "robot") -> Writ
         ET.SubElement(instance, "config", key=REST_LENGTH, value=repr(rest))
         tendon = ET.SubElement(tendons, "fixed", name=muscle.name)
         for joint, radius in zip(route.joints, route.radii, strict=True):
-            ET.SubElement(tendon, "joint", joint=robot.links[joint - 1].joint, coef=repr(-radius))
+            ET.SubElement(tendon, "joint", joint=robot.joints[joint - 1], coef=repr(-radius))
         low, high = plugin.control_range
         ET.SubElement(
             actuators, "plugin", name=muscle.name, tendon=muscle.name, plugin=plugin.plugin_name, instance=muscle.name,
@@ -197,11 +167,11 @@ def write_mjcf(plant: Plant, folder: str | Path, *, name: str = "robot") -> Writ
     return WrittenRobot(_written(root, folder, f"{program}.xml"), tuple(made), robot.left_out)
 
 
-def _mjcf_body(parent: ET.Element, link: RigidLink, name: str) -> ET.Element:
+def _mjcf_body(parent: ET.Element, name: str, joint: str, link: SpatialLink, friction: float) -> ET.Element:
     body = ET.SubElement(parent, "body", name=name, pos=_numbers(link.position))
     ET.SubElement(
-        body, "joint", name=link.joint, type="hinge", axis=_numbers(link.axis), ref=repr(link.zero_angle),
-        damping=repr(link.damping), armature=repr(link.armature), frictionloss=repr(link.friction),
+        body, "joint", name=joint, type="hinge", axis=_numbers(link.axis), ref=repr(link.zero_angle),
+        damping=repr(link.damping), armature=repr(link.rotor_inertia), frictionloss=repr(friction),
     )  # fmt: skip
     ET.SubElement(
         body, "inertial", pos=_numbers(link.centre), mass=repr(max(link.mass, LEAST)),
@@ -225,23 +195,25 @@ def write_urdf(plant: Plant, folder: str | Path, *, name: str = "robot") -> Writ
     """
     program = checked_name(name) or program_name(name)
     robot = robot_model(plant.mechanism)
-    rotors = [f"the rotor inertia of {n.joint}, {n.armature:.3g} kg m2" for n in robot.links[1:] if n.armature]
+    rotors = [
+        f"the rotor inertia of {name}, {link.rotor_inertia:.3g} kg m2"
+        for name, link in list(zip(robot.joints, robot.links, strict=True))[1:] if link.rotor_inertia
+    ]  # fmt: skip
     robot = dataclasses.replace(robot, left_out=(*robot.left_out, *rotors))
     root = ET.Element("robot", name=program)
     lines = [
         f"muscle {muscle.name}: resting length {muscle.geometry.resting_length!r} m, contraction {route.offset!r} at "
         "angles 0, moment arms "
         + ", ".join(
-            f"{radius!r} m about {robot.links[j - 1].joint}"
-            for j, radius in zip(route.joints, route.radii, strict=True)
+            f"{radius!r} m about {robot.joints[j - 1]}" for j, radius in zip(route.joints, route.radii, strict=True)
         )
         for muscle, route in zip(plant.muscles, robot.routes, strict=True)
     ]
     root.append(ET.Comment(_comment(f"Robot {program}", plant, lines + _named(robot))))
     ET.SubElement(root, "link", name="base")
     parent = "base"
-    for number, link in enumerate(robot.links, start=1):
-        _urdf_link(root, parent, link, f"link{number}")
+    for number, joint in enumerate(zip(robot.joints, robot.links, robot.frictions, strict=True), start=1):
+        _urdf_link(root, parent, f"link{number}", *joint)
         parent = f"link{number}"
     return WrittenRobot(_written(root, folder, f"{program}.urdf"), (), robot.left_out)
 
@@ -250,21 +222,21 @@ def _named(robot: RobotModel) -> list[str]:
     return [f"left out: {text}" for text in robot.left_out]
 
 
-def _urdf_link(root: ET.Element, parent: str, link: RigidLink, name: str) -> None:
+def _urdf_link(root: ET.Element, parent: str, name: str, axis: str, link: SpatialLink, friction: float) -> None:
     body = ET.SubElement(root, "link", name=name)
     inertial = ET.SubElement(body, "inertial")
     ET.SubElement(inertial, "origin", xyz=_numbers(link.centre))
     ET.SubElement(inertial, "mass", value=repr(max(link.mass, LEAST)))
-    turning = link.armature if parent == "base" else 0.0  # the first link turns about its axis alone
+    turning = link.rotor_inertia if parent == "base" else 0.0  # the first link turns about its axis alone
     moment = repr(max(link.inertia + turning, LEAST))
     ET.SubElement(inertial, "inertia", ixx=moment, iyy=moment, izz=moment, ixy="0", ixz="0", iyz="0")
-    joint = ET.SubElement(root, "joint", name=link.joint, type="continuous")
+    joint = ET.SubElement(root, "joint", name=axis, type="continuous")
     rotation = [-link.zero_angle * component for component in link.axis]  # about one axis of the frame
     ET.SubElement(joint, "origin", xyz=_numbers(link.position), rpy=_numbers(rotation))
     ET.SubElement(joint, "parent", link=parent)
     ET.SubElement(joint, "child", link=name)
     ET.SubElement(joint, "axis", xyz=_numbers(link.axis))
-    ET.SubElement(joint, "dynamics", damping=repr(link.damping), friction=repr(link.friction))
+    ET.SubElement(joint, "dynamics", damping=repr(link.damping), friction=repr(friction))
 
 
 def _numbers(values: Sequence[float]) -> str:

@@ -41,9 +41,10 @@ def latex_source(equation: LawEquation, validity: str) -> str:
 def matlab_source(equation: LawEquation, validity: str) -> str:
     """The equation as a MATLAB function of arrays."""
     notation = Matlab(equation.part_nodes, _argument_nodes(equation))
+    given = ", ".join(each.name for each in equation.arguments)
     return "\n".join(
         [
-            f"function {_variable(equation)} = muscle_{_word(equation)}({_argument_list(equation)})",
+            f"function {_variable(equation)} = muscle_{_word(equation)}({given})",
             f"% {_signature(equation)}. {validity}",
             *(f"{each.name} = {notation.number(_value(each))};  % {_described(each)}" for each in equation.parameters),
             *(f"{part.name} = {notation.text(node, definition=True)};" for part, node in equation.parts),
@@ -125,10 +126,6 @@ def _symbols(equation: LawEquation) -> set[Node]:
 def _argument_nodes(equation: LawEquation) -> set[Node]:
     names = {each.name for each in equation.arguments}
     return {node for node in _symbols(equation) if node.name in names}
-
-
-def _argument_list(equation: LawEquation) -> str:
-    return ", ".join(each.name for each in equation.arguments)
 
 
 def _variable(equation: LawEquation) -> str:

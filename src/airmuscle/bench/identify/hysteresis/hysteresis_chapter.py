@@ -64,7 +64,8 @@ def _overview(loop_fits: Sequence[LoopFit]) -> Chapter:
 def loop_chapter(loop_fit: LoopFit) -> Chapter:
     """Return the chapter of the friction laws of one loop."""
     loop = loop_fit.loop
-    shown = loop_fit.recommended or (loop_fit.fits[0] if loop_fit.fits else None)
+    best = loop_fit.recommended
+    shown = best or (loop_fit.fits[0] if loop_fit.fits else None)
     of_shown = None if shown is None else shown.chapter()
     plots = [Plot("loop", "Measured loop; light: rows that are not used.", functools.partial(_figure, loop))]
     tables = [_law_table(loop_fit)]
@@ -80,7 +81,7 @@ def loop_chapter(loop_fit: LoopFit) -> Chapter:
         title=f"{loop.recording.origin}: {loop.description}",
         summary=tuple(_summary(loop_fit, shown)),
         values=(
-            NamedValue("recommended", _name(loop_fit.recommended), brief=False),
+            NamedValue("recommended", best and type(best.friction).__name__, brief=False),
             NamedValue("usable in a plant", loop_fit.usable_in_plant, brief=False),
         ),
         tables=tuple(tables),
@@ -88,10 +89,6 @@ def loop_chapter(loop_fit: LoopFit) -> Chapter:
         notes=tuple(_notes(loop_fit)),
         references=() if of_shown is None else of_shown.references,
     )
-
-
-def _name(fit: HysteresisFit | None) -> str | None:
-    return None if fit is None else type(fit.friction).__name__
 
 
 def _summary(loop_fit: LoopFit, shown: HysteresisFit | None) -> list[str]:
