@@ -165,7 +165,7 @@ def section(rounds: int = 5) -> Section:
         Target("filter: difference", of_filters["extended Kalman filter, NumPy"], 1e-9, ""),
     ]
     if is_installed("control"):
-        targets.append(Target("margins: difference from python-control", of_margins, 1e-6, ""))
+        targets.append(Target("margins: difference from python-control", of_margins, 1e-9, ""))
     return Section("Margins, multi-rate loops and filters", TEXT, HEADER, tuple(rows), tuple(targets))
 
 

@@ -224,7 +224,7 @@ def test_a_filter_is_that_of_python_control(kind):
     assert told == pytest.approx(0.3 + expected, rel=1e-9, abs=1e-9)
 
 
-@pytest.mark.parametrize("given", ["10 ms", np.float32(0.01), np.float64(0.01), 0.01])
+@pytest.mark.parametrize("given", ["10 ms", np.float32(0.01), np.float64(0.01), np.array(0.01), 0.01])
 def test_the_sample_time_of_a_loop_is_a_number_of_any_kind_or_a_text(given):
     loop = ControlLoop(INNER, given, Schedule({"pressure": ((0, 1e5),)}))
     assert type(loop.sample_time) is float

@@ -296,7 +296,7 @@ def test_drivers_that_are_not_part_of_the_program_are_named(tmp_path):
 
 def test_what_cannot_be_printed_is_refused_by_name(tmp_path):
     with pytest.raises(
-        ParameterError, match="Called is a controller in Python and cannot be exported; derive it from Contr"
+        ParameterError, match="Called is a controller in Python and cannot be exported here; of predictive control the"
     ):
         write_controller(problem_of(Called(PRESSURE)), tmp_path)
     with pytest.raises(ParameterError, match="the problem has no controller to export"):

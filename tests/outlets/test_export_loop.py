@@ -202,7 +202,7 @@ def of_loop(controller=PRESSURE, **changes):
 @pytest.mark.parametrize(
     ("problem", "target", "options", "message"),
     [
-        (of_loop(Called(PRESSURE)), C99(), {}, "Called is a controller in Python and cannot be exported; derive it from"),
+        (of_loop(Called(PRESSURE)), C99(), {}, "Called is a controller in Python and cannot be exported here; of predictive"),
         (of_loop(drivers={"fill": Slow()}), C99(), {}, "the driver Slow of 'fill' has no printed form; there are PWM, Sol"),
         (of_loop(drivers={"fill": Slow()}), Octave(), {}, "the driver Slow of 'fill' has no printed form"),
         (of_loop(), C99(), {"tunable": ["gain"]}, r"Plant has no parameter 'gain'"),

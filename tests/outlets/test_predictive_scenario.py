@@ -110,7 +110,9 @@ def test_weights_are_tuned_in_the_units_of_their_signals(tmp_path):
     case = load_scenario_loop(EXAMPLE)
     bounds = case.bounds(["permitted[0]=0.2 mm:5 mm", "process_noise[3]=0.1 m/s2:10 m/s2", "max_rate[0]=1 1/s:50 1/s"])
     assert bounds["permitted[0]"] == pytest.approx((2e-4, 5e-3))
-    with pytest.raises(ParameterError, match="no gain of PredictiveControl differs from 0; state the ranges"):
+    with pytest.raises(
+        ParameterError, match="no parameter of PredictiveControl with the unit u/y, u or y differs from 0; state"
+    ):
         case.bounds()
     text = case.with_gains({"permitted[0]": 4e-4, "process_noise[3]": 2.0})
     assert 'permitted = ["0.4 mm", "0.1 m/s", 0.1, 0.1]' in text

@@ -186,7 +186,7 @@ def test_a_scenario_that_cannot_be_tuned_is_refused(scenario):
     assert "there is no such file" in refused(scenario.with_name("missing.toml"))
     zero = SCENARIO.replace('"1.5 1/bar"', "0.0").replace("integral_time = 0.6\n", "")
     scenario.write_text(zero, encoding="utf-8")
-    assert "[input.controller]: no gain of PID differs from 0" in refused(scenario)
+    assert "[input.controller]: no parameter of PID with the unit u/y, u or y differs from 0" in refused(scenario)
 
 
 @pytest.mark.parametrize(

@@ -96,8 +96,8 @@ class ScenarioLoop(ShortRepr):
         if not ranges:
             name = type(self.loop.controller).__name__
             raise ParameterError(
-                f"{self.location.inside('input').inside('controller')}: no gain of {name} differs from 0; state the "
-                "ranges of the gains as bounds."
+                f"{self.location.inside('input').inside('controller')}: no parameter of {name} with the unit u/y, u or "
+                "y differs from 0; state the ranges of the gains as bounds."
             )
         return ranges
 

@@ -81,7 +81,7 @@ class ControlLoop(ShortRepr):
         sample_time: Any = self.sample_time
         if isinstance(sample_time, str):
             sample_time = quantity(sample_time, "s", where="ControlLoop.sample_time")
-        elif isinstance(sample_time, np.number):
+        elif isinstance(sample_time, np.number | np.ndarray) and np.ndim(sample_time) == 0:
             sample_time = sample_time.item()
         object.__setattr__(self, "sample_time", sample_time)
         if (

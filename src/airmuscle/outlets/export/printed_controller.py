@@ -234,8 +234,9 @@ def check_control_law(problem: Problem, also: type = ControlLaw) -> ControlLoop:
         raise ParameterError("the problem has no controller to export; its input is a signal. Give it a ControlLoop.")
     if not isinstance(loop.controller, ControlLaw | also):
         raise ParameterError(
-            f"{type(loop.controller).__name__} is a controller in Python and cannot be exported; derive it from "
-            "ControlLaw and write its step over airmuscle.core.ops."
+            f"{type(loop.controller).__name__} is a controller in Python and cannot be exported here; of "
+            "predictive control the controller alone can, as C. Derive a law of your own from ControlLaw and write its "
+            "step over airmuscle.core.ops."
         )
     return loop
 
