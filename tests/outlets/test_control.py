@@ -40,7 +40,7 @@ from airmuscle.files.scenario import describe_input
 ROOT = Path(__file__).parents[2]
 EXAMPLE = ROOT / "examples" / "pressure_loop.toml"
 PAGE = (ROOT / "docs" / "control.md").read_text(encoding="utf-8")
-TABLE, NESTED = re.findall(r"```toml\n(.*?)```", PAGE, flags=re.DOTALL)
+PREDICTIVE, TABLE, NESTED = re.findall(r"```toml\n(.*?)```", PAGE, flags=re.DOTALL)
 
 VALVE = '{ model = "Valve", conductance = 3e-9, critical_ratio = 0.3 }'
 PLANT = f"""
@@ -98,6 +98,12 @@ def test_the_table_of_the_page_is_a_loop(tmp_path: Path):
     run = scenario.simulate()
     assert np.ptp(run["position"][run["time"] <= 0.1]) < 1e-12
     assert run["position"][-1] > run["position"][0] + 1e-3
+
+
+def test_the_table_of_predictive_control_is_that_of_the_example():
+    example = tomllib.loads((EXAMPLE.parent / "predictive_lift.toml").read_text(encoding="utf-8"))
+    page = tomllib.loads(PREDICTIVE)["input"]["controller"]
+    assert page == {key: value for key, value in example["input"]["controller"].items() if key != "setpoint"}
 
 
 def test_the_table_of_laws_inside_laws_is_that_of_the_example():

@@ -58,6 +58,7 @@ from .files import check_keys as check_keys
 from .files import is_path as is_path
 from .files import products_of_laws as products_of_laws
 from .files import read_finite_number as read_finite_number
+from .files import read_table as read_table
 from .files import read_text as read_text
 from .fitted_entry import campaign_entry as campaign_entry
 from .fitted_entry import find_initial_law as find_initial_law

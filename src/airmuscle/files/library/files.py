@@ -55,6 +55,13 @@ def check_keys(table: Mapping[str, Any], known: Sequence[str], location: Locatio
     check_known(f"{location}: unknown key", map(one_line, table), known)
 
 
+def read_table(value: Any, known: Any, where: object, remedy: str = "") -> Mapping[str, Any]:
+    """A table as it is. Raises ParameterError for anything else; `remedy` is what the message says of its contents."""
+    if not isinstance(value, Mapping):
+        raise ParameterError(f"{where} is {abridged(value)}; it must be a table{remedy}.")
+    return value
+
+
 def read_number(value: Any, unit: str, where: object, about: str = "") -> float:
     """Number in SI units, from a number in `unit` or a text with a unit; `about` is appended to the error message.
 

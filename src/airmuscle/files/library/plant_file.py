@@ -46,6 +46,7 @@ from .files import (
     list_names,
     located_errors,
     read_finite_number,
+    read_table,
     read_text,
     read_toml,
 )  # fmt: skip
@@ -61,9 +62,8 @@ def build_plant_entry(tables: Mapping[str, Any], location: Location) -> PlantEnt
     """The entry of the tables of a file. Raises FileError, ParameterError, UnitError or UnknownNameError."""
     keys = ("title", "provenance", "note", "warning", *SCENARIO_TABLES, "sources", "reference")
     check_keys(tables, keys, location)
-    sources, in_sources = tables.get("sources", {}), location.inside("sources")
-    if not isinstance(sources, Mapping):
-        raise ParameterError(f"{in_sources} is {abridged(sources)}; it must be a table of paths and sources.")
+    in_sources = location.inside("sources")
+    sources = read_table(tables.get("sources", {}), None, in_sources, " of paths and sources")
     given = {
         "name": Path(location.file).stem,
         "plant": build_plant(tables["plant"], location.inside("plant")),
@@ -120,14 +120,12 @@ def _named_plant(table: Any, location: Location, reader: TableReader) -> Plant |
 
 def _named_muscle(value: Any, location: Location, reader: TableReader) -> Muscle | None:
     """A library entry or a muscle file, with the parts that a table replaces."""
-    if isinstance(value, str):
+    if not isinstance(value, Mapping):
         entry = _load_entry(value, location)
         with located_errors(location):
             return entry.muscle
-    if isinstance(value, Mapping) and "library" not in value:
+    if "library" not in value:
         return None
-    if not isinstance(value, Mapping):
-        raise ParameterError(f"{location} is {abridged(value)}; name a library entry or a muscle file.")
     table = {key: item for key, item in value.items() if key not in ("library", *SIZES)}
     entry = _load_entry(value["library"], location.inside("library"))
     sizes = {key: read_finite_number(value[key], "m", location.at(key)) for key in SIZES if key in value}

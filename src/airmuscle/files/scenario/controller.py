@@ -29,6 +29,7 @@ static inverse are those of the plant unless the table gives others, in the form
 """
 
 import dataclasses
+import functools
 import math
 import re
 import typing
@@ -42,7 +43,7 @@ from ...physics.mechanism.base import Mechanism
 from ...physics.muscle import Muscle
 from ...physics.plant.plant import Plant
 from ...recording.columns import column_units
-from ..library import PLANT_READER, Location, custom_field, located_errors, origin, read_parameter
+from ..library import PLANT_READER, Location, custom_field, located_errors, origin, read_parameter, read_table
 from ..library.build import build
 from .inputs import build_input_signal, read_drivers
 from .values import Number
@@ -158,20 +159,15 @@ def _has(hint: Any, kind: type[Any]) -> bool:
     return hint is kind or any(_has(option, kind) for option in typing.get_args(hint))
 
 
-def _read_setpoint(value: Any, plant: Any, where: Location) -> Mapping[str, Any]:
-    """The table of the set points, which `build_control_loop` reads."""
-    if not isinstance(value, Mapping):
-        example = 'pressure = [["0 s", "1 bar"]]'
-        raise ParameterError(f"{where} is {abridged(value)}; it must be a table of set points, such as {example}.")
-    return value
-
-
 @dataclasses.dataclass(frozen=True)
 class LoopTable:
     """Keys of the table of a controller that are not its parameters."""
 
     sample_time: float = custom_field(Number("s", positive=True), 'sample time, such as sample_time = "10 ms"')
-    setpoint: Mapping[str, Any] = custom_field(_read_setpoint, "set point, the table [input.controller.setpoint]")
+    setpoint: Mapping[str, Any] = custom_field(
+        functools.partial(read_table, remedy=' of set points, such as pressure = [["0 s", "1 bar"]]'),
+        "set point, the table [input.controller.setpoint]",
+    )
 
 
 LOOP_KEYS = tuple(field.name for field in dataclasses.fields(LoopTable))
@@ -191,12 +187,11 @@ def build_control_loop(
 
     Raises ParameterError, UnitError, UnknownNameError, FileError or ColumnError with the location.
     """
-    inner, controller_table = location.inside("controller"), table["controller"]
-    if not isinstance(controller_table, Mapping):
-        raise ParameterError(
-            f'{inner} is {abridged(controller_table)}; it must be a table. Write model = "PID", its parameters, '
-            "sample_time and setpoint in it."
-        )
+    inner, remedy = (
+        location.inside("controller"),
+        '. Write model = "PID", its parameters, sample_time and setpoint in it',
+    )
+    controller_table = read_table(table["controller"], plant, inner, remedy)
     own = {key: value for key, value in controller_table.items() if key not in LOOP_KEYS}
     stated = {key: value for key, value in controller_table.items() if key in LOOP_KEYS}
     keys: LoopTable = build(stated, inner, kind=LoopTable)

@@ -46,7 +46,7 @@ from ...engine.run.problem import check_signal
 from ...physics.plant.plant import Plant
 from ...recording import Recording
 from ..library import build_plant, custom_field, read_toml, scenario_toml
-from ..library.files import Location, check_keys, located_errors, read_text
+from ..library.files import Location, check_keys, located_errors, read_table, read_text
 from . import values
 from .initial_state import build_initial_conditions, pressure_names
 from .inputs import build_input_signal
@@ -69,14 +69,14 @@ class RecordTable:
 
     file: str = ""
     start_time: float = custom_field(values.Number("s"), "time of the record at which the input begins", default=0.0)
-    initial_state: Mapping[str, Any] = custom_field(values.read_table, "initial values", default_factory=dict)
+    initial_state: Mapping[str, Any] = custom_field(read_table, "initial values", default_factory=dict)
     first: float = custom_field(values.Number("s"), "time of the first row that is used", default=-math.inf)
     last: float = custom_field(values.Number("s"), "time of the last row that is used", default=math.inf)
     mapping: ColumnMapping = custom_field(_read_mapping, "what the file does not state", default=ColumnMapping())
     resting_length: float | str | None = None
     ambient: float | str | None = None
-    input: Mapping[str, Any] | None = custom_field(values.read_table, "input of this record", default=None)
-    plant: Mapping[str, Any] = custom_field(values.read_table, "parts of the plant that differ", default_factory=dict)
+    input: Mapping[str, Any] | None = custom_field(read_table, "input of this record", default=None)
+    plant: Mapping[str, Any] = custom_field(read_table, "parts of the plant that differ", default_factory=dict)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

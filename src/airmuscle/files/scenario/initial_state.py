@@ -5,18 +5,19 @@ initial_state = { "left.pressure" = "1 bar", "right.pressure" = "3 bar" }   equi
 initial_state = { pressure = "2 bar", angle = "5 deg" }                  a state at rest that need not be an equilibrium
 """
 
+import functools
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from ...bench.identify.dynamic import InitialConditions
-from ...core import EquilibriumError, HintedText, ParameterError, abridged
+from ...core import EquilibriumError, HintedText, ParameterError
 from ...physics.equilibrium import find_equilibrium
 from ...physics.mechanism.base import Coordinate
 from ...physics.plant.plant import Plant
 from ...recording import Recording
-from ..library.files import Location, check_keys, located_errors, read_finite_number
+from ..library.files import Location, check_keys, located_errors, read_finite_number, read_table
 
 PRESSURE = "pressure"
 """Key of the gauge pressure of all muscles whose own pressure is not stated."""
@@ -24,6 +25,8 @@ FIRST_ROWS = 3
 """Number of first rows whose median is the default initial value of a record (chosen)."""
 LOOSE = 1e-3
 """Part of its nominal value by which a coordinate is moved to see whether anything holds it (chosen)."""
+read_initial_table = functools.partial(read_table, remedy='. Write initial_state = { pressure = "0 bar" }')
+"""Reader of the table `initial_state`, which `build_initial_state` reads."""
 START_REMEDY = (
     ' In [run], initial_state = { pressure = "2 bar" } is the equilibrium at another pressure, and '
     '{ position = "0 mm" } a state at rest that need not be one; a load that rests on a stop is a '
@@ -52,15 +55,6 @@ def read_initial_values(
     pressures = dict.fromkeys(names, values[PRESSURE]) if PRESSURE in values else {}
     pressures |= {name: values[name] for name in names if name in values}
     return pressures, {name: value for name, value in values.items() if name not in (PRESSURE, *names)}
-
-
-def read_initial_table(value: Any, plant: Any, where: Location) -> Mapping[str, Any]:
-    """The table `initial_state`, which `build_initial_state` reads. Raises ParameterError for anything else."""
-    if not isinstance(value, Mapping):
-        raise ParameterError(
-            f'{where} is {abridged(value)}; it must be a table. Write initial_state = {{ pressure = "0 bar" }}.'
-        )
-    return value
 
 
 def build_initial_state(

@@ -19,7 +19,7 @@ from ...core import ColumnError, Input, ParameterError, abridged
 from ...engine.loop import Driver, SampledSignal, WithDrivers
 from ...engine.loop.inputs import NO_INPUT, InputSignal, Periodic, Schedule, check_input_names
 from ...recording.columns import split_unit
-from ..library import PLANT_READER, Location, custom_field, located_errors, model_class, read_finite_number
+from ..library import PLANT_READER, Location, custom_field, located_errors, model_class, read_finite_number, read_table
 from .values import Number
 
 Points = tuple[tuple[float, float], ...]
@@ -35,13 +35,9 @@ def _read_names(value: Any, plant: Any, where: Location) -> Mapping[str, str]:
 
 def read_drivers(value: Any, plant: Any, where: Location) -> dict[str, Chain]:
     """The drivers of a table by input. Raises ParameterError, UnitError or UnknownNameError."""
-    if not isinstance(value, Mapping):
-        raise ParameterError(
-            f'{where} is {abridged(value)}; it must be a table. Write fill = {{ model = "SolenoidDriver" }} in '
-            f"[{where.table}.{where.key}]."
-        )
-    place = where.inside("")
-    return {name: PLANT_READER.value(item, Chain, place, name) for name, item in value.items()}
+    remedy = f'. Write fill = {{ model = "SolenoidDriver" }} in [{where.table}.{where.key}]'
+    drivers, place = read_table(value, plant, where, remedy), where.inside("")
+    return {name: PLANT_READER.value(item, Chain, place, name) for name, item in drivers.items()}
 
 
 @dataclasses.dataclass(frozen=True)

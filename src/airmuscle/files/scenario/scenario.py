@@ -35,12 +35,12 @@ from ...engine.run import Integrator, Problem, solve
 from ...physics.plant.plant import Plant
 from ...recording import Recording
 from ..library import SCENARIO_TABLES, build_plant, custom_field, is_path, list_plants, plant_tables, read_toml
-from ..library.files import Location, check_keys, located_errors, read_finite_number
+from ..library.files import Location, check_keys, located_errors, read_finite_number, read_table
 from .controller import build_control_loop, signal_units
 from .initial_state import build_initial_state, read_initial_table
 from .inputs import build_input_signal
 from .plant_uncertainty import read_plant_uncertainty
-from .values import Number, read_observed, read_table, required_table, table_reader
+from .values import Number, read_observed, required_table, table_reader
 
 MAX_ROWS = 2_000_000
 """Maximum number of rows of a run that a command writes (chosen): 300 MB of a plant with one muscle."""

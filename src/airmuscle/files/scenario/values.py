@@ -14,7 +14,16 @@ from ...core import ParameterError, abridged, check_known, tree
 from ...engine.run import Integrator
 from ...physics.plant.plant import Plant
 from ...recording.columns import quantity_of
-from ..library import PLANT_READER, Location, TableReader, check_keys, custom_field, read_finite_number, read_text
+from ..library import (
+    PLANT_READER,
+    Location,
+    TableReader,
+    check_keys,
+    custom_field,
+    read_finite_number,
+    read_table,
+    read_text,
+)
 from .initial_state import PRESSURE, pressure_names
 
 MAX_STARTS, MAX_SEED = 10_000, 2**32 - 1
@@ -62,13 +71,6 @@ class BySignal:
         return number(value[0], plant, where), number(value[1], plant, where)
 
 
-def read_table(value: Any, plant: Any, where: Location) -> Mapping[str, Any]:
-    """A table as it is. Raises ParameterError for anything else."""
-    if not isinstance(value, Mapping):
-        raise ParameterError(f"{where} is {abridged(value)}; it must be a table.")
-    return value
-
-
 def table_reader(plant: Plant) -> TableReader:
     """The reader of tables whose fields depend on the plant."""
     return dataclasses.replace(PLANT_READER, known=plant)
@@ -76,10 +78,7 @@ def table_reader(plant: Plant) -> TableReader:
 
 def optional_table(tables: Mapping[str, Any], key: str, location: Location) -> Mapping[str, Any]:
     """A table inside tables; empty if it is missing. Raises ParameterError if the value is not a table."""
-    table = tables.get(key, {})
-    if not isinstance(table, Mapping):
-        raise ParameterError(f"{location}: the table [{key}] is {abridged(table)}; it must be a table.")
-    return table
+    return read_table(tables.get(key, {}), None, f"{location}: the table [{key}]")
 
 
 def required_table(tables: Mapping[str, Any], key: str, location: Location) -> Mapping[str, Any]:

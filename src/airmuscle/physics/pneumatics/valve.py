@@ -46,10 +46,6 @@ class Valve(Orifice):
     )
 
     def mass_flow(self, upstream: Value, downstream: Value, opening: Value, temperature: Value) -> Value:
-        """Mass flow [kg/s] from absolute pressure `upstream` to `downstream` [Pa] of air at `temperature` [K].
-
-        `opening` scales the conductance from 0 (closed) to 1 (fully open). A reversed flow is negative.
-        """
         high, low = ops.maximum(upstream, downstream), ops.minimum(upstream, downstream)
         subsonic = ops.maximum(low - self.critical_ratio * high, 0.0) / (1.0 - self.critical_ratio)
         # Both branches are concave in the pressure difference, so the smaller one is the chord near equal pressures
@@ -103,10 +99,6 @@ class SubsonicIndexValve(Orifice):
     )
 
     def mass_flow(self, upstream: Value, downstream: Value, opening: Value, temperature: Value) -> Value:
-        """Mass flow [kg/s] from absolute pressure `upstream` to `downstream` [Pa] of air at `temperature` [K].
-
-        `opening` scales the conductance from 0 (closed) to 1 (fully open). A reversed flow is negative.
-        """
         high, low = ops.maximum(upstream, downstream), ops.minimum(upstream, downstream)
         chord_range = (1.0 - self.laminar_ratio) * high
         subsonic_range = ops.maximum((1.0 - self.critical_ratio) * high - self.cracking_pressure, chord_range)
