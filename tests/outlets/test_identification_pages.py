@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import itertools
 import re
+import shlex
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from command_line import airmuscle
 
 from airmuscle import read
 from airmuscle.bench import Experiment, InitialConditions, write
@@ -72,36 +73,17 @@ def test_the_code_on_prediction_runs(capsys):
     assert capsys.readouterr().out == "15 N, 39.1 N in row 125\n"
 
 
-def loop(seed):
-    """A slow loop of contraction at 300 kPa of a muscle that rubs."""
-    eps = np.concatenate([np.linspace(a, b, 80) for a, b in itertools.pairwise((0.02, 0.14, 0.08, 0.12, 0.02))])
-    rng = np.random.default_rng(seed)
-    slip = MaxwellSlip((2e4, 1e4), (3e-4, 1.2e-3))
-    force = LAW.force(3e5, eps) - slip.force_along((eps - eps[0]) * 0.3) + 0.5 * rng.standard_normal(eps.size)
-    columns = {
-        "time": 0.2 * np.arange(eps.size),
-        "pressure": np.full(eps.size, 3e5),
-        "contraction": eps,
-        "force": force,
-    }
-    return Recording(columns, f"loop {seed}", {"resting_length": 0.3})
-
-
-def test_the_code_on_hysteresis_runs(capsys):
-    first, second = loop(1), loop(2)
-    everywhere = np.ones(len(first), dtype=bool)
-    found = run(
-        "hysteresis.md",
-        muscle=load("dmsp-20-300").muscle,
-        run=first,
-        second_run=second,
-        recordings=[first, second.with_columns(pressure=np.full(len(second), 4.5e5))],
-        quiet=everywhere,
-        quiet_there=everywhere,
-    )
+def test_the_code_on_hysteresis_runs(tmp_path, monkeypatch, capsys):
+    """Also its command, on the files that the code writes."""
+    monkeypatch.chdir(tmp_path)
+    found = run("hysteresis.md")
     assert isinstance(found["muscle"].friction, MaxwellSlip)
     assert len(found["joint"][0].agreement) == 2
-    assert "justify" in capsys.readouterr().out
+    assert capsys.readouterr().out.strip().endswith("The data justify this friction.")
+    (command,) = re.findall(r"```sh\nairmuscle (hysteresis .*?)\n```", (DOCS / "hysteresis.md").read_text(), re.DOTALL)
+    done = airmuscle(*shlex.split(command.replace("\\\n", " ")))
+    assert done.exit_code == 0, done.output
+    assert "muscle: friction/muscle.toml" in done.stdout
 
 
 def test_the_code_on_studies_runs(tmp_path, monkeypatch, capsys):
