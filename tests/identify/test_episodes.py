@@ -383,6 +383,11 @@ def test_what_forbids_a_fit_is_named(change, message):
         fit_joint(changed(JOINT, **change))
 
 
+def test_the_t_values_of_one_episode_are_no_certainty():
+    """They were 4e14, because one cluster of errors has no scatter."""
+    assert all(2.0 < action.t_value < 100.0 for action in inspect_episodes(made_episodes(1, rows=400)).actions)
+
+
 def test_exchanged_muscles_are_named():
     found = inspect_episodes(JOINT, pairs=((2, 1),))
     assert (

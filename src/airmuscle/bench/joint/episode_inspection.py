@@ -15,6 +15,8 @@ CERTAIN, CLEAR = 5.0, 1.25
 """t-value from which a pressure acts on an angle, and its ratio to that of the next joint (chosen)."""
 TURN, BURST = 10.0, 1e7
 """Greatest angle [rad] of a joint and gauge pressure [Pa] of a muscle (chosen)."""
+PIECES = 20
+"""Independent pieces of the record at least, from which a t-value comes (chosen)."""
 DEAD = 0.01
 """Spread of a reading, relative to the greatest of its kind, up to which it is none (chosen)."""
 JUMP = np.pi
@@ -204,7 +206,7 @@ def _block(run: Episode, step: float) -> tuple[Array, Array, Array] | None:
 
 
 def _regress(blocks: Sequence[tuple[Array, Array, Array]], delay: int) -> tuple[Array, float]:
-    """t-values (M, J) of the pressures, with errors that are independent between episodes only, and the residual."""
+    """t-values (M, J) of the pressures, with errors that are independent between episodes or PIECES only; the residual."""
     rows = slice(4, -MAX_DELAY - 1)
     x = [np.concatenate([p[4 + delay : len(p) - MAX_DELAY - 1 + delay], s[rows]], axis=1) for _, s, p in blocks]
     y = [a[rows] for a, _, _ in blocks]
@@ -215,6 +217,7 @@ def _regress(blocks: Sequence[tuple[Array, Array, Array]], delay: int) -> tuple[
     coefficients = inverse @ (design.T @ target)
     residual = target - design @ coefficients
     muscles, ends = blocks[0][2].shape[1], np.cumsum([len(each) for each in x])[:-1]
+    ends = ends if len(x) >= PIECES else np.linspace(0, len(whole), PIECES + 1).astype(int)[1:-1]
     pieces = zip(np.split(design, ends), np.split(residual, ends), strict=True)
     scores = np.array([a.T @ r for a, r in pieces])
     t_values = np.empty((muscles, target.shape[1]))
