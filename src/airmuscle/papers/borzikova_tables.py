@@ -221,13 +221,11 @@ def conditioning_table(data: am.Recording) -> Table:
         {
             "scaling": list(designs),
             "rank of 15": [c.rank for c in designs.values()],
-            "condition number [1]": [_condition_text(c.condition) for c in designs.values()],
+            "condition number [1]": [
+                "infinite" if np.isinf(c.condition) else f"{c.condition:.1e}" for c in designs.values()
+            ],
         },
     )
-
-
-def _condition_text(condition: float) -> str:
-    return "infinite" if np.isinf(condition) else f"{condition:.1e}"
 
 
 def violation_table(laws: Mapping[str, am.characteristic.ContractionLaw]) -> Table:

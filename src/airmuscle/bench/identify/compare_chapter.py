@@ -188,7 +188,8 @@ def _fold_figure(comparison: Comparison) -> Any:
         errors = [error_of[fold] for fold in folds]
         axes.plot(errors, MARKERS[i], color=LINES[i], linestyle=":", linewidth=0.8, label=contender.candidate.name)
     common = _common_word(folds)
-    axes.set_xticks(range(len(folds)), [_shorten(name[len(common) :]) for name in folds], rotation=30, ha="right")
+    own = [name[len(common) :] for name in folds]
+    axes.set_xticks(range(len(own)), [n if len(n) <= 22 else f"...{n[-20:]}" for n in own], rotation=30, ha="right")
     axes.set(xlabel=common.strip(), ylabel=f"rms error, {comparison.leave_out.group_name} left out [N]", yscale="log")
     legend_outside(axes)
     return figure
@@ -204,10 +205,6 @@ def _common_word(names: Sequence[str]) -> str:
     """The first word of the names with the blank behind it, if all have the same; otherwise an empty text."""
     word = names[0].partition(" ")[0] + " "
     return word if all(name.startswith(word) for name in names) else ""
-
-
-def _shorten(name: str) -> str:
-    return name if len(name) <= 22 else f"...{name[-20:]}"
 
 
 def residual_figure(fit: Fit) -> Any:

@@ -155,8 +155,9 @@ def collect_notes(problem: FitProblem, statistics: FitStatistics, loss: Loss, dr
     notes = _row_notes(problem, statistics, dropped)
     notes += _length_notes(problem)
     notes += [
-        f"{name} is on its bound; its value is not determined by the data."
-        for name in _parameters_on_bound(problem, statistics)
+        f"{problem.leaves[i].path} is on its bound; its value is not determined by the data."
+        for i, on_bound in zip(problem.free, statistics.on_bound, strict=True)
+        if on_bound
     ]
     if not np.isfinite(statistics.sigma):
         notes.append("There are as many rows as parameters, so the standard errors are unknown.")
@@ -189,7 +190,3 @@ def _length_notes(problem: FitProblem) -> list[str]:
         for leaf in problem.leaves
         if leaf.declared.name == "resting_length" and length is not None and abs(leaf.value - float(length)) > 1e-6
     ]
-
-
-def _parameters_on_bound(problem: FitProblem, statistics: FitStatistics) -> list[str]:
-    return [problem.leaves[i].path for i, on_bound in zip(problem.free, statistics.on_bound, strict=True) if on_bound]

@@ -235,14 +235,11 @@ def make_problem(
         signs = -signs  # a smaller force at the same pressure means that the stated force needs a higher pressure
     leaves = tuple(tree.leaves(law))
     _check_known(law, leaves, fixed)
-    free = tuple(i for i, leaf in enumerate(leaves) if leaf.declared.fitted and not _is_fixed(leaf, fixed))
+    known = [{leaf.path, leaf.path.partition("[")[0]} & set(fixed) for leaf in leaves]
+    free = tuple(i for i, leaf in enumerate(leaves) if leaf.declared.fitted and not known[i])
     measured = int(np.count_nonzero(signs == 0))
     _check_row_count(law, data, len(free), measured)
     return FitProblem(law, quantity, data, target, signs, weights, leaves, free)
-
-
-def _is_fixed(leaf: Leaf, fixed: Collection[str]) -> bool:
-    return leaf.path in fixed or leaf.path.partition("[")[0] in fixed
 
 
 def _check_known(law: Characteristic, leaves: Sequence[Leaf], fixed: Collection[str]) -> None:

@@ -206,7 +206,7 @@ def _block(run: Episode, step: float) -> tuple[Array, Array, Array] | None:
 
 
 def _regress(blocks: Sequence[tuple[Array, Array, Array]], delay: int) -> tuple[Array, float]:
-    """t-values (M, J) of the pressures, with errors that are independent between episodes or PIECES only; the residual."""
+    """t-values (M, J) of the pressures, with errors independent between episodes or PIECES only; and the residual."""
     rows = slice(4, -MAX_DELAY - 1)
     x = [np.concatenate([p[4 + delay : len(p) - MAX_DELAY - 1 + delay], s[rows]], axis=1) for _, s, p in blocks]
     y = [a[rows] for a, _, _ in blocks]

@@ -104,7 +104,9 @@ def perturbed_family(
     if perturbations.delay and not isinstance(loop.controller, ControlLaw):
         notes.append("no case with a delay: the controller is no ControlLaw")
     elif perturbations.delay:
-        delayed = dataclasses.replace(loop, controller=_delayed(loop.controller, perturbations.delay))
+        law: Any = loop.controller
+        sensors = tuple(ColumnSensor(name, delay=perturbations.delay) for name in law.measured_columns)
+        delayed = dataclasses.replace(loop, controller=WithSensors(law, sensors))
         cases.append(LoopCase(f"delay {perturbations.delay}", plant, delayed, cases[0].initial_state, "law"))
     return PerturbedFamily(tuple(cases), tuple(notes))
 
@@ -134,10 +136,6 @@ def _leaking(plant: Plant, share: float) -> Plant | None:
             return None
         circuits.append(WithLeak(circuit, Valve(share * max(known), LEAK_CRITICAL_RATIO)))
     return dataclasses.replace(plant, circuit=tuple(circuits) if isinstance(plant.circuit, tuple) else circuits[0])
-
-
-def _delayed(law: Any, delay: int) -> WithSensors:
-    return WithSensors(law, tuple(ColumnSensor(name, delay=delay) for name in law.measured_columns))
 
 
 def _draws(

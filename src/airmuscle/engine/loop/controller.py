@@ -123,7 +123,8 @@ def failure_notes(owner: str, program: str, failures: int) -> tuple[str, ...]:
 
 def named_signal_units(controller: Any) -> dict[str, str]:
     """Units of the signals that a controller and the laws inside it name, and that are no columns of a plant."""
-    return {name: unit for part in _parts(controller, "") for name, unit in _named(part[1]).items()}
+    laws = [part for _, part in _parts(controller, "") if isinstance(part, Controller)]
+    return {name: unit for law in laws for name, unit in law.signal_units.items()}
 
 
 def parameter_units(controller: Any, units: Mapping[str, str]) -> dict[str, str]:
@@ -159,10 +160,6 @@ def _unit_or_one(part: Any, declared: Parameter, index: int, units: Mapping[str,
         return unit_of(part, declared, index, units)
     except KeyError:
         return "1"
-
-
-def _named(part: Any) -> Mapping[str, str]:
-    return part.signal_units if isinstance(part, Controller) else {}
 
 
 def _parts(thing: Any, path: str) -> Iterator[tuple[str, Any]]:

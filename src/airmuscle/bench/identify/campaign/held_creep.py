@@ -39,7 +39,7 @@ def fit_held_creep(recordings: Sequence[Recording], *, law: ForceLaw | None = No
     Holds at a constant length are fitted together along the recorded motion; without any, the longest hold under a
     constant load gives the elements. A hold without a motion before it has a course but no stiffness.
     """
-    holds = [(each, _longest(each)) for each in recordings]
+    holds = [(each, max(find_holds(each), key=lambda hold: len(hold.interval), default=None)) for each in recordings]
     sentences, reasons = [], list[str]()
     held, loaded = list[tuple[str, HeldRows]](), list[tuple[float, str, CreepElements]]()
     for recording, hold in holds:
@@ -66,10 +66,6 @@ def free_of_creep(elements: CreepElements, recordings: Sequence[Recording]) -> l
 
 def _has_path(recording: Recording) -> bool:
     return "time" in recording and isinstance(recording.constants.get("resting_length"), float | int)
-
-
-def _longest(recording: Recording) -> Hold | None:
-    return max(find_holds(recording), key=lambda hold: len(hold.interval), default=None)
 
 
 def _sentence(recording: Recording, hold: Hold | None) -> str:

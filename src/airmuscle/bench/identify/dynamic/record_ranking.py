@@ -216,10 +216,6 @@ def _precision(information: Array, names: Sequence[str], pair: tuple[str, str]) 
     return PairPrecision((float(first), float(second)), float(covariance[i, k] / (first * second)))
 
 
-def _kind(name: str) -> str:
-    return name.rpartition(".")[2].partition("[")[0]
-
-
 def _most_correlated(information: Array, names: Sequence[str]) -> tuple[str, str]:
     """The most correlated pair of a valve and a wall parameter, else of any two. Raises IdentificationError."""
     if len(names) < 2:
@@ -229,7 +225,8 @@ def _most_correlated(information: Array, names: Sequence[str]) -> tuple[str, str
     covariance = np.linalg.inv(information)
     deviations = np.sqrt(np.diag(covariance))
     strength = np.abs(covariance / np.outer(deviations, deviations))
-    valve, wall = ([i for i, name in enumerate(names) if _kind(name) in kinds] for kinds in (VALVE, WALL))
+    fields = [name.rpartition(".")[2].partition("[")[0] for name in names]
+    valve, wall = ([i for i, field in enumerate(fields) if field in kinds] for kinds in (VALVE, WALL))
     pairs = [(i, k) for i in valve for k in wall] or [(i, k) for i in range(len(names)) for k in range(i)]
     i, k = max(pairs, key=lambda pair: strength[pair])
     return names[i], names[k]
