@@ -182,6 +182,23 @@ def test_records_in_different_ambient_air():
     assert "ambient" not in stage.verdict
 
 
+def test_standard_errors_contain_the_scatter_of_records_from_rooms_of_unstated_temperature():
+    """The rooms are 3 K warmer than supposed on average: conductances are wrong by many standard errors of the rows."""
+    rooms = (Ambient(temperature=each) for each in (290.15, 296.15, 302.15))
+    recordings = [
+        record(c, BOTH, i, ambient=room, stated=False)
+        for i, (c, room) in enumerate(zip(CONTRACTIONS, rooms, strict=True))
+    ]
+    fit = stage_of(recordings).fit
+    for valve, true in (("fill", 3e-9), ("discharge", 3.6e-9)):
+        estimate = fit[f"circuit.{valve}.conductance"]
+        assert abs(estimate.value - true) < 2.5 * estimate.stderr
+        assert 0.003 * true < estimate.stderr < 0.02 * true
+    (said,) = [note for note in fit.notes if "scatter between 3 records" in note]
+    assert "circuit.fill.conductance" in said
+    assert "temperature of the room" in said
+
+
 def test_an_ambient_pressure_that_no_record_states_is_said():
     silent = stage_of([record(c, BOTH, i, stated=False) for i, c in enumerate(CONTRACTIONS)])
     assert "No record states the ambient pressure: 101.3 kPa are supposed" in silent.verdict

@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import airmuscle
-from dynamic_study import VALVES, noisy_run, plant_table, run_table, variant
+from dynamic_study import HELD, STUDY, VALVES, noisy_run, plant_table, run_table, variant
 
 from airmuscle.bench import CrossPrediction, InitialValue, StartTime, describe_cross_predictions, read_csv, write
 from airmuscle.core import leaves
@@ -120,6 +120,23 @@ def test_cross_predictions_say_whether_the_plant_is_identified():
     said = describe_cross_predictions([prediction(1.1), prediction(4.0)])
     assert "run1.csv is 4 times the residual of the joint fit" in said
     assert "do not identify the plant" in said
+
+
+def test_three_records_whose_valves_differ_have_standard_errors_of_their_scatter(tmp_path):
+    rng, files = np.random.default_rng(2), ("a.csv", "b.csv", "c.csv")
+    for file, conductance in zip(files, (2.9e-9, 3e-9, 3.1e-9), strict=True):
+        (tmp_path / "truth.toml").write_text(
+            plant_table(HELD, exponent=1.2, conductance=conductance) + INPUT + run_table("0 bar"), encoding="utf-8"
+        )
+        write(Recording(noisy_run(tmp_path / "truth.toml", rng, {"pressure": 500.0}), file), tmp_path / file)
+    start = plant_table(HELD, exponent=1.2, conductance=4e-9) + STUDY.replace(', "gas.exponent"', "")
+    records = "".join(f'[[record]]\nfile = "{file}"\ninitial_state = {{ pressure = "0 bar" }}\n' for file in files)
+    (tmp_path / "study.toml").write_text(start + records, encoding="utf-8")
+    done = airmuscle("fit-dynamic", tmp_path / "study.toml", "--out", tmp_path / "fit", "--json")
+    result = json.loads(done.stdout)["dynamic"]
+    (conductance,) = result["estimates"]
+    assert conductance["standard_error"] == pytest.approx(1e-10 / np.sqrt(3.0), rel=0.1)
+    assert any("scatter between 3 records" in note for note in result["notes"])
 
 
 def test_what_cannot_be_told_apart_is_printed_with_its_experiment(folder, tmp_path):

@@ -198,6 +198,8 @@ def in_fitted_quantity(loss: Loss, law: Characteristic, points: FitPoints) -> Lo
 
 Progress = Callable[[str, float], None]
 Scores = list[tuple[Score, ...]]
+_Task = tuple[Candidate, Sequence[float]]
+"""A candidate with the errors [N] above which it is not cross-validated further."""
 
 
 def score_candidates(
@@ -223,7 +225,7 @@ def score_candidates(
             if pool is not None:  # those that take longest first
                 groups.sort(key=lambda group: -sum(1 for i in group for _ in tree.leaves(candidates[i].law)))
             tasks = [
-                [_Task(candidates[i], tuple(max_excess(candidates[i]) * each for each in lowest)) for i in group]
+                [(candidates[i], [max_excess(candidates[i]) * each for each in lowest]) for i in group]
                 for group in groups
             ]
             for position, scores in distribution.completed(tasks):
@@ -253,16 +255,8 @@ def is_fitted_by_projection(candidate: Candidate) -> bool:
     return bool(fields) and not isinstance(candidate.law, PooledLengthLaw) and any(name not in fields for name in names)
 
 
-@dataclasses.dataclass(frozen=True)
-class _Task:
-    """A candidate with the errors [N] above which it is not cross-validated further."""
-
-    candidate: Candidate
-    limits: Sequence[float]
-
-
 def _score_tasks(common: tuple[Sequence[ComparedPoints], Loss], tasks: Sequence[_Task]) -> Scores:
-    return [score_candidate(task.candidate, common[0], common[1], task.limits) for task in tasks]
+    return [score_candidate(candidate, *common, limits) for candidate, limits in tasks]
 
 
 def _of_one_population(candidates: Sequence[Candidate], indices: Sequence[int]) -> list[list[int]]:

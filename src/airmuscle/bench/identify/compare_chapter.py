@@ -3,7 +3,7 @@
 import dataclasses
 import re
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -84,14 +84,10 @@ def select_for_both(
 
     best = min(names, key=lambda name: (max(ratios(name)), rankings[0][name].parameter_count))
     limit = max(1 + MAX_JOINT_EXCESS, *ratios(best))
-    equivalent = [name for name in names if max(ratios(name)) <= limit and _equivalent_for_both(name, best, rankings)]
+    within = [name for name in names if max(ratios(name)) <= limit]
+    equivalent = [name for name in within if all(is_equivalent(each[name], each[best]) for each in rankings)]
     chosen = min(equivalent, key=lambda name: (rankings[0][name].parameter_count, max(ratios(name))))
     return JointSelection(comparisons, tuple(ranking[chosen] for ranking in rankings), ratios(chosen))
-
-
-def _equivalent_for_both(name: str, best: str, rankings: Sequence[Mapping[str, RankedModel]]) -> bool:
-    """Whether a law is equivalent to the best one for each purpose."""
-    return all(is_equivalent(ranking[name], ranking[best]) for ranking in rankings)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -15,7 +15,7 @@ from ...report.chapter import NamedValue
 from ..checks import find_suspicious
 from ..checks.bench_rows import file_list
 from ..checks.contractions import without_missing_codes
-from ..segment import Outlier, estimate_noise, estimate_sensors, find_outliers, remembered
+from ..segment import estimate_noise, estimate_sensors, find_outliers, remembered
 from .branch_residuals import SensorDelay, delay_notes, find_delay
 from .contradictions import contradiction_notes, repeatability
 from .matched_rows import match_rows
@@ -110,7 +110,10 @@ def outlier_notes(recordings: Sequence[Recording]) -> list[str]:
     if not found or (len(found) < MIN_SHARE * rows and rms < MIN_RMS * greatest):
         return []
     files = len({run.origin for run, _ in found})
-    examples = "; ".join(_describe_outlier(run, outlier) for run, outlier in found[:3])
+    examples = "; ".join(
+        f"{run.origin}, row {each.row + 1} ({each.value:.4g} N, neighbours {each.expected:.4g} N)"
+        for run, each in found[:3]
+    )
     return [
         HintedText(
             f"Suspected outliers of the force pull the law: {len(found)} of {rows} rows, in {files} of "
@@ -119,10 +122,6 @@ def outlier_notes(recordings: Sequence[Recording]) -> list[str]:
             Hint("To reduce their weight", "loss", Huber(float(f"{HUBER * sensors['force'].std:.2g}"))),
         )
     ]
-
-
-def _describe_outlier(run: Recording, outlier: Outlier) -> str:
-    return f"{run.origin}, row {outlier.row + 1} ({outlier.value:.4g} N, neighbours {outlier.expected:.4g} N)"
 
 
 def saturation_notes(recordings: Sequence[Recording]) -> list[str]:

@@ -159,7 +159,8 @@ def _warn(message: str) -> None:
 
 def _magnitude(recording: Recording, name: str) -> float:
     """The 95th percentile of the absolute values of a column [SI]; absolute pressures are compared as written."""
-    offset = 0.0 if quantity_of(name) is None else _unit_offset(name, recording.units[name])
+    is_pressure = quantity_of(name) is not None and name.rpartition(".")[2] == "pressure"
+    offset = conversion(recording.units[name], "Pa").offset if is_pressure else 0.0
     return float(np.quantile(np.abs(recording.columns[name] - offset), 0.95))
 
 
@@ -169,10 +170,6 @@ def _unit_factor(name: str, unit: str) -> float:
         return conversion(unit, quantity.unit if quantity else "1").factor
     except UnitError:
         return conversion(unit, "kg").factor * STANDARD_GRAVITY  # a load stated as a mass
-
-
-def _unit_offset(name: str, unit: str) -> float:
-    return conversion(unit, "Pa").offset if name.rpartition(".")[2] == "pressure" else 0.0
 
 
 def _pressure_reference(unit: str) -> str:

@@ -160,19 +160,11 @@ def _runs_at_levels(recording: Recording, kind: RunKind, bands: dict[str, float]
     runs = []
     intervals = list(level_intervals(recording[name], bands[name]))
     for interval in _join_ripple(recording, intervals, bands) if kind == ISOBARIC else intervals:
-        swept = tuple(
-            other
-            for other, band in bands.items()
-            if other != name and _spread(recording[other][interval.rows]) > max(band, _min_sweep(recording, other))
-        )
+        ranges = {other: SWEEP_FRACTION * float(np.ptp(recording[other])) for other in bands if other != name}
+        swept = tuple(n for n, part in ranges.items() if _spread(recording[n][interval.rows]) > max(bands[n], part))
         if len(interval) >= MIN_ROWS and swept:
             runs.append(_constant_run(recording, interval, kind, name, swept))
     return tuple(runs)
-
-
-def _min_sweep(recording: Recording, name: str) -> float:
-    """The minimum change of a swept quantity [SI], from its range in the whole recording."""
-    return SWEEP_FRACTION * float(np.ptp(recording[name]))
 
 
 def moved_column(recording: Recording) -> str | None:

@@ -239,7 +239,7 @@ def _upper_limit(runs: list[Array], resolution: float) -> tuple[float, int]:
     if rows_at_top < MIN_SATURATED_ROWS:
         return math.inf, 0
     between = [values[(values < top - tolerance) & (values > combined.min() + tolerance)] for values in runs]
-    rows_elsewhere = max(_longest_constant(values, tolerance) for values in between)
+    rows_elsewhere = 1 + max(_longest_interval(np.abs(np.diff(values)) <= tolerance) for values in between)
     noise = max(estimate_noise(values) for values in between)
     is_noisy = noise > max(MIN_NOISE * resolution, 1e-6 * float(np.ptp(combined)))
     saturated = is_noisy and rows_at_top > 2 * rows_elsewhere
@@ -249,8 +249,3 @@ def _upper_limit(runs: list[Array], resolution: float) -> tuple[float, int]:
 def _longest_interval(mask: Mask) -> int:
     """The length of the longest interval of true rows."""
     return max((len(interval) for interval in true_intervals(mask)), default=0)
-
-
-def _longest_constant(values: Array, tolerance: float) -> int:
-    """The maximum number of consecutive rows with the same reading."""
-    return 1 + _longest_interval(np.abs(np.diff(values)) <= tolerance)

@@ -55,7 +55,9 @@ def sobol_indices(metric: Array, parameters: int, seed: int = 0) -> SobolIndices
     terms = _summands(table[complete])
     count = len(terms)
     undefined = np.full(parameters, np.nan)
-    if not _varies(table[complete]):
+    known = table[complete]
+    varies = len(known) and np.ptp(known) > 1e-12 * np.abs(known).max() and np.ptp(known[:, [0, -1]]) > 0
+    if not varies:  # by more than rounding errors
         no_interval = np.tile(undefined, (2, 1))
         return SobolIndices(undefined, undefined, no_interval, no_interval, count, len(table) - count)
     first, total = _indices(terms.mean(axis=0)[None, :], parameters)
@@ -74,11 +76,6 @@ def _summands(table: Array) -> Array:
     table = table - table[:, [0, -1]].mean() if len(table) else table
     a, mixed, b = table[:, :1], table[:, 1:-1], table[:, -1:]
     return np.hstack([b * (mixed - a), 0.5 * (a - mixed) ** 2, 0.5 * (a + b), 0.5 * (a * a + b * b)])
-
-
-def _varies(table: Array) -> bool:
-    """Whether the metric varies by more than rounding errors."""
-    return bool(len(table) and np.ptp(table) > 1e-12 * np.abs(table).max() and np.ptp(table[:, [0, -1]]) > 0)
 
 
 def _indices(means: Array, parameters: int) -> tuple[Array, Array]:

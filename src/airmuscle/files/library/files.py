@@ -161,7 +161,7 @@ def complete_name(name: str, known: Iterable[str], kind: str) -> str:
     known = tuple(known)
     if name in known:
         return name
-    folded = _folded(name)
+    folded = "-".join(name.lower().replace("_", " ").split())  # the spelling of the library
     if folded in known:
         return folded
     matches = [candidate for candidate in known if folded and candidate.lower().startswith(folded)]
@@ -178,11 +178,6 @@ def _file_in_folder(name: str) -> str:
     files = (Path(name) / file for file in ("muscle.toml", "scenario.toml"))
     found = next((file.as_posix() for file in files if 0 < len(name) <= MAX_NAME and file.is_file()), "")
     return f" '{name}' is a folder; write {found}." if found else ""
-
-
-def _folded(name: str) -> str:
-    """A name in the spelling of the library: lower case, with hyphens."""
-    return "-".join(name.lower().replace("_", " ").split())
 
 
 def _names_with(part: str, known: Iterable[str]) -> str:

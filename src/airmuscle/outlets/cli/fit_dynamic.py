@@ -66,6 +66,7 @@ def fit_dynamic(study: Study, request: DynamicFitRequest, out: Folder = Path("dy
         echo("  " + ", ".join(f"{count} {noun}{'s' * (count != 1)}" for count, noun in counts), err=True)
     fit = loaded.fit()
     cross = loaded.cross_predictions(fit)
+    fit = fit.with_scatter_of_records([each.common for each in cross])
     profiles = [fit.profile(name, request.points) for name in _profiled_names(fit, request.profile)]
     count = len(loaded.experiments)
     names = ["scenario.toml"] if count == 1 else [f"scenario-{i + 1}.toml" for i in range(count)]

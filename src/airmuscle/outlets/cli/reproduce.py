@@ -70,7 +70,10 @@ def _print_chapter(chapter: Chapter) -> None:
         text = f"{question} {to_plain(answer)}"
         echo(textwrap.fill(text, terminal_width(), subsequent_indent="  ", break_on_hyphens=False))
     found = [(kind, each) for kind in Kind for each in statements(chapter.claims, kind)]
-    values = [(_expected(each), _reproduced(each), f"{MARKS[each.verdict]} {each.verdict}") for _, each in found]
+    values = [
+        (format_published(s.cases[0], with_tolerance=False), _reproduced(s), f"{MARKS[s.verdict]} {s.verdict}")
+        for _, s in found
+    ]
     columns = zip(HEADERS[1:], *values, strict=True)
     room = max(MIN_CLAIM, terminal_width() - sum(max(len(str(cell)) for cell in column) + GAP for column in columns))
     texts = (f"{PREFIXES[kind]}{to_plain(each.claim)}" for kind, each in found)
@@ -87,10 +90,6 @@ def _print_counts(claims: list[Claim]) -> None:
         listed = ", ".join(f"{count} {verdict}" for verdict, count in counts.items())
         if total:
             echo(f"{total} {kind.value}{'s' if total > 1 else ''}: {listed}")
-
-
-def _expected(statement: Statement) -> str:
-    return format_published(statement.cases[0], with_tolerance=False)
 
 
 def _reproduced(statement: Statement) -> str:

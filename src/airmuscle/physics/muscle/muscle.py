@@ -223,7 +223,8 @@ class Muscle(NotebookDisplay):
             - self.damper.force(pressure, contraction, speed)
             - self.friction_force(pressure, speed, state)
         )
-        return total - self.creep.force({**self._relaxed_creep(), **state}) if self.creep.states else total
+        relaxed = {s.name: 0.0 for s in self.creep.states}
+        return total - self.creep.force({**relaxed, **state}) if relaxed else total
 
     def static_force(self, pressure: Value, contraction: Value) -> Value:
         """Sum of the forces of all elements and the end stop [N] at zero speed, friction and creep relaxed."""
@@ -236,9 +237,6 @@ class Muscle(NotebookDisplay):
 
     def _bristle_state(self, state: Values) -> dict[str, Value]:
         return {s.name: state.get(s.name, 0.0) for s in self.friction.states}
-
-    def _relaxed_creep(self) -> dict[str, Value]:
-        return {s.name: 0.0 for s in self.creep.states}
 
     def stiffness(self, pressure: Value, contraction: Value) -> Value:
         """Static stiffness -dF/deps at constant pressure [N]; divide by the resting length for N/m.

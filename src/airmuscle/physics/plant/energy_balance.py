@@ -147,12 +147,9 @@ class WithEnergyMeters(System):
             **plant.outputs_of(at),
             "kinetic_energy": plant.mechanism.kinetic_energy(state, state),
             "potential_energy": plant.mechanism.potential_energy(state),
-            "air_energy": sum(self._available_energy(muscle) for muscle in at.muscles),
+            "air_energy": sum(plant.gas.available_energy(m.states, m.volume, plant.ambient) for m in at.muscles),
             "air_total": total_air(own),
         }
-
-    def _available_energy(self, muscle: MuscleState) -> Value:
-        return self.plant.gas.available_energy(muscle.states, muscle.volume, self.plant.ambient)
 
 
 def total_air(state: Mapping[str, Any]) -> Value:

@@ -168,7 +168,7 @@ def _fit_elements(
             "hold the pressure constant during the motion and after it, because a pressure step also changes the force",
         )
     elements = CreepElements(tuple(stiffnesses.tolist()), tuple(times.tolist()))
-    modelled = _modelled(holds, times, coefficients)
+    modelled = [matrix @ coefficients for matrix in _matrices(holds, times)]
     return _build(holds, elements, _standard_errors(holds, times, coefficients, rest), fits, modelled)
 
 
@@ -187,10 +187,6 @@ def _linear_part(holds: Sequence[HeldRows], times: Array) -> tuple[Array, Array]
     target = np.concatenate([hold.recording["force"] for hold in holds])
     coefficients = np.linalg.lstsq(matrix, target, rcond=None)[0]
     return coefficients, matrix @ coefficients - target
-
-
-def _modelled(holds: Sequence[HeldRows], times: Array, coefficients: Array) -> list[Array]:
-    return [matrix @ coefficients for matrix in _matrices(holds, times)]
 
 
 def _standard_errors(holds: Sequence[HeldRows], times: Array, coefficients: Array, residuals: Array) -> Array:

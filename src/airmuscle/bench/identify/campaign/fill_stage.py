@@ -10,7 +10,7 @@ from ....engine.loop.inputs import Schedule
 from ....physics.muscle.geometry import Geometry
 from ....physics.plant.plant import Plant
 from ....physics.pneumatics import FillDischarge, WithTubes
-from ..dynamic import DynamicFit, Experiment, fit_tube
+from ..dynamic import DynamicFit, Experiment, cross_predict, fit_tube
 from ..dynamic.experiment import describe_ambient
 from . import fill_plants as plants
 from . import fill_records as fills
@@ -214,11 +214,13 @@ def _fit_jointly(
     if valves.both and (reason := fills.poor_ratios(fit)):
         valves = dataclasses.replace(valves, common_ratio=reason)
         fit = _fit_common(records, experiments, everything, valves)
-    cross = []
-    for i in everything if len(records) > 1 else ():
-        part = _fit_common(records, experiments, [k for k in everything if k != i], valves)
-        cross.append(_prediction_rms(fit, part, i))
-        progress(0.5 + 0.5 * (i + 1) / len(records))
+
+    def fit_to_others(chosen: Sequence[int]) -> DynamicFit:
+        progress(0.5 + 0.5 * (sum(everything) - sum(chosen)) / len(records))
+        return _fit_common(records, experiments, chosen, valves)
+
+    predictions = cross_predict(fit, fit_to_others)
+    fit = fit.with_scatter_of_records([each.common for each in predictions])
     contractions = np.array([plants.held_contraction(record) for record in records])
     supposed = (
         *([fills.describe_supply(fit)] if valves.sinks else []),
@@ -226,10 +228,9 @@ def _fit_jointly(
         *valves.supposed,
         *describe_ambient([record.recording for record in records]),
     )
-    others = fills.fill_baselines(fit) if cross else ()
-    return FillStage(
-        fit, tuple(records), tuple(experiments), geometry, estimate, contractions, tuple(cross), others, supposed
-    )
+    cross = tuple(rms for each in predictions for rms in each.rms.values())
+    others = fills.fill_baselines(fit) if len(cross) == len(records) else ()
+    return FillStage(fit, tuple(records), tuple(experiments), geometry, estimate, contractions, cross, others, supposed)
 
 
 def _fit_common(
@@ -286,15 +287,3 @@ def _with_tube(experiments: Sequence[Experiment], valves: fills.ValveUnknowns, f
     guess = dataclasses.replace(plant, circuit=WithTubes(plants.valves_of(plant.circuit), plants.tube_guess(plant)))
     fit = fit_tube(guess, lambda changed, _: fitted(divided(changed), unknowns))
     return fit, divided(fit.problem.record_models[0].plant), unknowns
-
-
-def _prediction_rms(fit: DynamicFit, part: DynamicFit, record: int) -> float:
-    """Rms error [Pa] of a record for the common parameters of another fit, with its own start time."""
-    values = fit.values.copy()
-    names = [estimate.name for estimate in fit.estimates]
-    for estimate in part.estimates:
-        if "record" not in estimate.name:
-            values[names.index(estimate.name)] = estimate.value
-    model = fit.problem.record_models[record]
-    differences = model.evaluate(values).values[:, 0] - model.experiment.recording["pressure"]
-    return float(np.sqrt(np.mean(differences**2)))

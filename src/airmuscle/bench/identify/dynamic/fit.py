@@ -25,7 +25,6 @@ from .experiment import (
     has_standard_ambient,
     make_unknowns,
 )
-from .levenberg_marquardt import LevenbergMarquardt
 from .problem import MAX_RUNS, DynamicFitProblem
 from .record_model import RecordModel, count_readings, separate_residuals
 from .reliability import describe_bounds, describe_flatness, describe_optima, distinct_optima
@@ -131,18 +130,13 @@ def _solve_all(problem: DynamicFitProblem, guesses: Sequence[Array]) -> list[tup
         return [problem.solve(guesses[0])]
     pool = ThreadPoolExecutor(min(len(guesses), os.cpu_count() or 1))
     try:
-        searches = list(pool.map(lambda guess: _run_search(problem.search(guess), SCREENING_RUNS), guesses))
+        searches = list(pool.map(lambda guess: problem.search(guess).run(SCREENING_RUNS), guesses))
         lowest = min(search.cost for search in searches)
         continued = [s for s in searches if not s.finished and s.cost <= SCREENING_RATIO * lowest]
-        list(pool.map(lambda search: _run_search(search, MAX_RUNS), continued))
+        list(pool.map(lambda search: search.run(MAX_RUNS), continued))
         return [(search.x, search.cost) for search in searches]
     finally:
         pool.shutdown(cancel_futures=True)
-
-
-def _run_search(search: LevenbergMarquardt, max_runs: int) -> LevenbergMarquardt:
-    search.run(max_runs)
-    return search
 
 
 def _check_row_count(problem: DynamicFitProblem) -> None:
@@ -225,11 +219,13 @@ MAX_RATIO = 3.0
 @dataclasses.dataclass(frozen=True)
 class CrossPrediction:
     """A record predicted by the common parameters of a fit to the other records, with its own unknowns of the joint
-    fit, such as start time and supply pressure: rms errors and rms residuals of the joint fit by quantity [SI]."""
+    fit, such as start time and supply pressure: rms errors and rms residuals of the joint fit by quantity [SI], and
+    those parameters."""
 
     record: str
     rms: Mapping[str, float]
     fitted: Mapping[str, float]
+    common: Mapping[str, float] = dataclasses.field(default_factory=dict)
 
     @property
     def ratio(self) -> float:
@@ -261,14 +257,12 @@ def cross_predict(fit: DynamicFit, refit: Callable[[Sequence[int]], DynamicFit])
         except AirmuscleError:
             continue
         names = fit.problem.record_models[i].names
-        common = {e.name: e for e in part.estimates if OF_RECORD not in e.name}
-        estimates = tuple(
-            dataclasses.replace(e, value=common[e.name].value) if e.name in common else e for e in fit.estimates
-        )
+        common = {e.name: e.value for e in part.estimates if OF_RECORD not in e.name}
+        estimates = tuple(dataclasses.replace(e, value=common.get(e.name, e.value)) for e in fit.estimates)
         other = dataclasses.replace(fit, estimates=estimates)
         origin = fit.problem.record_models[i].experiment.recording.origin
         rms, fitted = ({name: each.rms(name, i) for name in names} for each in (other, fit))
-        predictions.append(CrossPrediction(origin, rms, fitted))
+        predictions.append(CrossPrediction(origin, rms, fitted, common))
     return tuple(predictions)
 
 

@@ -12,7 +12,7 @@ Springer 1978 (scaling by D); Nielsen, H. B., Damping parameter in Marquardt's m
 """
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -76,10 +76,11 @@ class LevenbergMarquardt:
             self.x, equations or _NormalEquations(np.inf, np.zeros((start.size, start.size)), np.zeros(start.size))
         )
 
-    def run(self, max_evaluations: int) -> None:
+    def run(self, max_evaluations: int) -> Self:
         """Search until convergence, or until the residuals were evaluated `max_evaluations` times in total."""
         while not self.finished and self._evaluations < max_evaluations:
             self._step()
+        return self
 
     def _accept(self, x: Array, equations: _NormalEquations) -> None:
         self.x, (self.cost, self._normal, self._gradient) = x, equations

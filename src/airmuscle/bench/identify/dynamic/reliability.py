@@ -1,4 +1,4 @@
-"""Reliability of a dynamic fit beyond its standard errors: other optima of the searches, and the effect of bounds.
+"""Reliability of a dynamic fit beyond its standard errors: other optima, the effect of bounds, scatter of records.
 
 Standard errors describe the curvature at one optimum. They contain neither another optimum that fits almost as well nor
 the effect of an unknown on its bound, whose sensitivity follows from the normal equations of the others:
@@ -6,7 +6,7 @@ dx/db = -(J^T J)^-1 J^T j, with j the column of the unknown on the bound.
 """
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -27,6 +27,9 @@ SMALL_RMS, WIDE_RANGE = 0.01, 0.1
 unknown that is named (both chosen)."""
 BOUND_SHIFT = 0.1
 """Shift of a bound, relative to its value, whose effect on the other unknowns is stated (chosen)."""
+MIN_RECORDS, MAX_SCATTER = 3, 2.0
+"""Records from which their scatter is known, and its ratio to the standard error of the rows from which it counts
+(chosen): with three records, a true standard error is exceeded so far in 2 % of cases."""
 MIN_SEARCHES = 3
 """Number of searches from which a single one at the optimum is named (chosen)."""
 MAX_NAMES = 3
@@ -205,3 +208,27 @@ def _consequence(name: str) -> str:
         return RECORD_CONSEQUENCE
     last = name.partition(" of record")[0].rpartition(".")[2].partition("[")[0]
     return next((text for names, text in CONSEQUENCES if last in names), _OTHER_CONSEQUENCE)
+
+
+def scatter_of_records(
+    estimates: Sequence[Estimate], common: Sequence[Mapping[str, float]]
+) -> tuple[tuple[Estimate, ...], list[str]]:
+    """The estimates with standard errors of common parameters by the jackknife over three records or more, where these
+    are `MAX_SCATTER` times those of the rows or more, and a sentence that says so.
+
+    `common` are the common parameters of the fits without each record in turn. What differs between records is no
+    noise of their rows.
+    """
+    found, ratios = list(estimates), dict[str, float]()
+    for i, each in enumerate(estimates if len(common) >= MIN_RECORDS else ()):
+        values = [one[each.name] for one in common if each.name in one]
+        scatter = float(np.std(values)) * np.sqrt(len(values) - 1) if len(values) == len(common) else 0.0
+        if scatter > MAX_SCATTER * each.stderr:
+            ratios[each.name] = scatter / each.stderr
+            found[i] = dataclasses.replace(each, stderr=scatter)
+    note = (
+        f"the standard errors of {', '.join(ratios)} are those of the scatter between {len(common)} records, up to "
+        f"{max(ratios.values(), default=0.0):.2g} times those of the rows: something that is not recorded differs "
+        "between them, such as the temperature of the room, the supply or a zero"
+    )
+    return tuple(found), [note] if ratios else []

@@ -2,7 +2,7 @@
 of the pressure sensor in a fill by two fits."""
 
 import dataclasses
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,7 @@ from ..identifiability import Identifiability
 from ..result import MAX_ROWS, Estimate
 from .experiment import Unknown
 from .problem import DynamicFitProblem, DynamicProfile, compute_profile
-from .reliability import Optimum, searches_at_lowest
+from .reliability import Optimum, scatter_of_records, searches_at_lowest
 
 
 def plot_record(measured: Recording, modelled: Recording, names: Sequence[str], ax: Any = None) -> Any:
@@ -86,6 +86,12 @@ class DynamicFit(Reported):
     def starts_at_optimum(self) -> int:
         """Number of searches that reached the lowest sum of squares, within 0.1 %."""
         return searches_at_lowest(self.costs)
+
+    def with_scatter_of_records(self, common: Sequence[Mapping[str, float]]) -> "DynamicFit":
+        """The fit whose standard errors contain the scatter of the records: `common` are the common parameters of the
+        fits without each of them in turn, from `cross_predict`."""
+        estimates, notes = scatter_of_records(self.estimates, common)
+        return dataclasses.replace(self, estimates=estimates, notes=(*self.notes, *notes))
 
     def plant(self, record: int = 0) -> System:
         """The plant of one record with the estimated parameters."""

@@ -229,11 +229,9 @@ def preferred_fit(fits: Sequence[AnyFit]) -> AnyFit | None:
     error is at most 2 % greater.
     """
     justified = [fit for fit in fits if fit.justified]
-    if not justified or not _is_open(justified[0]):
-        return justified[0] if justified else None
+    if not justified:
+        return None
+    if not justified[0].undetermined and not any("[" in leaf.path for leaf in leaves(justified[0].friction)):
+        return justified[0]
     similar = [fit for fit in justified if fit.rmse <= SIMILAR_RMSE * justified[0].rmse]
     return min(similar, key=lambda fit: free_parameters(fit.friction))
-
-
-def _is_open(fit: FrictionFit) -> bool:
-    return bool(fit.undetermined) or any("[" in leaf.path for leaf in leaves(fit.friction))

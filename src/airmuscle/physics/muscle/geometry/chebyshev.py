@@ -170,7 +170,8 @@ def as_polynomial(
         )
     middle, half = (low + high) / 2, (high - low) / 2
     coefficients = np.polynomial.chebyshev.chebinterpolate(
-        lambda x: geometry.volume(_clip_to_range(middle + half * x, low, high)), degree
+        lambda x: geometry.volume(np.clip(middle + half * x, low, high)),
+        degree,  # rounding may leave the limits
     )
     polynomial = ChebyshevGeometry(tuple(coefficients), low, high, geometry.resting_length)
     points = np.linspace(low, high, _ERROR_POINTS)
@@ -179,8 +180,3 @@ def as_polynomial(
         np.abs(polynomial.volume_derivative(points) - geometry.volume_derivative(points)).max(),
     )
     return ChebyshevGeometry(tuple(coefficients), low, high, geometry.resting_length, *(float(e) for e in errors))
-
-
-def _clip_to_range(contraction: npt.NDArray[np.float64], low: float, high: float) -> npt.NDArray[np.float64]:
-    """Clip samples that rounding has moved beyond the limits."""
-    return np.clip(contraction, low, high)
