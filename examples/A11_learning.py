@@ -1,18 +1,21 @@
-"""Reinforcement learning of a joint: PPO of Stable-Baselines3 on the native vector environment, beside a tuned PI.
+"""Reinforcement learning of a joint: PPO and SAC of Stable-Baselines3 on the native vector environment, beside a PI.
 
-python examples/A11_learning.py        writes learning.png to the working directory; needs stable-baselines3
+python examples/A11_learning.py        one seed of each method, about 5 minutes of one core
+python examples/A11_learning.py 3      three seeds of each method
 
-Environment `airmuscle/Joint-v0`; network, settings of PPO, ranges of the PI gains and numbers of episodes are chosen.
+Writes learning.png to the working directory; needs stable-baselines3. Environment `airmuscle/Joint-v0`; networks,
+settings of PPO and SAC, ranges of the PI gains and numbers of episodes are chosen.
 """
 
 import sys
+import time
 
 import numpy as np
 
 try:
     import gymnasium
     import torch
-    from stable_baselines3 import PPO
+    from stable_baselines3 import PPO, SAC
     from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 except ImportError as error:
     print(f"no learning: {error}. Install the packages: pip install airmuscle[sim] stable-baselines3")
@@ -25,7 +28,7 @@ PERIODS, PERIOD = 500, 0.01
 PLANTS, UPDATE = 128, 64
 """Plants that learn together, and periods between two updates."""
 FRESH, FRESH_SEED = 128, 100_000
-"""Episodes that judge, and the seed of the first one; neither PPO nor the PI is trained with them."""
+"""Episodes that judge, and the seed of the first one; no method and not the PI is trained with them."""
 
 
 def joints(count, **options):
@@ -104,6 +107,18 @@ def pi_control(gain, integral_gain):
     return policy
 
 
+WEIGHTS = np.array([13.4, -0.42, 1.02, -0.83, 3.97, -0.02])
+"""Weights of a cross-entropy search, benchmarks/environments.py."""
+
+
+def with_pressure_difference(observations):
+    """The policy u = tanh(w . (e, omega, r', p_l - p_r, r, 1)) of six numbers, actions u and -u."""
+    angle, speed, left, right, wanted, later = observations.T
+    features = wanted - angle, speed, (later - wanted) / PERIOD, left - right, wanted, np.ones(len(angle))
+    command = np.tanh(WEIGHTS @ np.stack(features))
+    return np.stack([command, -command], axis=1).astype(np.float32)
+
+
 def tuned_pi(sets=256, episodes=16):
     """Gains [1/rad, 1/(rad s)] with the maximum mean return of training episodes, the same ones for all sets."""
     from scipy.stats import qmc
@@ -124,6 +139,20 @@ def learner(seed=1):
     return PPO("MlpPolicy", environment, policy_kwargs=network, seed=seed, device="cpu", **settings)
 
 
+def off_policy_learner(seed=1):
+    """SAC with the same network, observations normalised: 16 gradient steps of 512 samples for 128 periods."""
+    torch.set_num_threads(1)
+    environment = VecNormalize(LearningJoints(PLANTS, seed), clip_obs=10.0, gamma=0.98, norm_reward=False)
+    settings = {"gradient_steps": 16, "batch_size": 512, "gamma": 0.98, "learning_rate": 1e-3}
+    memory = {"buffer_size": 400_000, "learning_starts": 50 * PLANTS, "train_freq": 1}
+    network = {"net_arch": [64, 64]}
+    return SAC("MlpPolicy", environment, policy_kwargs=network, seed=seed, device="cpu", **settings, **memory)
+
+
+METHODS = {"PPO": (learner, 48), "SAC": (off_policy_learner, 24)}
+"""Methods: their learner, and its number of updates of 8192 periods."""
+
+
 def learned_policy(model):
     """The mean action of a learner."""
     return lambda observations: model.predict(model.env.normalize_obs(observations), deterministic=True)[0]
@@ -139,29 +168,40 @@ def learning_curve(model, updates, every):
     return curve
 
 
-def main():
+def main(seeds=1):
     gains = tuned_pi()
     pi = returns(pi_control(*np.repeat(gains[None, :], FRESH, axis=0).T), FRESH_SEED + np.arange(FRESH))
-    curve = learning_curve(learner(), updates=48, every=4)
     print(f"PI, {gains[0]:.3g} 1/rad and {gains[1]:.3g} 1/(rad s): mean return {pi.mean():.1f}, least {pi.min():.1f}")
-    for periods, found in curve:
-        print(f"PPO after {periods:6d} periods: mean return {found.mean():.1f}, least {found.min():.1f}")
-    draw(curve, pi)
+    found = returns(with_pressure_difference, FRESH_SEED + np.arange(FRESH))
+    print(f"six numbers with the pressure difference: mean return {found.mean():.1f}, least {found.min():.1f}")
+    curves = {name: [] for name in METHODS}
+    for name, (method, updates) in METHODS.items():
+        for seed in range(1, seeds + 1):
+            begun = time.process_time()
+            curve = learning_curve(method(seed), updates, every=4)
+            curves[name].append(curve)
+            spent = time.process_time() - begun
+            print(f"{name}, seed {seed}, {spent:.0f} s of CPU time: periods, mean and least return")
+            for periods, found in curve:
+                print(f"  {periods:6d}  {found.mean():5.1f}  {found.min():5.1f}", flush=True)
+    draw(curves, pi)
 
 
-def draw(curve, pi):
+def draw(curves, pi):
     figure, axes = plotting.new_figure(height=3.0)
-    steps = np.array([periods for periods, _ in curve]) / 1e3
-    low, middle, high = np.percentile([found for _, found in curve], (5, 50, 95), axis=1)
-    axes.fill_between(steps, low, high, color=plotting.BLUE, alpha=0.2, linewidth=0)
-    axes.plot(steps, middle, color=plotting.BLUE, label="PPO, median and 5 to 95 % of 128 episodes")
-    axes.axhline(np.median(pi), color=plotting.RED, linestyle="--", label="tuned PI, median of the same episodes")
+    for colour, (name, of_seeds) in zip((plotting.BLUE, plotting.GREEN), curves.items(), strict=True):
+        steps = np.array([periods for periods, _ in of_seeds[0]]) / 1e3
+        found = np.concatenate([[each for _, each in curve] for curve in of_seeds], axis=1)
+        low, middle, high = np.percentile(found, (5, 50, 95), axis=1)
+        axes.fill_between(steps, low, high, color=colour, alpha=0.2, linewidth=0)
+        axes.plot(steps, middle, color=colour, label=f"{name}, median and 5 to 95 % of {found.shape[1]} episodes")
+    axes.axhline(np.median(pi), color=plotting.RED, linestyle="--", label="tuned PI, median of 128 episodes")
     axes.axhspan(*np.percentile(pi, (5, 95)), color=plotting.RED, alpha=0.1, linewidth=0)
-    axes.set(xlabel="periods of training [1000]", ylabel="return of an episode", xlim=(0, steps[-1]), ylim=(0, 500))
+    axes.set(xlabel="periods of training [1000]", ylabel="return of an episode", xlim=(0, None), ylim=(0, 500))
     axes.legend(loc="lower right", framealpha=1.0)
     plotting.save(figure, "learning.png")
     print("wrote learning.png")
 
 
 if __name__ == "__main__":
-    main()
+    main(*(int(argument) for argument in sys.argv[1:2]))

@@ -149,7 +149,7 @@ def test_without_active_limits_the_plan_is_that_of_the_linear_quadratic_regulato
     n = judged.problem.gradient.shape[1]
     a, b = judged.observer.transition[:n, :n], judged.observer.input_matrix[:n]
     weights = np.diag([1.0 if s in GIVEN["permitted"] else 0.0 for s in AT.states])
-    gain, _ = regulator("test", a, b, weights, np.eye(2), "")
+    gain, _ = regulator("test", a, b, weights, np.eye(2))
     wide = np.full(2, 1e4)
     for _ in range(5):
         estimate, setpoint = 0.1 * rng.normal(size=n + 3), np.array([0.05])

@@ -1,5 +1,5 @@
 """Claims about learning on the native vector environment: an episode begins anew in the step that ends it where this is
-asked for, and PPO learns to follow better than a PI controller whose gains are tuned for the same return."""
+asked for, and PPO and SAC learn to follow better than a PI controller whose gains are tuned for the same return."""
 
 from __future__ import annotations
 
@@ -76,3 +76,15 @@ def test_ppo_follows_better_than_a_pi_controller_tuned_for_the_same_return(examp
     assert better.mean() > 10.0
     assert better.mean() > 4.0 * better.std() / np.sqrt(fresh.size)
     assert after.min() > pi.min() + 10.0
+
+
+@pytest.mark.slow
+def test_sac_follows_better_than_a_pi_controller_after_a_sixth_of_the_periods(example):
+    """65 536 periods; measured means of three seeds: 486, 481 and 484 against 460, with 491 of six numbers."""
+    fresh = example.FRESH_SEED + np.arange(example.FRESH)
+    gains = example.tuned_pi()
+    pi = example.returns(example.pi_control(*np.repeat(gains[None, :], fresh.size, axis=0).T), fresh)
+    _, (periods, after) = example.learning_curve(example.off_policy_learner(), updates=8, every=8)
+    assert periods == 65_536
+    assert after.mean() > pi.mean() + 10.0
+    assert 487.0 < example.returns(example.with_pressure_difference, fresh).mean() < 495.0

@@ -89,10 +89,8 @@ def _regulator_gains(
     a, b, columns = sampled
     (n, m), q = b.shape, len(columns)
     wide = np.block([[a, np.zeros((n, q))], [sample_time * columns, np.eye(q)]])
-    gains, _ = regulator(
-        "design_lqg", wide, np.vstack([b, np.zeros((q, m))]), np.diag(weights) * sample_time, costs * sample_time,
-        "inputs do not stabilise",
-    )  # fmt: skip
+    driving = np.vstack([b, np.zeros((q, m))])
+    gains, _ = regulator("design_lqg", wide, driving, np.diag(weights) * sample_time, costs * sample_time)
     return gains[:, :n], gains[:, n:]
 
 

@@ -160,7 +160,7 @@ class NonlinearModelPredictive(ShortRepr, MultivariableController):
         a, b = held(linear.A * scale / scale[:, None], linear.B * sizes / scale[:, None], estimator.sample_time)
         weights = np.diag([1.0 if name in self.permitted else 0.0 for name in states])
         owner, costs = "NonlinearModelPredictive", np.eye(sizes.size)
-        _, terminal = regulator(owner, a, b, weights, costs, "inputs do not stabilise")
+        _, terminal = regulator(owner, a, b, weights, costs)
         return PredictiveProgram(
             estimator.plant, estimator.places[1], inputs, self.controlled, self.commanded, scale, sizes, weights,
             terminal, dict(self.limits), float(self.slack_weight), self.horizon, self.substeps, estimator.sample_time,

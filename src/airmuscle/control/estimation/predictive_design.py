@@ -82,7 +82,7 @@ def design_predictive(
     c, z, limited = (model.select(outputs=list(part)).C * scale for part in (measured, controlled, limits))
     weights = np.diag([(s / permitted[i]) ** 2 if i in permitted else 0.0 for i, s in zip(states, scale, strict=True)])
     costs = np.eye(sizes.size)
-    gain, terminal = regulator(where, a, b, weights, costs, "inputs do not stabilise")
+    gain, terminal = regulator(where, a, b, weights, costs)
     noise = np.array([process_noise.get(i, 0.0) for i in names]) / np.append(scale, np.ones(len(disturbed)))
     deviations = np.array([measurement_noise[name] for name in measured])
     at = [np.array([model.output_values[name] for name in part]) for part in (measured, controlled, limits)]

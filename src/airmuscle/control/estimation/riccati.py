@@ -76,36 +76,31 @@ def sampled_plant(
     return a, b, by_disturbance
 
 
-def regulator(owner: str, a: Array, b: Array, weights: Array, costs: Array, reason: str) -> tuple[Array, Array]:
+def regulator(owner: str, a: Array, b: Array, weights: Array, costs: Array) -> tuple[Array, Array]:
     """Gain (m, n) of the linear-quadratic regulator, and the matrix (n, n) of its cost.
 
-    Raises ParameterError that begins with `owner` and contains `reason`, where there is none.
+    Raises ParameterError that begins with `owner` where there is none.
     """
-    from scipy.linalg import solve_discrete_are
-
-    try:
-        p = solve_discrete_are(a, b, weights, costs)
-        gain = np.linalg.solve(costs + b.T @ p @ b, b.T @ p @ a)
-    except np.linalg.LinAlgError:
-        raise ParameterError(
-            f"{owner}: these {reason} the plant, or a weight is missing. Give states a permitted deviation or a "
-            "process noise, and measure or command more."
-        ) from None
-    return np.asarray(gain), np.asarray(p)
+    failure = "inputs do not stabilise the plant, or a weight is missing. Give states a permitted deviation, or command"
+    p = _riccati(a, b, weights, costs, f"{owner}: these {failure} more.")
+    return np.asarray(np.linalg.solve(costs + b.T @ p @ b, b.T @ p @ a)), p
 
 
 def observer_gain(owner: str, a: Array, c: Array, noise: Array, covariance: Array) -> Array:
     """Gain (n, p) of the stationary Kalman filter, which corrects a prediction by a measurement."""
+    failure = "columns do not detect all states, or a process noise is missing. Give states a process noise, or measure"
+    p = _riccati(a.T, c.T, noise, covariance, f"{owner}: these measured {failure} more.")
+    return np.asarray(np.linalg.solve(c @ p @ c.T + covariance, c @ p).T)
+
+
+def _riccati(a: Array, b: Array, weights: Array, costs: Array, failure: str) -> Array:
+    """The solution (n, n) of the discrete algebraic Riccati equation; ParameterError with this text without one."""
     from scipy.linalg import solve_discrete_are
 
     try:
-        p = solve_discrete_are(a.T, c.T, noise, covariance)
+        return np.asarray(solve_discrete_are(a, b, weights, costs))
     except np.linalg.LinAlgError:
-        raise ParameterError(
-            f"{owner}: these measured columns do not detect all states, or a process noise is missing. Give the "
-            "states a process noise, or measure more."
-        ) from None
-    return np.asarray(np.linalg.solve(c @ p @ c.T + covariance, c @ p).T)
+        raise ParameterError(failure) from None
 
 
 def disturbance_observer(

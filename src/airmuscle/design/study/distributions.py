@@ -4,7 +4,7 @@ import abc
 import dataclasses
 import math
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -18,6 +18,21 @@ MIN_PROBABILITY = 1e-6
 
 class Variation(abc.ABC):
     """The values that one parameter takes in a study."""
+
+    positive: ClassVar[tuple[str, ...]] = ()
+    """Fields that must be positive."""
+
+    def __post_init__(self) -> None:
+        numbers = {name: value for name, value in vars(self).items() if isinstance(value, float | int)}
+        _check_finite(self, *numbers.values())
+        for name in self.positive:
+            if not numbers[name] > 0:
+                raise ParameterError(f"{type(self).__name__}: {name} is {numbers[name]:g}; it must be positive.")
+        low, high = numbers.get("low", 0.0), numbers.get("high", 1.0)
+        if not low < high:
+            raise ParameterError(
+                f"{type(self).__name__}: low is {low:g} and high is {high:g}; low must be less than high."
+            )
 
     @abc.abstractmethod
     def ppf(self, probabilities: Array) -> Array:
@@ -95,10 +110,6 @@ class Uniform(Distribution):
     low: float = custom_field(read_quantity, "lower bound")
     high: float = custom_field(read_quantity, "upper bound")
 
-    def __post_init__(self) -> None:
-        _check_finite(self, self.low, self.high)
-        _check_order(self, ("low", self.low), ("high", self.high))
-
     def scipy_distribution(self) -> Any:
         from scipy import stats
 
@@ -109,12 +120,9 @@ class Uniform(Distribution):
 class Normal(Distribution):
     """Normal distribution. It is unbounded: use Truncated if values beyond a bound are impossible."""
 
+    positive: ClassVar[tuple[str, ...]] = ("std",)
     mean: float = custom_field(read_quantity, "mean")
     std: float = custom_field(read_difference, "standard deviation")
-
-    def __post_init__(self) -> None:
-        _check_finite(self, self.mean, self.std)
-        _check_positive(self, "std", self.std)
 
     def scipy_distribution(self) -> Any:
         from scipy import stats
@@ -126,15 +134,11 @@ class Normal(Distribution):
 class LogNormal(Distribution):
     """Log-normal distribution: the natural logarithm of the value is normally distributed."""
 
+    positive: ClassVar[tuple[str, ...]] = ("median", "log_std")
     median: float = custom_field(read_quantity, "median")
     log_std: float = custom_field(
         read_ratio, "standard deviation of the natural logarithm; approximately the relative standard deviation"
     )
-
-    def __post_init__(self) -> None:
-        _check_finite(self, self.median, self.log_std)
-        _check_positive(self, "median", self.median)
-        _check_positive(self, "log_std", self.log_std)
 
     def scipy_distribution(self) -> Any:
         from scipy import stats
@@ -151,8 +155,7 @@ class Triangular(Distribution):
     high: float = custom_field(read_quantity, "upper bound")
 
     def __post_init__(self) -> None:
-        _check_finite(self, self.low, self.mode, self.high)
-        _check_order(self, ("low", self.low), ("high", self.high))
+        super().__post_init__()
         if not self.low <= self.mode <= self.high:
             raise ParameterError(
                 f"Triangular: mode is {self.mode:g}; it must lie between low, {self.low:g}, and high, {self.high:g}."
@@ -178,8 +181,7 @@ class Truncated(Variation):
     high: float = custom_field(read_quantity, "upper bound")
 
     def __post_init__(self) -> None:
-        _check_finite(self, self.low, self.high)
-        _check_order(self, ("low", self.low), ("high", self.high))
+        super().__post_init__()
         if not isinstance(self.inner, Distribution):
             raise ParameterError(f"Truncated: {self.inner!r} is not a continuous distribution; only these are allowed.")
         below, above = self._probability_range()
@@ -227,16 +229,3 @@ def read_variation(value: Any, unit: str, location: Location) -> Variation:
 def _check_finite(variation: Any, *values: float) -> None:
     if not all(math.isfinite(value) for value in values):
         raise ParameterError(f"{variation}: all values must be finite.")
-
-
-def _check_positive(variation: Any, name: str, value: float) -> None:
-    if not value > 0:
-        raise ParameterError(f"{type(variation).__name__}: {name} is {value:g}; it must be positive.")
-
-
-def _check_order(variation: Any, lower: tuple[str, float], upper: tuple[str, float]) -> None:
-    if not lower[1] < upper[1]:
-        raise ParameterError(
-            f"{type(variation).__name__}: {lower[0]} is {lower[1]:g} and {upper[0]} is {upper[1]:g}; {lower[0]} must "
-            f"be less than {upper[0]}."
-        )

@@ -1,6 +1,5 @@
 """Maxwell-slip friction model: parallel springs, each sliding at its deflection limit."""
 
-from collections.abc import Sequence
 from typing import Any, ClassVar, Self
 
 from ....core import ParameterError, Reference, StateVariable, Value, Values, model, ops, parameter, published
@@ -24,17 +23,45 @@ def element_rate(deflection: Value, limit: Value, transition: Value, speed: Valu
     return speed - sliding_forward - sliding_backward
 
 
-def check_equal_lengths(owner: str, stiffnesses: Sequence[Value], limits: Sequence[Value]) -> None:
-    """Raise ParameterError unless every element has a stiffness and a limit, and there is at least one element."""
-    if len(stiffnesses) != len(limits) or not limits:
-        raise ParameterError(
-            f"{owner}: {len(stiffnesses)} stiffnesses and {len(limits)} limits; give one stiffness and one limit per "
-            "element."
-        )
+class SlipElements(Friction):
+    """Friction of parallel springs, each sliding at its deflection limit (interface)."""
+
+    element: ClassVar[tuple[str, str]] = ("bristle", "element")
+    """Beginning of the names of the states, and what an element is called."""
+    stiffnesses: tuple[float, ...]
+    limits: tuple[float, ...]
+    transition: float
+
+    def check(self) -> None:
+        if len(self.stiffnesses) != len(self.limits) or not self.limits:
+            raise ParameterError(
+                f"{type(self).__name__}: {len(self.stiffnesses)} stiffnesses and {len(self.limits)} limits; give one "
+                "stiffness and one limit per element."
+            )
+
+    @property
+    def states(self) -> tuple[StateVariable, ...]:
+        elements = enumerate(zip(self._names, self.limits, strict=True), 1)
+        return tuple(StateVariable(n, "m", limit, f"deflection of {self.element[1]} {i}") for i, (n, limit) in elements)
+
+    @property
+    def presliding_distance(self) -> float:
+        return max(self.limits)
+
+    def rates(self, bristles: Values, speed: Value) -> dict[str, Value]:
+        limits = zip(self._names, self.limits, strict=True)
+        return {name: element_rate(bristles[name], limit, self.transition, speed) for name, limit in limits}
+
+    def force(self, bristles: Values, speed: Value) -> Value:
+        return sum(k * bristles[name] for name, k in zip(self._names, self.stiffnesses, strict=True))
+
+    @property
+    def _names(self) -> list[str]:
+        return [f"{self.element[0]}{i}" for i in range(1, len(self.limits) + 1)]
 
 
 @model
-class MaxwellSlip(Friction):
+class MaxwellSlip(SlipElements):
     """Maxwell-slip model: F = Sum k_i delta_i,  d(delta_i)/dt = v, but 0 if |delta_i| = Delta_i and v increases it.
 
     delta_i: deflection of element i [m]; k_i: stiffness; Delta_i: deflection limit; k_i Delta_i: Coulomb force of the
@@ -60,29 +87,6 @@ class MaxwellSlip(Friction):
     @classmethod
     def guess(cls, scales: LoopScales) -> Self:
         return cls(scales.element_stiffnesses, scales.element_limits)
-
-    def check(self) -> None:
-        check_equal_lengths("MaxwellSlip", self.stiffnesses, self.limits)
-
-    @property
-    def states(self) -> tuple[StateVariable, ...]:
-        return tuple(
-            StateVariable(f"bristle{i}", "m", limit, f"deflection of element {i}")
-            for i, limit in enumerate(self.limits, 1)
-        )
-
-    @property
-    def presliding_distance(self) -> float:
-        return max(self.limits)
-
-    def rates(self, bristles: Values, speed: Value) -> dict[str, Value]:
-        elements = enumerate(self.limits, 1)
-        return {
-            f"bristle{i}": element_rate(bristles[f"bristle{i}"], limit, self.transition, speed) for i, limit in elements
-        }
-
-    def force(self, bristles: Values, speed: Value) -> Value:
-        return sum(k * bristles[f"bristle{i}"] for i, k in enumerate(self.stiffnesses, 1))
 
     def element_deflections(self, displacement: Any) -> Any:
         """Exact deflection [m] of every element along a displacement path [m], shape (N, elements)."""

@@ -2,9 +2,8 @@
 
 from typing import Any, ClassVar, Self
 
-from ....core import ParameterError, Reference, StateVariable, Value, Values, model, ops, parameter, published
-from .base import Friction
-from .maxwell_slip import check_equal_lengths, element_rate
+from ....core import ParameterError, Reference, Value, Values, model, ops, parameter, published
+from .maxwell_slip import SlipElements
 from .path import LoopScales, stop_operators
 
 KUHNEN2003 = published("kuhnen-2003")
@@ -12,7 +11,7 @@ AL_JANAIDEH2011 = published("al-janaideh-2011")
 
 
 @model
-class PrandtlIshlinskii(Friction):
+class PrandtlIshlinskii(SlipElements):
     """Modified Prandtl-Ishlinskii model: F = S(Sum k_i E_ri[x]),  S(u) = u + Sum w_j S_dj(u).
 
     E_r: stop operator, which follows x within the limits -r..r. S_d: dead zone, max(u - d, 0) for d > 0 and
@@ -25,6 +24,7 @@ class PrandtlIshlinskii(Friction):
     """
 
     references: ClassVar[tuple[Reference, ...]] = (KUHNEN2003, AL_JANAIDEH2011)
+    element: ClassVar[tuple[str, str]] = ("stop", "stop")
 
     stiffnesses: tuple[float, ...] = parameter("N/m", "k_i", "stiffness of each stop", bounds=(0.0, 1e9))
     limits: tuple[float, ...] = parameter("m", "r_i", "deflection limit of each stop", bounds=(1e-9, 1.0), fitted=False)
@@ -45,7 +45,7 @@ class PrandtlIshlinskii(Friction):
         )  # fmt: skip
 
     def check(self) -> None:
-        check_equal_lengths("PrandtlIshlinskii", self.stiffnesses, self.limits)
+        super().check()
         if len(self.thresholds) != len(self.weights) or 0.0 in self.thresholds:
             raise ParameterError(
                 f"PrandtlIshlinskii: {len(self.thresholds)} thresholds and {len(self.weights)} weights; give one "
@@ -62,22 +62,8 @@ class PrandtlIshlinskii(Friction):
                         "the weights must not be less than -1."
                     )
 
-    @property
-    def states(self) -> tuple[StateVariable, ...]:
-        return tuple(
-            StateVariable(f"stop{i}", "m", limit, f"deflection of stop {i}") for i, limit in enumerate(self.limits, 1)
-        )
-
-    @property
-    def presliding_distance(self) -> float:
-        return max(self.limits)
-
-    def rates(self, bristles: Values, speed: Value) -> dict[str, Value]:
-        elements = enumerate(self.limits, 1)
-        return {f"stop{i}": element_rate(bristles[f"stop{i}"], limit, self.transition, speed) for i, limit in elements}
-
     def force(self, bristles: Values, speed: Value) -> Value:
-        return self.apply_dead_zones(sum(k * bristles[f"stop{i}"] for i, k in enumerate(self.stiffnesses, 1)))
+        return self.apply_dead_zones(super().force(bristles, speed))
 
     def apply_dead_zones(self, force: Value) -> Value:
         """S(u): force [N] after the dead zones, from the force u [N] of the stops."""
