@@ -47,7 +47,9 @@ def test_a_controller_that_is_called_meets_the_same_sensors_and_the_same_actuati
         replace(called, bounds={"gain": (1e5, 5e5)})
     with pytest.raises(ParameterError, match="commands angle; allowed are 'difference'"):
         complete(JOINT, Contender("wrong", Called(PassedSignals(("angle",)))))
-    with pytest.raises(ParameterError, match=r"measures 'left\.force'; the joint has sensors of"):
+    with pytest.raises(
+        ParameterError, match=r"measures 'left\.force'; the joint has sensors of .* with tune and simulate"
+    ):
         complete(JOINT, Contender("wrong", Called(PassedSignals(("left.force",)))))
 
 

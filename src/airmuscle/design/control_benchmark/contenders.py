@@ -217,7 +217,8 @@ def _check_columns(joint: BenchmarkJoint, contender: Contender) -> None:
     known = [sensor.column for sensor in joint.sensors]
     if without := [name for name in contender.law.measured_columns if name not in known]:
         raise ParameterError(
-            f"contender '{contender.name}' measures '{without[0]}'; the joint has sensors of {', '.join(known)}."
+            f"contender '{contender.name}' measures '{without[0]}'; the joint has sensors of {', '.join(known)}. "
+            "Judge a controller of another plant, such as a fitted arm, with tune and simulate."
         )
 
 
@@ -268,7 +269,7 @@ def scenario_contender(joint: BenchmarkJoint, path: str | Path) -> Contender:
         raise ParameterError(
             f"{scenario.location.inside('input').inside('controller')}: the law commands {', '.join(law.inputs)}; "
             f"allowed are '{DIFFERENCE}', the pressures {', '.join(joint.pressures)}, or all valves "
-            f"{', '.join(sorted(allowed[2]))}."
+            f"{', '.join(sorted(allowed[2]))}. Judge a controller of another plant with tune and simulate."
         )
     bounds = {key.removeprefix(prefix): pair for key, pair in scenario.bounds().items() if key.startswith(prefix)}
     return Contender(Path(path).stem, law, bounds)
