@@ -90,6 +90,18 @@ def test_the_law_of_a_specimen_does_not_pull_at_pressures_below_its_slack_rows(p
     assert np.max(law.force(np.full(9, pressure), contraction)) < 5.0
 
 
+def test_the_law_of_a_specimen_does_not_pull_where_its_rows_imply_that_it_is_slack_but_none_was_recorded(measured):
+    """Contracted muscles were recorded from 60 kPa on: at lower pressures they are slack all the more."""
+    recorded = [
+        run.rows((run["force"] > 0) | (run["pressure"] > 6e4) | (run["contraction"] < 0.04)) for run in measured
+    ]
+    name = "pooled, ln L0, degree 3, change of degree 1, effects of degree 2"
+    (law,) = [each.law for each in standard_candidates(recorded) if each.name == name]
+    found = fit(law, recorded).model
+    pressure, contraction = (x.ravel() for x in np.meshgrid(np.linspace(8e3, 9e4, 15), np.linspace(0.06, 0.12, 7)))
+    assert max(np.max(found.for_specimen(each).force(pressure, contraction)) for each in found.specimens) < 2.0
+
+
 def test_the_effects_decay_where_the_population_does_not_pull():
     population = LogarithmicLength(
         _surface(-100.0), ContractileSurface.blank(1).with_validity_range((1e5, 6e5), (0.0, 0.2)), 0.2, 0.2
