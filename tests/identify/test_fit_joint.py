@@ -52,6 +52,15 @@ def test_the_band_grows_with_the_horizon_and_holds_what_it_says(fitted):
     assert fit.coverage[0] > 0.85
 
 
+@pytest.mark.parametrize("unit", [75.0, 3e5])
+def test_counts_and_shares_of_a_range_are_fitted_as_they_are(short_search, unit):
+    """Pressures in counts of 4095, or from 0 to 1, without their scale: the gain is absorbed (2.6 and 14
+    degrees before)."""
+    fit = fit_joint(changed(EPISODES, pressure=lambda p: p / unit), left_out=0.2)
+    assert np.degrees(fit.rms[0]) < 0.6
+    assert any("pressures look like a scale and not like Pa" in remark for remark in fit.remarks)
+
+
 def test_rows_after_a_saturated_reading_do_not_count(short_search):
     """A sensor that ends at 2.6 bar: the arm is found nearly as well as from whole readings (1.07 degrees before)."""
     fit = fit_joint(changed(EPISODES, pressure=lambda p: np.minimum(p, 2.6e5)), left_out=0.2)
@@ -164,7 +173,9 @@ def test_commands_predict_the_angle_where_they_are_the_pressures(fitted):
 
 
 def test_impossible_arguments_are_refused():
-    with pytest.raises(ParameterError, match="left_out is 1 of 30 episodes; give 4 episodes or more"):
+    with pytest.raises(
+        ParameterError, match="episodes: 30, of which a share of 1 is left out; give 4 episodes or more"
+    ):
         fit_joint(EPISODES, left_out=1.0)
     with pytest.raises(ParameterError, match="2 pairs and 0 axes are given for 1 joints; give one each"):
         fit_joint(EPISODES, pairs=((1, 2), (3, 4)))

@@ -92,7 +92,9 @@ def test_the_gains_of_the_readings_are_found_by_the_force_of_the_rubber(episodes
 def test_impossible_requests_are_refused(episodes):
     with pytest.raises(ParameterError, match=r"no parameter 'mechanism.inertai'; .* Did you mean"):
         fit_known_joint(episodes, JOINT, ("mechanism.inertai",))
-    with pytest.raises(ParameterError, match="left_out is 1 of 24 episodes; give 4 episodes or more"):
+    with pytest.raises(
+        ParameterError, match="episodes: 24, of which a share of 1 is left out; give 4 episodes or more"
+    ):
         fit_known_joint(episodes, JOINT, left_out=1.0)
     twice = replace(episodes, runs=tuple(replace(run, angle=np.hstack([run.angle] * 2)) for run in episodes.runs))
     with pytest.raises(ParameterError, match="have 2 pressures and 2 angles, the arm 2 muscles and 1 coordinates"):

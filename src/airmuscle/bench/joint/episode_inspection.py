@@ -269,7 +269,8 @@ def without_saturated(windows: Windows, episodes: Episodes) -> tuple[Windows, li
     few = hit[:, 1:].mean() <= 1.0 - LEAST
     text = (
         f"{hit[:, 1:].sum()} of {hit[:, 1:].size} rows of the fit follow a pressure reading at its upper end, whose "
-        f"true value is unknown: they {'do not count' if few else 'are too many to leave out'}"
+        "true value is unknown: they "
+        + ("do not count, except in the errors of the report" if few else "are too many to leave out")
     )
     counts = np.concatenate([windows.counts[:, :HISTORY], ~hit], axis=1)
     return dataclasses.replace(windows, counts=counts) if few else windows, [text] if hit.any() else []

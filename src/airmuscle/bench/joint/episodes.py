@@ -88,7 +88,8 @@ def count_fitted(episodes: Episodes, left_out: float | None) -> int:
     share = min(max(0.1, ENOUGH / count), 1 / 3) if left_out is None else left_out
     if not 0.0 < share < 1.0 or count < 4:
         raise ParameterError(
-            f"left_out is {share:.3g} of {count} episodes; give 4 episodes or more, and a share between 0 and 1."
+            f"episodes: {count}, of which a share of {share:.3g} is left out; give 4 episodes or more, and a share "
+            "between 0 and 1."
         )
     return max(1, round((1.0 - share) * count))
 

@@ -102,7 +102,8 @@ def _search(
 ) -> tuple[PressureDriven, dict[int, list[str]]]:
     """The arm, and the parameters fitted for each joint; the most coupled joint determines what they share."""
     low, high = np.quantile(episodes.rows("angle"), (0.01, 0.99), axis=0)
-    arm = reduced_arm(0.5 * (low + high), axes)
+    level = float(np.quantile(np.abs(episodes.rows("pressure")), 0.99))
+    arm = reduced_arm(0.5 * (low + high), axes, LEVEL if LEVEL / 10 < level < 10 * LEVEL else level)
     shared = shared_parameters(axes) if axes else []
     prior = {leaf.path: float(leaf.value) for leaf in tree.leaves(arm) if leaf.path in shared}
     paths: dict[int, list[str]] = {}
@@ -210,17 +211,22 @@ record of pressures and angles contains none of the first three, and each multip
 fibre angle [rad] of the volume permits 2.5 rad to both sides."""
 
 
-def reduced_arm(middle: Array, axes: Sequence[tuple[int, int, int]] = ()) -> PressureDriven:
+LEVEL = 3e5
+"""Gauge pressure [Pa] at which a muscle pulls with this area (chosen), as far as the readings are Pa and not counts."""
+
+
+def reduced_arm(middle: Array, axes: Sequence[tuple[int, int, int]] = (), level: float = LEVEL) -> PressureDriven:
     """Arm of J joints with a pair of muscles each, from which a fit starts.
 
     middle  middle of the range of each joint [rad], about which forces are polynomials
     axes    axes of the joints, if the coupling of the links is to be found; without them every joint has an inertia of
             its own
+    level   reading of a high pressure, at which every muscle has the same force
     """
     count = len(middle)
     routes = tuple(MuscleRoute((j + 1,), (sign * RADIUS,)) for j in range(count) for sign in (1.0, -1.0))
     muscles = tuple(
-        _muscle(f"m{2 * j + k}", sign * RADIUS * float(middle[j]) / LENGTH)
+        _muscle(f"m{2 * j + k}", sign * RADIUS * float(middle[j]) / LENGTH, level)
         for j in range(count)
         for k, sign in enumerate((1.0, -1.0))
     )
@@ -231,9 +237,9 @@ def reduced_arm(middle: Array, axes: Sequence[tuple[int, int, int]] = ()) -> Pre
     return PressureDriven(muscles, WithStickSlip(SerialArm(links, routes), elements), (0.02,) * (2 * count))
 
 
-def _muscle(name: str, reference: float) -> Muscle:
-    full = 3e5 * AREA
-    law = LinearInPressure((AREA, 0.0, 0.0), (-0.05 * full, 0.0, 0.0), 0.3 * full, reference)
+def _muscle(name: str, reference: float, level: float) -> Muscle:
+    full = LEVEL * AREA
+    law = LinearInPressure((full / level, 0.0, 0.0), (-0.05 * full, 0.0, 0.0), 0.3 * full, reference)
     return Muscle(law, Braid(0.01, FIBRE_ANGLE, LENGTH), name=name)
 
 
