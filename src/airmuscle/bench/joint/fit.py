@@ -239,7 +239,7 @@ def reduced_arm(middle: Array, axes: Sequence[tuple[int, int, int]] = (), level:
 
 def _muscle(name: str, reference: float, level: float) -> Muscle:
     full = LEVEL * AREA
-    law = LinearInPressure((full / level, 0.0, 0.0), (-0.05 * full, 0.0, 0.0), 0.3 * full, reference)
+    law = LinearInPressure((AREA * (LEVEL / level), 0.0, 0.0), (-0.05 * full, 0.0, 0.0), 0.3 * full, reference)
     return Muscle(law, Braid(0.01, FIBRE_ANGLE, LENGTH), name=name)
 
 
