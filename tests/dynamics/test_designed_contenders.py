@@ -90,6 +90,20 @@ def test_the_sum_of_both_commands_keeps_its_range(name: str):
     assert np.abs(found).max() > 0.99 * JOINT.pressure_span
 
 
+def test_predictive_control_plans_no_faster_change_than_the_flow_permits():
+    """60 bar/s, the feed-forward apart; the state feedback of the same weights commands several times that."""
+    changes = []
+    for name in (LQG, MPC):
+        law = CONTENDERS[name].law
+        memory, told = law.init(), []
+        for k in range(30):
+            command, memory = law.step(memory, measured(0.0, 0.3 if k > 3 else 0.0, 0.0), 2e-3)
+            told.append(command["difference"])
+        changes.append(np.abs(np.diff(told)).max())
+    assert changes[0] > 2.0 * changes[1]
+    assert changes[1] == pytest.approx(6e6 * 2e-3, rel=1e-6)
+
+
 @pytest.mark.parametrize("name", [LQG, MPC, ADRC])
 def test_a_disturbance_leaves_no_offset_and_the_pressures_keep_their_limits(name: str):
     """A torque that the model does not know, and a step that saturates the command.
@@ -155,7 +169,7 @@ def test_bounds_of_a_parameter_that_a_controller_does_not_have_are_refused():
         ParameterError, match=r"AlongMotion has no declared parameter 'design\.weight' to be tuned; there"
     ):
         dataclasses.replace(CONTENDERS[MPC], bounds={"design.weight": (1.0, 2.0)}, commissioned={})
-    with pytest.raises(ParameterError, match=r"AlongMotion: delay is -1; allowed range: 0 to 1000 samples"):
+    with pytest.raises(ParameterError, match=r"AlongMotion: delay is -1; allowed range: 0 to 1000"):
         dataclasses.replace(CONTENDERS[MPC].law, delay=-1)
 
 

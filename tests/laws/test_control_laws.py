@@ -163,6 +163,23 @@ def test_super_twisting_rejects_a_changing_disturbance_to_second_order_in_the_sa
     assert bands[0] / bands[1] == pytest.approx(4.0, rel=0.3)
 
 
+def test_the_integral_of_super_twisting_is_held_at_the_end_of_the_range_and_never_takes_up_the_command():
+    """Driven further into the limit it is held, driven back it moves by k_2 h; a range of one point is no exception."""
+    law, memory = SuperTwisting("y", "u", proportional=2.0, integral=4.0), {"started": 1.0, "integral": 0.5}
+    for error, limits, change in (
+        (1.0, (-1.0, 1.0), 0.0),
+        (1.0, (-9.0, 9.0), 4.0 * H),
+        (-1.0, (-9.0, -3.0), -4.0 * H),
+        (-1.0, (-1.0, 9.0), 0.0),
+        (1.0, (-7.0, -7.0), 0.0),
+        (-1.0, (-7.0, -7.0), -4.0 * H),
+    ):
+        last = {**memory, "error": error, "error_rate": 0.0}
+        commands, later = law.step(last, Measurement({"y": -error}, {"y": 0.0}, {"u": limits}), H)
+        assert limits[0] <= commands["u"] <= limits[1]
+        assert later["integral"] == pytest.approx(0.5 + change), (error, limits)
+
+
 def test_the_derivative_of_the_sliding_variable_is_that_of_the_error():
     law = SlidingMode("y", "u", amplitude=1.0, sliding_time=0.5, boundary_layer=1e6)
     told = commanded(law, {"y": np.arange(5.0) * H * 3.0}, {"y": np.zeros(5)})

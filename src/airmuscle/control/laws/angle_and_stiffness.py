@@ -8,6 +8,7 @@ from ...engine.loop import ControlLaw, Measurement, Memory, Sampled
 from ...physics.mechanism.base import Mechanism
 from ...physics.muscle.characteristic.tondu_lopez2000 import TONDU_LOPEZ_2000
 from ...physics.muscle.muscle import Muscle
+from .open_loop import check_pair
 from .static_inverse import check_invertible, pressure_between, static_force
 
 TONIETTI_BICCHI2002 = published("tonietti-bicchi-2002")
@@ -137,11 +138,7 @@ class AngleAndStiffness(ControlLaw):
     initial_memory: ClassVar[Mapping[str, float]] = {"integral": 0.0}
 
     def check(self) -> None:
-        if len(self.commanded) != 2:
-            raise ParameterError(
-                f"AngleAndStiffness: {len(self.commanded)} commanded pressures; name two, such as ('left.pressure', "
-                "'right.pressure')."
-            )
+        check_pair(self, self.commanded)
         if self.speed_gain and not self.speed_column:
             raise ParameterError(
                 "AngleAndStiffness: speed_gain needs speed_column, the measured speed, such as 'angular_speed'."
@@ -165,7 +162,9 @@ class AngleAndStiffness(ControlLaw):
         wanted, angle = measurement.setpoints, self.inverse.coordinate
         error = wanted[angle] - measurement.columns[angle]
         acceleration = wanted[self.acceleration_setpoint] if self.acceleration_setpoint else 0.0
-        torque = self._torque_at(wanted[angle], acceleration) + self.gain * error + memory["integral"]
+        mechanism, speed = self.inverse.mechanism, self.inverse.mechanism.coordinates[0].speed
+        needed = mechanism.driving_force({angle: wanted[angle]}, {speed: 0.0}, acceleration)
+        torque = needed + self.gain * error + memory["integral"]
         if self.speed_column:
             torque = torque - self.speed_gain * measurement.columns[self.speed_column]
         first, second = self.inverse.pressures(wanted[angle], torque, wanted["stiffness"])
@@ -179,13 +178,3 @@ class AngleAndStiffness(ControlLaw):
         )
         later = {"integral": ops.where(integrates, integral, memory["integral"])}
         return dict(zip(self.commanded, (first, second), strict=True)), later
-
-    def _torque_at(self, angle: Value, acceleration: Value) -> Value:
-        """Torque of the muscles [N m] for an acceleration [rad/s2] from rest at an angle [rad]."""
-        mechanism, name = self.inverse.mechanism, self.inverse.coordinate
-        speed = mechanism.coordinates[0].speed
-        inputs = {each.name: 0.0 for each in mechanism.inputs}
-        free, driven = (
-            mechanism.acceleration({name: angle}, {speed: 0.0}, {name: torque}, inputs)[name] for torque in (0.0, 1.0)
-        )
-        return (acceleration - free) / (driven - free)

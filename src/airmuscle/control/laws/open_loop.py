@@ -52,6 +52,15 @@ class SetpointCommand(OpenLoopLaw):
         return {name: setpoints[setpoint] for name, setpoint in names}
 
 
+def check_pair(law: ControlLaw, commanded: tuple[str, ...]) -> None:
+    """Raise ParameterError where a law of two antagonistic pressures does not command two."""
+    if len(commanded) != 2:
+        raise ParameterError(
+            f"{type(law).__name__}: {len(commanded)} commanded pressures; name two, such as ('left.pressure', "
+            "'right.pressure')."
+        )
+
+
 @model
 class SetpointLead(OpenLoopLaw):
     """u = K_f (r + T r').

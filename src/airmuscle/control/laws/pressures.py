@@ -17,7 +17,7 @@ from ...core import (
 )
 from ...engine.loop import Commanded, ControlLaw, Measurement, Memory, Sampled, commands, range_of
 from ...physics.muscle.characteristic.tondu_lopez2000 import TONDU_LOPEZ_2000
-from .open_loop import OpenLoopLaw
+from .open_loop import OpenLoopLaw, check_pair
 from .pid import ASTROM_HAGGLUND1995
 
 DIFFERENCE = "difference"
@@ -42,11 +42,7 @@ class CoContraction(OpenLoopLaw):
     mean_setpoint: str = ""
 
     def check(self) -> None:
-        if len(self.commanded) != 2:
-            raise ParameterError(
-                f"CoContraction: {len(self.commanded)} commanded pressures; name two, such as ('left.pressure', "
-                "'right.pressure')."
-            )
+        check_pair(self, self.commanded)
 
     @property
     def setpoints(self) -> tuple[str, ...]:

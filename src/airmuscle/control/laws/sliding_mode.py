@@ -71,8 +71,9 @@ class SuperTwisting(SisoController):
 
     The integral w reconstructs a disturbance with bounded rate; for s' = d(t) - u with |d'| < k_2 and k_1 large enough
     s reaches 0 in finite time, and the command is continuous. By forward differences with sample time h, s remains
-    within a band that shrinks with h^2. w is limited to the range of the command and starts at u_0. e' is a backward
-    difference with a first-order filter of time constant T_f.
+    within a band that shrinks with h^2. w starts at u_0 and is held while the command is at the end of its range and s
+    drives it further: it never takes up what the range leaves to the sum. e' is a backward difference with a
+    first-order filter of time constant T_f.
     Reference: Levant (1993).
     """
 
@@ -98,5 +99,7 @@ class SuperTwisting(SisoController):
         integral = ops.where(memory["started"] > 0, memory["integral"], self.initial_output)
         low, high = range_of(self.commanded, measurement.ranges)
         wanted = self.proportional * ops.sqrt(ops.absolute_value(s)) * sign + integral
-        later["integral"] = ops.clip(integral + dt * self.integral * sign, low, high)
-        return commands(self.commanded, ops.clip(wanted, low, high)), later
+        command = ops.clip(wanted, low, high)
+        rate = ops.where((wanted - command) * sign > 0.0, 0.0, self.integral * sign)
+        later["integral"] = integral + dt * rate
+        return commands(self.commanded, command), later

@@ -6,6 +6,7 @@ from typing import ClassVar
 from ...core import ParameterError, Reference, Value, model, ops, parameter, published, select_prefix, with_prefix
 from ...engine.loop import ControlLaw, Measurement, Memory, MultivariableController, Sampled
 from .angle_and_stiffness import AntagonisticInverse
+from .open_loop import check_pair
 
 FRANKLIN1998 = published("franklin-1998")
 
@@ -133,11 +134,7 @@ class ComputedTorque(ControlLaw):
     initial_memory: ClassVar[Mapping[str, float]] = {}
 
     def check(self) -> None:
-        if len(self.commanded) != 2:
-            raise ParameterError(
-                f"ComputedTorque: {len(self.commanded)} commanded pressures; name two, such as ('left.pressure', "
-                "'right.pressure')."
-            )
+        check_pair(self, self.commanded)
 
     @property
     def measured_columns(self) -> tuple[str, ...]:
@@ -170,13 +167,11 @@ class ComputedTorque(ControlLaw):
     def torque(self, angle: Value, speed: Value, acceleration: Value) -> Value:
         """Static torque of the muscles [N m] for an acceleration [rad/s2] at an angle [rad] and a speed [rad/s]."""
         inverse, mechanism, name = self.inverse, self.inverse.mechanism, self.inverse.coordinate
-        q, v, inputs = {name: angle}, {self._speed: speed}, {each.name: 0.0 for each in mechanism.inputs}
-        free, driven = (mechanism.acceleration(q, v, {name: torque}, inputs)[name] for torque in (0.0, 1.0))
-        lengths = [muscle.geometry.resting_length for muscle in inverse.muscles]
+        q, lengths = {name: angle}, [muscle.geometry.resting_length for muscle in inverse.muscles]
         contractions, middle = mechanism.contractions(q, lengths), 0.5 * (inverse.min_pressure + inverse.max_pressure)
         damping: Value = 0.0
         for i, (muscle, contraction) in enumerate(zip(inverse.muscles, contractions, strict=True)):
             unit = [1.0 if k == i else 0.0 for k in range(len(lengths))]
             arm = mechanism.generalised_forces(q, unit, lengths)[name]
             damping = damping + arm * muscle.damper.force(middle, contraction, arm * speed)
-        return (acceleration - free) / (driven - free) + damping
+        return mechanism.driving_force(q, {self._speed: speed}, acceleration) + damping

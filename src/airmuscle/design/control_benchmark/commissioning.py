@@ -30,9 +30,9 @@ RESTARTS = 2
 """Most restarts of the searches of a contender (chosen)."""
 Progress = Callable[[str, int, int], None]
 SensedLaw = TypeVar("SensedLaw", bound=Controller)
-PROBE, DAMPING, FIRST_REGION = 0.04, 1e-4, 0.5
-"""Step of a difference quotient and first radius of the trusted region, in parts of the ranges, and relative damping of
-the least squares (chosen)."""
+PROBE, DAMPING, FIRST_REGION, LEAST_REGION, LEAST_GAIN = 0.04, 1e-4, 0.5, 0.1, 0.02
+"""Step of a difference quotient, relative damping of the least squares, first radius of the trusted region and the
+least one with derivatives measured anew, in parts of the ranges, and relative gain of a small step (chosen)."""
 
 
 def search_gains(
@@ -111,7 +111,10 @@ class _Rig:
         tasks: Sequence[ControlTask], limit: int,
     ) -> None:  # fmt: skip
         self.joint, self.truth, self.law, self.ranges, self.tasks, self.limit = joint, truth, law, ranges, tasks, limit
-        self.runs, self.best, self.point = 0, np.inf, np.zeros(len(ranges))
+        known = {leaf.path: leaf.value for leaf in leaves(law)}
+        present = [np.array(min(max(known[each.path], each.low), each.high)) for each in ranges]
+        self.point = np.array([float(each.to_unit(value)) for each, value in zip(ranges, present, strict=True)])
+        self.runs, self.best = 0, np.inf
 
     def gains(self, point: Array) -> dict[str, float]:
         """The gains at a point (D,) within 0 and 1."""
@@ -143,46 +146,44 @@ def commission(
     bounds  minimum and maximum [SI] of each gain by its path
 
     Each set of gains is tried in all tasks. Each run is judged by the error of set point and reading of the encoder,
-    whose dead time is known afterwards: Gauss-Newton steps with difference quotients, in a trusted region that shrinks
-    where a step does not help. Nothing but the sensors of the truth is used.
+    whose dead time is known afterwards: Gauss-Newton steps in a trusted region that shrinks where a step does not help.
+    Their derivatives are difference quotients, corrected by what each step has shown (Broyden's update), and measured
+    again where a step does not help or hardly helps. Nothing but the sensors of the truth is used.
     """
-    known = {leaf.path: leaf.value for leaf in leaves(law)}
-    ranges = [GainRange(path, *pair) for path, pair in bounds.items()]
-    point = np.array([
-        float(each.to_unit(np.array(min(max(known[each.path], each.low), each.high)))) for each in ranges
-    ])  # fmt: skip
-    rig = _Rig(joint, truth, law, ranges, tasks, runs)
+    rig = _Rig(joint, truth, law, [GainRange(path, *pair) for path, pair in bounds.items()], tasks, runs)
     before = np.inf
     with contextlib.suppress(_Spent):
-        errors = rig.errors(point)
+        errors = rig.errors(rig.point)
         before = rig.best
-        _descend(rig, point, errors)
-    if not np.isfinite(rig.best):
-        return Commissioning(rig.gains(point), before, before, rig.runs)
+        _descend(rig, rig.point, errors)
     return Commissioning(rig.gains(rig.point), before, rig.best, rig.runs)
 
 
 def _descend(rig: _Rig, point: Array, errors: Array | None) -> None:
-    """Gauss-Newton steps until all runs are used."""
+    """Gauss-Newton steps until all runs are used, with derivatives that are measured or corrected by the last steps."""
     from scipy.optimize import lsq_linear
 
-    region = FIRST_REGION
-    while errors is not None:
-        slopes = np.array([_slope(rig, point, errors, i) for i in range(point.size)]).T
+    region, slopes, measured = FIRST_REGION, None, False
+    while errors is not None and region > 1e-3 and np.any(errors):
+        if slopes is None:
+            slopes, measured = np.array([_slope(rig, point, errors, i) for i in range(point.size)]).T, True
         damping = DAMPING * np.linalg.norm(slopes) * np.eye(point.size)
-        improved = False
-        while not improved and region > 1e-3:
-            low, high = (np.clip(point + side * region, 0.0, 1.0) - point for side in (-1.0, 1.0))
-            step = lsq_linear(
-                np.vstack([slopes, damping]), np.append(-errors, np.zeros(point.size)), (low - 1e-12, high + 1e-12)
-            ).x
-            tried = np.clip(point + step, 0.0, 1.0)
-            found = rig.errors(tried)
-            improved = found is not None and _rms(found) < _rms(errors)
-            region *= 1.5 if improved else 0.4
-        if not improved:
-            return
-        point, errors = tried, found
+        low, high = (np.clip(point + side * region, 0.0, 1.0) - point for side in (-1.0, 1.0))
+        step = lsq_linear(
+            np.vstack([slopes, damping]), np.append(-errors, np.zeros(point.size)), (low - 1e-12, high + 1e-12)
+        ).x
+        tried = np.clip(point + step, 0.0, 1.0)
+        step, found = tried - point, rig.errors(tried)
+        better = -1.0 if found is None else 1.0 - _rms(found) / _rms(errors)
+        if found is not None and np.any(step):
+            slopes = slopes + np.outer(found - errors - slopes @ step, step) / (step @ step)
+        if found is not None and better > 0.0:
+            point, errors, region, measured = tried, found, 1.5 * region, False
+            slopes = slopes if better >= LEAST_GAIN else None
+        elif measured:
+            region *= 0.4
+        else:
+            region, slopes = max(0.4 * region, LEAST_REGION), None
 
 
 def _slope(rig: _Rig, point: Array, errors: Array, index: int) -> Array:

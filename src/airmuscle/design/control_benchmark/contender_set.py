@@ -7,6 +7,7 @@ from ...control.laws import PID, SlidingMode, SuperTwisting, WithFeedForward, Wi
 from ...control.laws.angle_and_stiffness import AngleAndStiffness, AntagonisticInverse
 from ...control.laws.open_loop import FrictionFeedForward, MotionFeedForward, SetpointLead
 from ...control.laws.pressures import DIFFERENCE
+from ...core import with_prefix
 from ...engine.loop import ControlLaw
 from .contenders import Bounds, Contender
 from .designed_controllers import AlongMotion, DeviationLaw, JointDesign, RejectionDesign, joint_design_model
@@ -15,8 +16,9 @@ from .joints import BenchmarkJoint
 MAX_LEAD = 0.03
 """Greatest lead time [s] of a feed-forward (chosen): it replaces the lag of the pressures, never damping or inertia."""
 PID_BOUNDS: Bounds = {"gain": (2e4, 2e6), "integral_time": (0.02, 3.0), "derivative_time": (1e-3, 0.2)}
-PERMITTED_ANGLE = (2e-3, 0.2)
-"""Range of the permitted error [rad] of LQG and MPC, which is also sought on a truth: its bandwidth follows from it."""
+PERMITTED_ANGLE, BANDWIDTH = (2e-3, 0.2), (3.0, 100.0)
+"""Ranges of the permitted error [rad] of LQG and MPC, from which their bandwidth follows, and of the bandwidth [rad/s]
+of ADRC, which are also sought on a truth."""
 _SLIDING = (3e-3, 0.3)
 _LEAD, _FRICTION = "feed_forward.lead_time", "feedback.feed_forward.amplitude"
 FEED_FORWARD: Bounds = {_LEAD: (0.0, MAX_LEAD), _FRICTION: (0.0, 3e4)}
@@ -28,10 +30,6 @@ COMMISSIONED: Bounds = {
     "feedback.feedback.acceleration_gain": (-1e3, 1e3),
 }
 """Gains of the feed-forward that are sought on a truth."""
-
-
-def _inside(prefix: str, bounds: Bounds) -> Bounds:
-    return {f"{prefix}{path}": pair for path, pair in bounds.items()}
 
 
 def _feed_forward() -> WithFeedForward:
@@ -50,8 +48,8 @@ def _beside_feed_forward(
     commissioned  gains of the feedback that are also sought on a truth
     """
     law = WithFeedForward(_feed_forward(), WithSetpointDelay(feedback, _delay(joint)))
-    known = {**_inside("feed_forward.", FEED_FORWARD), **_inside("feedback.law.", bounds)}
-    sought = {**_inside("feed_forward.", COMMISSIONED), **_inside("feedback.law.", commissioned or {})}
+    known = {**with_prefix("feed_forward.", FEED_FORWARD), **with_prefix("feedback.law.", bounds)}
+    sought = {**with_prefix("feed_forward.", COMMISSIONED), **with_prefix("feedback.law.", commissioned or {})}
     return Contender(name, law, known, sought)
 
 
@@ -82,7 +80,7 @@ def standard_contenders(joint: BenchmarkJoint) -> tuple[Contender, ...]:
     design = JointDesign(model, 0.1, 7.0, 200.0, 0.005)
     quadratic = ours(
         "feed-forward + LQG", DeviationLaw(design),
-        _inside("law.", {
+        with_prefix("law.", {
             "permitted_angle": PERMITTED_ANGLE, "speed_noise": (0.1, 100.0), "disturbance_noise": (10.0, 1e4),
             "pressure_time": (3e-3, 0.1),
         }),
@@ -94,13 +92,13 @@ def standard_contenders(joint: BenchmarkJoint) -> tuple[Contender, ...]:
         ours("feed-forward + PID", dataclasses.replace(pid, derivative_weight=1.0), PID_BOUNDS),
         ours("feed-forward + sliding mode", sliding,
              {"amplitude": (5e3, 2e5), "sliding_time": _SLIDING, "boundary_layer": (3e-3, 1.0)}),
-        dataclasses.replace(
-            ours("feed-forward + super-twisting", twisting,
-                 {"proportional": (1e4, 1e6), "integral": (1e4, 3e6), "sliding_time": _SLIDING}), tracking=False),
+        ours("feed-forward + super-twisting", twisting,
+             {"proportional": (1e4, 1e6), "integral": (1e4, 3e6), "sliding_time": _SLIDING}),
         ours("feed-forward + ADRC", DeviationLaw(RejectionDesign(model, 20.0, 60.0)),
-             _inside("law.", {"bandwidth": (3.0, 100.0), "observer_bandwidth": (10.0, 500.0)})),
+             with_prefix("law.", {"bandwidth": BANDWIDTH, "observer_bandwidth": (10.0, 500.0)}),
+             {"law.bandwidth": BANDWIDTH}),
         quadratic,
         Contender("feed-forward + MPC", AlongMotion(_feed_forward(), design, _delay(joint)), {},
-                  {**_inside("feed_forward.", COMMISSIONED), "design.permitted_angle": PERMITTED_ANGLE}, quadratic),
+                  {**with_prefix("feed_forward.", COMMISSIONED), "design.permitted_angle": PERMITTED_ANGLE}, quadratic),
         _angle_and_stiffness(joint),
     )  # fmt: skip

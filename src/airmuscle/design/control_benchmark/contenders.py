@@ -8,7 +8,8 @@ from typing import Any, ClassVar, NamedTuple
 
 from ...control.laws import Cascade, CoContraction, ProportionalFeedback
 from ...control.laws.pressures import DIFFERENCE
-from ...core import ParameterError, Value, check_field_types, leaves, model, one_line, ops, united
+from ...core import ParameterError, Value, check_field_types, leaves, model, one_line, ops
+from ...core.system import select_prefix, united, with_prefix
 from ...engine.loop import ControlLaw, Controller, Measurement, Memory, Sampled, SigmaDelta, SplitRange, WithSensors
 from ...engine.run.compiled_law import LawSample
 from ..tuning import load_scenario_loop
@@ -114,7 +115,7 @@ class SensedController(Controller):
         readings, sensors = sense.step(memory.sensors, measurement, dt)
         seen = Measurement(readings, measurement.setpoints, {**measurement.ranges, **self.ranges})
         commands, own = self.controller.step(memory.controller, seen, dt)
-        points = {**measurement.setpoints, **{f"{COMMANDED}{name}": value for name, value in commands.items()}}
+        points = {**measurement.setpoints, **with_prefix(COMMANDED, commands)}
         valves, actuation = act.step(memory.actuation, seen._replace(setpoints=points), dt)
         memories = zip(self.actuation.initial_memory, actuation, strict=True)
         applied = {f".{key}".rpartition("outer.")[2].removeprefix("."): value for key, value in memories}
@@ -152,8 +153,6 @@ class Contender:
     commissioned  the same of the gains that are sought afterwards on each truth, by the same routine and number of runs
              for all contenders; none: the contender is not commissioned
     tuned_as  a contender whose tuned gains it takes, by the ends of their paths, in place of its own tuning
-    tracking  whether the law goes on from what proportional valves attain; not for an integral that would take up the
-              whole of it
     """
 
     name: str
@@ -161,7 +160,6 @@ class Contender:
     bounds: Bounds = dataclasses.field(default_factory=dict)
     commissioned: Bounds = dataclasses.field(default_factory=dict)
     tuned_as: "Contender | None" = None
-    tracking: bool = True
 
     def __post_init__(self) -> None:
         if not isinstance(self.law, Controller):
@@ -196,17 +194,17 @@ def complete(joint: BenchmarkJoint, contender: Contender, seed: int = 1) -> Comp
     _check_columns(joint, contender)
     ranges, known = (contender.bounds, contender.commissioned), {sensor.column: sensor for sensor in joint.sensors}
     if isinstance(contender.law, ControlLaw):
-        law, prefix, own = _actuated(joint, contender.law, contender)
+        law, prefix, own = _actuated(joint, contender.law, contender.name)
         sensors = tuple(known[name] for name in law.measured_columns)
-        tuned, commissioned = (_within(f"law.{prefix}", bounds) for bounds in ranges)
-        return CompleteLaw(WithSensors(law, sensors, float(seed)), {**tuned, **_within("law.", own)}, commissioned)
+        tuned, commissioned = (with_prefix(f"law.{prefix}", bounds) for bounds in ranges)
+        return CompleteLaw(WithSensors(law, sensors, float(seed)), {**tuned, **with_prefix("law.", own)}, commissioned)
     inputs = contender.law.inputs
-    law, _, own = _actuated(joint, PassedSignals((), inputs), contender)
-    tuned, commissioned = (_within("controller.", bounds) for bounds in ranges)
+    law, _, own = _actuated(joint, PassedSignals((), inputs), contender.name)
+    tuned, commissioned = (with_prefix("controller.", bounds) for bounds in ranges)
     span = joint.pressure_span
     limits = dict.fromkeys(joint.pressures, (joint.min_pressure, joint.max_pressure)) | {DIFFERENCE: (-span, span)}
     limited = {name: limits[name] for name in inputs if name in limits}
-    tuned = {**tuned, **_within("actuation.", own)} if tuned else {}
+    tuned = {**tuned, **with_prefix("actuation.", own)} if tuned else {}
     columns = united(contender.law.measured_columns, law.measured_columns)
     sense = WithSensors(PassedSignals(columns), tuple(known[name] for name in columns), float(seed))
     return CompleteLaw(SensedController(contender.law, law, limited, sense), tuned, commissioned)
@@ -222,10 +220,9 @@ def _check_columns(joint: BenchmarkJoint, contender: Contender) -> None:
         )
 
 
-def _actuated(joint: BenchmarkJoint, law: ControlLaw, contender: Contender) -> tuple[ControlLaw, str, Bounds]:
+def _actuated(joint: BenchmarkJoint, law: ControlLaw, name: str) -> tuple[ControlLaw, str, Bounds]:
     """A law with the parts from its commands to the valves, the prefix of its parameters, and ranges of the parts."""
-    prefix, ranges = "", dict[str, tuple[float, float]]()
-    tracking = contender.tracking and not joint.switching
+    prefix, ranges, tracking = "", dict[str, tuple[float, float]](), not joint.switching
     if law.inputs == (DIFFERENCE,):
         span = (joint.pressure_span,)
         law = Cascade(law, CoContraction(joint.pressures, 0.0, "mean_pressure"), (-span[0],), span, tracking)
@@ -238,17 +235,13 @@ def _actuated(joint: BenchmarkJoint, law: ControlLaw, contender: Contender) -> t
         prefix, ranges = f"outer.{prefix}", {"inner.gain": joint.pressure_gains}
         if joint.switching:
             law = SigmaDelta(law)
-            prefix, ranges = f"law.{prefix}", _within("law.", {**ranges, "inner.zone": ZONE})
+            prefix, ranges = f"law.{prefix}", with_prefix("law.", {**ranges, "inner.zone": ZONE})
     if set(law.inputs) != set(joint.model.inputs) - {"external_torque"}:
         raise ParameterError(
-            f"contender '{contender.name}' commands {', '.join(law.inputs)}; allowed are '{DIFFERENCE}', the pressures "
+            f"contender '{name}' commands {', '.join(law.inputs)}; allowed are '{DIFFERENCE}', the pressures "
             f"{', '.join(joint.pressures)}, or all valves."
         )
     return law, prefix, ranges
-
-
-def _within(prefix: str, bounds: Bounds) -> dict[str, tuple[float, float]]:
-    return {f"{prefix}{path}": pair for path, pair in bounds.items()}
 
 
 def scenario_contender(joint: BenchmarkJoint, path: str | Path) -> Contender:
@@ -271,5 +264,4 @@ def scenario_contender(joint: BenchmarkJoint, path: str | Path) -> Contender:
             f"allowed are '{DIFFERENCE}', the pressures {', '.join(joint.pressures)}, or all valves "
             f"{', '.join(sorted(allowed[2]))}. Judge a controller of another plant with tune and simulate."
         )
-    bounds = {key.removeprefix(prefix): pair for key, pair in scenario.bounds().items() if key.startswith(prefix)}
-    return Contender(Path(path).stem, law, bounds)
+    return Contender(Path(path).stem, law, select_prefix(prefix, scenario.bounds()))

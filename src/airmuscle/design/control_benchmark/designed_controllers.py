@@ -11,7 +11,7 @@ from ...control.estimation.predictive_design import design_predictive
 from ...control.laws.linear_model_predictive import RAWLINGS2017, LinearModelPredictive
 from ...control.laws.pressures import DIFFERENCE
 from ...control.laws.state_feedback import FRANKLIN1998, StateFeedback
-from ...core import ParameterError, Reference, Value, model, parameter
+from ...core import Reference, Value, model, parameter, within
 from ...engine.loop import ControlLaw, Controller, EnclosingLaw, LawDesign, Measurement, Memory, Sampled
 from ...physics.analysis.linear_model import LinearModel
 from .joints import ENCODER_STEP, BenchmarkJoint
@@ -25,8 +25,9 @@ pressure difference after 1 s [Pa] (chosen)."""
 RESERVE = 8e-3
 """Dead time [s] beyond the stated one with which a design reckons (chosen): the hold of a sample, 1 m of tube and two
 samples that nobody knows. Without it the loop amplifies errors near its bandwidth."""
-HORIZON = 40
-"""Samples of the horizon of the predictive controller (chosen)."""
+HORIZON, MAX_RATE = 40, 6e6
+"""Samples of the horizon of the predictive controller, and greatest rate [Pa/s] of the half pressure difference that it
+plans, about that of the model with its valves fully open (chosen)."""
 STEPS = (1e-3, 1e-2, 1e3)
 """Steps of angle [rad], speed [rad/s] and half pressure difference [Pa] of the linearisation (chosen)."""
 
@@ -84,7 +85,7 @@ class JointDesign(LawDesign):
     """Design of a controller of the reading with an observer of a disturbance torque, from weights.
 
     `law` is that of `control.design_lqg`, `predictive` that of `control.design_predictive` with the same weights and
-    the range of the command as a limit; references there.
+    the range and the rate of the command as limits; references there.
     """
 
     references: ClassVar[tuple[Reference, ...]] = (FRANKLIN1998, RAWLINGS2017)
@@ -104,7 +105,9 @@ class JointDesign(LawDesign):
     @functools.cached_property
     def predictive(self) -> LinearModelPredictive:
         """The predictive controller with its observer."""
-        controller: LinearModelPredictive = self.designed(design_predictive, horizon=HORIZON)
+        controller: LinearModelPredictive = self.designed(
+            design_predictive, horizon=HORIZON, max_rate={DIFFERENCE: MAX_RATE}
+        )
         return controller
 
     def designed(self, design: Callable[..., Any], **further: Any) -> Any:
@@ -192,11 +195,7 @@ class AlongMotion(Controller):
 
     feed_forward: ControlLaw
     design: JointDesign
-    delay: int
-
-    def check(self) -> None:
-        if not 0 <= self.delay <= 1000:
-            raise ParameterError(f"AlongMotion: delay is {self.delay}; allowed range: 0 to 1000 samples.")
+    delay: int = within(0, 1000)
 
     @property
     def measured_columns(self) -> tuple[str, ...]:

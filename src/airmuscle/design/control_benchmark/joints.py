@@ -16,7 +16,7 @@ from ...physics.muscle.friction import Dahl
 from ...physics.plant.plant import Plant
 from ...physics.pneumatics import FillDischarge, Orifice, Polytropic, Supply, TubeOrifice, Valve
 from ..tuning import RobustObjective
-from .tasks import DEGREE, ControlTask, SineMotion, tuning_tasks
+from .tasks import DEGREE, ControlTask, SineMotion, commissioning_tasks, tuning_tasks
 from .truths import JOINT, SIDES, SUPPLY, TRUTH_SEEDS, BenchmarkTruth, random_truth
 
 ENCODER_STEP = 2.0 * math.pi / 4096
@@ -49,7 +49,8 @@ class BenchmarkJoint(ShortRepr):
     objective       of tuning: rms error [degree] over the family with weights of air [kg/s] and travel [strokes/s]
     valve           description of the valves with their size
     pressure_gains  range of the gain of the inner pressure control [1/Pa] (chosen)
-    tuning_tasks    for which controllers are tuned, and commissioned on a truth
+    tuning_tasks    for which controllers are tuned
+    commissioning_tasks    for which they are commissioned on a truth; the default tuning tasks unless given
     """
 
     name: str
@@ -67,6 +68,7 @@ class BenchmarkJoint(ShortRepr):
     objective: RobustObjective = RobustObjective(air_weight=AIR_WEIGHT, travel_weight=TRAVEL_WEIGHT)
     pressure_gains: tuple[float, float] = (1e-5, 60e-5)
     tuning_tasks: tuple[ControlTask, ...] = tuning_tasks()
+    commissioning_tasks: tuple[ControlTask, ...] = tuning_tasks
 
     def __post_init__(self) -> None:
         check_field_types(self)
@@ -196,7 +198,7 @@ def proportional_joint(seeds: Sequence[int] = TRUTH_SEEDS) -> BenchmarkJoint:
         "proportional valves", model_plant(conductance), perturbed_models(conductance),
         tuple(random_truth(seed, conductance) for seed in seeds), benchmark_sensors(2e-3), 2e-3,
         f"four proportional valves, C = {conductance:g} m3/(s Pa) each", pressure_gains=PROPORTIONAL_GAINS,
-        tuning_tasks=tuning_tasks(FAST_SINE),
+        tuning_tasks=tuning_tasks(FAST_SINE), commissioning_tasks=commissioning_tasks(),
     )  # fmt: skip
 
 

@@ -8,13 +8,13 @@ import numpy as np
 
 from ...control.laws.iterative_learning import IterativeLearning
 from ...core import Array, ParameterError, ShortRepr, leaves
-from ...engine.loop import ControlLoop, Driver, WithSensors
+from ...engine.loop import Driver, WithSensors
 from ...engine.run import simulate
 from ...physics.plant.plant import Plant
 from .benchmark import ContenderResult
 from .commissioning import on_truth
 from .joints import ENCODER_STEP, BenchmarkJoint
-from .signals import TaskSignals, disturbance, task_signals
+from .signals import TaskSignals, task_loop, task_signals
 from .tasks import ControlTask
 
 SIGNAL, RATE = "feed_forward", "feed_forward_rate"
@@ -116,10 +116,8 @@ def _trial(
     """The angle (N,) [rad] one sample after each element of a feed-forward signal (N,) [Pa], of a plant and drivers."""
     plant, drivers = driven
     padded = np.append(signal, np.full(signals.time.size - signal.size, signal[-1]))
-    further = {SIGNAL: padded, RATE: np.zeros_like(padded)}
-    loop = ControlLoop(
-        law, joint.sample_time, signals.setpoint(law.setpoints, further), disturbance(task, plant.inputs), drivers
-    )
+    learned = signals._replace(feed_forward=padded, feed_forward_rate=np.zeros_like(padded))
+    loop = task_loop(joint, law, task, plant, drivers, learned)
     duration = signal.size * joint.sample_time
     record = simulate(plant, loop, duration=duration, initial_state=start, output_times=joint.sample_time)
     return np.interp(signals.time[1 : signal.size + 1], record["time"], record["angle"])

@@ -43,9 +43,9 @@ class TaskSignals(NamedTuple):
     feed_forward_rate: Array
     stiffness: Array
 
-    def setpoint(self, names: Sequence[str], further: Mapping[str, Array] | None = None) -> SampledSignal:
+    def setpoint(self, names: Sequence[str]) -> SampledSignal:
         """The named signals as set points. Raises ParameterError for a name that a task does not have."""
-        known = {**self._asdict(), **(further or {})}
+        known = self._asdict()
         known.pop("time")
         points = {}
         for name in names:
@@ -102,8 +102,8 @@ def inverse_dynamics(joint: BenchmarkJoint, plant: Plant, motion: JointMotion, t
     difference by bisection within the range of the joint. A motion beyond the range receives the limit.
     """
     angle, speed, acceleration = motion.at(time)
-    free, driven = (_acceleration(plant, angle, speed, torque) for torque in (0.0, 1.0))
-    wanted = (acceleration - free) / (driven - free)
+    (coordinate,) = plant.mechanism.coordinates
+    wanted = plant.mechanism.driving_force({coordinate.name: angle}, {coordinate.speed: speed}, acceleration)
     low, high = np.full(time.shape, -joint.pressure_span), np.full(time.shape, joint.pressure_span)
     for _ in range(BISECTIONS):
         half = 0.5 * (low + high)
@@ -116,15 +116,9 @@ def angular_acceleration(joint: BenchmarkJoint, plant: Plant, angle: float, spee
     """Acceleration [rad/s2] of a plant without friction at an angle [rad], a speed [rad/s] and half a pressure
     difference [Pa] about the mean pressure."""
     torque = _torque(plant, angle, speed, joint.mean_pressure + half, joint.mean_pressure - half)
-    return float(_acceleration(plant, angle, speed, torque))
-
-
-def _acceleration(plant: Plant, angle: Any, speed: Any, torque: Any) -> Any:
-    """Acceleration [rad/s2] of the joint under a torque of the muscles [N m]."""
     coordinate, inputs = plant.mechanism.coordinates[0], {each.name: 0.0 for each in plant.mechanism.inputs}
-    return plant.mechanism.acceleration(
-        {coordinate.name: angle}, {coordinate.speed: speed}, {coordinate.name: torque}, inputs
-    )[coordinate.name]
+    q, v, forces = {coordinate.name: angle}, {coordinate.speed: speed}, {coordinate.name: torque}
+    return float(plant.mechanism.acceleration(q, v, forces, inputs)[coordinate.name])
 
 
 def _torque(plant: Plant, angle: Any, speed: Any, first: Any, second: Any) -> Any:
@@ -141,15 +135,16 @@ def _torque(plant: Plant, angle: Any, speed: Any, first: Any, second: Any) -> An
 
 
 def task_loop(
-    joint: BenchmarkJoint, law: Controller, task: ControlTask, plant: Plant, drivers: Mapping[str, Driver]
-) -> ControlLoop:
-    """The control loop of a task at a plant with drivers of its valves."""
+    joint: BenchmarkJoint, law: Controller, task: ControlTask, plant: Plant, drivers: Mapping[str, Driver],
+    signals: TaskSignals | None = None,
+) -> ControlLoop:  # fmt: skip
+    """The control loop of a task at a plant with drivers of its valves; signals other than those of the task."""
     if task.stuck is not None and isinstance(law, SensedController):
         law = dataclasses.replace(law, stuck=task.stuck)
     elif task.stuck is not None:
         assert isinstance(law, ControlLaw)
         law = WithStuckValve(law, task.stuck.input, task.stuck.time, task.stuck.opening)
-    setpoint = task_signals(joint, task).setpoint(law.setpoints)
+    setpoint = (signals or task_signals(joint, task)).setpoint(law.setpoints)
     return ControlLoop(law, joint.sample_time, setpoint, disturbance(task, plant.inputs), drivers)
 
 

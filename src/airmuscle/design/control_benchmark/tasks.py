@@ -196,13 +196,30 @@ def tuning_tasks(*fast: SineMotion) -> tuple[ControlTask, ControlTask]:
     Smooth motions with sines of 0.8, 1.7 and 3.7 Hz, and the further ones, with a step of the torque; and a step of the
     angle that must have settled. Their durations are equal.
     """
-    rises = MinimumJerkMotion(10.0 * DEGREE, 0.1, 0.6), MinimumJerkMotion(-14.0 * DEGREE, 1.0, 0.5)
-    sines = (SineMotion(a * DEGREE, f) for a, f in ((8.0, 0.8), (8.0, 1.7), (2.0, 3.7)))
-    motions = SumOfMotions((*rises, *sines, *fast))
+    motions = _tuning_motions(SineMotion(2.0 * DEGREE, 3.7), *fast)
     return (
         ControlTask("tuning: motions", motions, 3.0, torque=((0.0, 0.0), (1.8, 0.0), (1.81, 1.0))),
         ControlTask("tuning: step", StepMotion(18.0 * DEGREE, 0.1), 3.0),
     )
+
+
+def commissioning_tasks() -> tuple[ControlTask, ControlTask]:
+    """What controllers of proportional valves are commissioned for on a truth (chosen), none of the tasks judged.
+
+    The motions of tuning with larger fast sines, which the gains of a feed-forward need; and the step, with a torque in
+    both directions. Against a torque during the motions, or one whose mean is not 0, those gains would be misused.
+    """
+    motions = _tuning_motions(SineMotion(5.0 * DEGREE, 3.7), SineMotion(3.0 * DEGREE, 5.9))
+    torque = ((1.2, 0.0), (1.21, 1.0), (1.8, 1.0), (1.81, -1.0), (2.4, -1.0), (2.41, 0.0))
+    return (
+        ControlTask("commissioning: motions", motions, 3.0),
+        ControlTask("commissioning: step", StepMotion(18.0 * DEGREE, 0.1), 3.0, torque=((0.0, 0.0), *torque)),
+    )
+
+
+def _tuning_motions(*fast: SineMotion) -> SumOfMotions:
+    rises = MinimumJerkMotion(10.0 * DEGREE, 0.1, 0.6), MinimumJerkMotion(-14.0 * DEGREE, 1.0, 0.5)
+    return SumOfMotions((*rises, SineMotion(8.0 * DEGREE, 0.8), SineMotion(8.0 * DEGREE, 1.7), *fast))
 
 
 TUNING_BEGIN = 0.7

@@ -246,15 +246,13 @@ def _needed_torque(plant: am.Plant, x: Any) -> Any:
     mechanism, lengths = plant.mechanism, plant.resting_lengths
     coordinate = mechanism.coordinates[0]
     q, v = {coordinate.name: x[0]}, {coordinate.speed: x[1]}
-    rest = dict.fromkeys((each.name for each in mechanism.inputs), 0.0)
-    free, driven = (mechanism.acceleration(q, v, {coordinate.name: t}, rest)[coordinate.name] for t in (0.0, 1.0))
     contractions = mechanism.contractions(q, lengths)
     damping = []
     for muscle, length, contraction, pressure in zip(plant.muscles, lengths, contractions, (x[3], x[4]), strict=True):
         speed = length * casadi.jacobian(casadi.SX(contraction), x[0]) * x[1]
         damping.append(-muscle.damper.force(pressure, contraction, speed))
     held = mechanism.generalised_forces(q, damping, lengths)[coordinate.name]
-    return casadi.SX((x[2] - free) / (driven - free) - held)
+    return casadi.SX(mechanism.driving_force(q, v, x[2]) - held)
 
 
 def _module(printer: Printer, names: list[str]) -> str:

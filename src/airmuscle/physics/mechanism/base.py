@@ -108,6 +108,12 @@ class Mechanism(abc.ABC):
     def acceleration(self, q: Values, v: Values, forces: Values, inputs: Values) -> Values:
         """Acceleration of each coordinate under the generalised muscle forces and the forces of the mechanism."""
 
+    def driving_force(self, q: Values, v: Values, acceleration: Value) -> Value:
+        """Generalised force of the muscles for an acceleration of the only coordinate, without inputs."""
+        (coordinate,), inputs = self.coordinates, {each.name: 0.0 for each in self.inputs}
+        free, driven = (self.acceleration(q, v, {coordinate.name: f}, inputs)[coordinate.name] for f in (0.0, 1.0))
+        return (acceleration - free) / (driven - free)
+
     def dissipated_power(self, q: Values, v: Values, forces: Values, inputs: Values) -> Value:
         """Power [W] that leaves the mechanism through its dampers, end stops, drives and external loads."""
         return 0.0
