@@ -14,7 +14,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import airmuscle as am
-from airmuscle.control import AngleAndStiffness, StaticFeedForward, StaticInverse
+from airmuscle.control import StaticFeedForward, StaticInverse
 from airmuscle.core import autodiff
 from airmuscle.errors import ParameterError
 from airmuscle.files.library import LAWS as LAW_FILES
@@ -147,9 +147,8 @@ def test_a_stiffness_that_would_slacken_a_muscle_keeps_both_at_the_minimum_tensi
 
 
 def test_the_torque_that_holds_the_joint_is_that_of_the_equilibrium():
-    law = AngleAndStiffness(INVERSE, ("left.pressure", "right.pressure"))
-    from_law = float(law._torque_at(0.3, 0.0))
-    assert from_law == pytest.approx(MECHANISM.weight_torque * np.sin(0.3), rel=1e-12)
-    pressures = INVERSE.pressures(0.3, from_law, 8.0)
+    torque = float(MECHANISM.driving_force({"angle": 0.3}, {"angular_speed": 0.0}, 0.0))
+    assert torque == pytest.approx(MECHANISM.weight_torque * np.sin(0.3), rel=1e-12)
+    pressures = INVERSE.pressures(0.3, torque, 8.0)
     start = am.find_equilibrium(JOINT, pressure=tuple(pressures))
     assert start["angle"] == pytest.approx(0.3, abs=1e-6)
