@@ -29,7 +29,7 @@ BOUND_SHIFT = 0.1
 """Shift of a bound, relative to its value, whose effect on the other unknowns is stated (chosen)."""
 MIN_RECORDS, MAX_SCATTER = 3, 2.0
 """Records from which their scatter is known, and its ratio to the standard error of the rows from which it counts
-(chosen): with three records, a true standard error is exceeded so far in 2 % of cases."""
+(chosen): with three records, the scatter is that far above a true standard error in about 2 % of cases."""
 MIN_SEARCHES = 3
 """Number of searches from which a single one at the optimum is named (chosen)."""
 MAX_NAMES = 3
