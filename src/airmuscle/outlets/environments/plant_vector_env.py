@@ -128,7 +128,8 @@ class PlantVectorEnv(gymnasium.vector.VectorEnv):  # type: ignore[misc, unused-i
         np.clip(actions, -1.0, 1.0, out=self._inputs[:, :count], casting="same_kind")
         self._elapsed += 1
         np.multiply(self._elapsed, self.task.period, out=self._inputs[:, count], casting="same_kind")
-        effort = self.task.effort_weight * np.mean(np.square(self._inputs[:, :count], dtype=float), axis=1)
+        given = self._inputs[:, :count].astype(float)
+        effort = self.task.effort_weight * (np.einsum("ij,ij->i", given, given) / count)
         self._plants.inputs[...] = self._given.transpose(0, 2, 1)
         self._plants.advance(self._steps)
         anew = np.flatnonzero(self._over)
@@ -137,7 +138,8 @@ class PlantVectorEnv(gymnasium.vector.VectorEnv):  # type: ignore[misc, unused-i
         observations, rewards, terminated = self._observed()
         truncated: Booleans = self._elapsed >= self.max_episode_steps
         rewards[anew], terminated[anew] = 0.0, False
-        effort[terminated & ~observations.any(axis=1)] = 0.0  # an impossible state
+        ends = np.flatnonzero(terminated)
+        effort[ends[~observations[ends].any(axis=1)]] = 0.0  # an impossible state
         terms = {"closeness": rewards + effort, "effort": effort}
         over: Booleans = terminated | truncated
         if not self._at_once:
@@ -223,7 +225,7 @@ class PlantVectorEnv(gymnasium.vector.VectorEnv):  # type: ignore[misc, unused-i
 
 def _masked(terms: dict[str, Array], present: Booleans) -> dict[str, Any]:
     """Terms of the rewards (N,) where they are present, 0 elsewhere, with the masks of Gymnasium's own vectors."""
-    values = {name: np.where(present, value, 0.0) for name, value in terms.items()}
+    values = terms if present.all() else {name: np.where(present, value, 0.0) for name, value in terms.items()}
     return {**values, **{f"_{name}": present.copy() for name in terms}}
 
 
