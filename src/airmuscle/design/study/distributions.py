@@ -88,19 +88,16 @@ class Range:
 
 
 class Distribution(Variation):
-    """A continuous probability distribution, evaluated by scipy.stats."""
+    """A continuous probability distribution, of functions of `scipy.special`: `scipy.stats` takes long to import."""
 
     @abc.abstractmethod
-    def scipy_distribution(self) -> Any:
-        """The frozen distribution of scipy.stats."""
-
-    def ppf(self, probabilities: Array) -> Array:
-        return np.asarray(self.scipy_distribution().ppf(probabilities), dtype=float)
+    def cdf(self, values: Array) -> Array:
+        """The cumulative distribution function (N,) at values (N,)."""
 
     @property
     def support(self) -> tuple[float, float]:
-        low, high = self.scipy_distribution().support()
-        return float(low), float(high)
+        low, high = self.ppf(np.array([0.0, 1.0])).tolist()
+        return low, high
 
 
 @dataclasses.dataclass(frozen=True)
@@ -110,10 +107,11 @@ class Uniform(Distribution):
     low: float = custom_field(read_quantity, "lower bound")
     high: float = custom_field(read_quantity, "upper bound")
 
-    def scipy_distribution(self) -> Any:
-        from scipy import stats
+    def ppf(self, probabilities: Array) -> Array:
+        return probabilities * (self.high - self.low) + self.low
 
-        return stats.uniform(self.low, self.high - self.low)
+    def cdf(self, values: Array) -> Array:
+        return np.clip((values - self.low) / (self.high - self.low), 0.0, 1.0)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -124,10 +122,15 @@ class Normal(Distribution):
     mean: float = custom_field(read_quantity, "mean")
     std: float = custom_field(read_difference, "standard deviation")
 
-    def scipy_distribution(self) -> Any:
-        from scipy import stats
+    def ppf(self, probabilities: Array) -> Array:
+        from scipy import special
 
-        return stats.norm(self.mean, self.std)
+        return np.asarray(special.ndtri(probabilities) * self.std + self.mean)
+
+    def cdf(self, values: Array) -> Array:
+        from scipy import special
+
+        return np.asarray(special.ndtr((values - self.mean) / self.std))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -140,10 +143,12 @@ class LogNormal(Distribution):
         read_ratio, "standard deviation of the natural logarithm; approximately the relative standard deviation"
     )
 
-    def scipy_distribution(self) -> Any:
-        from scipy import stats
+    def ppf(self, probabilities: Array) -> Array:
+        return np.exp(Normal(0.0, self.log_std).ppf(probabilities)) * self.median
 
-        return stats.lognorm(self.log_std, scale=self.median)
+    def cdf(self, values: Array) -> Array:
+        with np.errstate(divide="ignore"):
+            return Normal(0.0, self.log_std).cdf(np.log(np.maximum(values / self.median, 0.0)))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -161,10 +166,17 @@ class Triangular(Distribution):
                 f"Triangular: mode is {self.mode:g}; it must lie between low, {self.low:g}, and high, {self.high:g}."
             )
 
-    def scipy_distribution(self) -> Any:
-        from scipy import stats
+    def ppf(self, probabilities: Array) -> Array:
+        q, c = probabilities, (self.mode - self.low) / (self.high - self.low)
+        unit = np.where(q < c, np.sqrt(c * q), 1.0 - np.sqrt((1.0 - c) * (1.0 - q)))
+        return unit * (self.high - self.low) + self.low
 
-        return stats.triang((self.mode - self.low) / (self.high - self.low), self.low, self.high - self.low)
+    def cdf(self, values: Array) -> Array:
+        c = (self.mode - self.low) / (self.high - self.low)
+        x = np.clip((values - self.low) / (self.high - self.low), 0.0, 1.0)
+        with np.errstate(divide="ignore", invalid="ignore"):  # of the branch that is not taken
+            falling = np.where(x < 1.0, (x * x - 2.0 * x + c) / (c - 1.0), 1.0)
+            return np.where(x < c, x * x / c, falling)
 
 
 def _read_inner(value: Any, unit: str, where: Location) -> Distribution:
@@ -192,8 +204,8 @@ class Truncated(Variation):
             )
 
     def _probability_range(self) -> tuple[float, float]:
-        below, above = self.inner.scipy_distribution().cdf([self.low, self.high])
-        return float(below), float(above)
+        below, above = self.inner.cdf(np.array([self.low, self.high])).tolist()
+        return below, above
 
     def ppf(self, probabilities: Array) -> Array:
         below, above = self._probability_range()
