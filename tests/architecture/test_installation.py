@@ -213,7 +213,8 @@ def test_an_installation_uses_the_locks_that_the_command_needs(
     monkeypatch.setattr(subprocess, "call", lambda command, **settings: called.append(command[-1]))
     assert run.install(everything) is None
     locks = ["requirements.lock", "requirements-dev.lock"] if everything else ["requirements.lock"]
-    assert [Path(name).name for name in called[1:-1]] == locks
+    assert [Path(name).name for name in called[1:-2]] == locks
+    assert called[-1] == str(checkout / ".venv" / "lib")  # is compiled when all packages are there
     assert run.installed(everything)
 
 
@@ -226,7 +227,7 @@ def test_further_packages_are_added_once_and_keep_the_stamp_of_the_program(
     monkeypatch.setattr(subprocess, "call", lambda command, **settings: called.append(command[-1]))
     assert run.install_added(name) is None
     assert run.install_added(name) is None
-    assert [Path(lock).name for lock in called] == [f"requirements-{name}.lock"]
+    assert [Path(lock).name for lock in called] == [f"requirements-{name}.lock", "lib"]
     assert run.installed(everything=True)
 
 
