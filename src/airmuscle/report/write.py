@@ -108,6 +108,26 @@ def _check_unique(chapters: Iterable[Chapter]) -> None:
 
 def render_page(chapters: Sequence[Chapter], figures: Path, *, title: str, date: datetime.date) -> str:
     """Return the HTML of a report; the folder `figures` contains its figures as <name>.svg and <name>.png."""
+    page: str = _template().render(
+        title=title,
+        date=date.isoformat(),
+        chapters=chapters,
+        claims=[claim for chapter in chapters for claim in chapter.claims],
+        kinds=list(Kind),
+        statements=statements,
+        count_verdicts=count_verdicts,
+        marks=MARKS,
+        meanings=MEANINGS,
+        versions=versions(),
+        zip=zip,
+        image=lambda plot: image_data_uri(figures / plot.name),
+    )
+    return page
+
+
+@functools.cache
+def _template() -> Any:
+    """The template of a page, compiled once in a process."""
     import jinja2  # needed by reports only
     from markupsafe import Markup
 
@@ -132,21 +152,8 @@ def render_page(chapters: Sequence[Chapter], figures: Path, *, title: str, date:
         results=lambda chapter: value_table(f"{chapter.name}-results", "Results", chapter.values),
         is_short=is_short,
     )
-    template = resources.files(__package__).joinpath("template.html").read_text(encoding="utf-8")
-    return environment.from_string(template).render(
-        title=title,
-        date=date.isoformat(),
-        chapters=chapters,
-        claims=[claim for chapter in chapters for claim in chapter.claims],
-        kinds=list(Kind),
-        statements=statements,
-        count_verdicts=count_verdicts,
-        marks=MARKS,
-        meanings=MEANINGS,
-        versions=versions(),
-        zip=zip,
-        image=lambda plot: image_data_uri(figures / plot.name),
-    )
+    text = resources.files(__package__).joinpath("template.html").read_text(encoding="utf-8")
+    return environment.from_string(text)
 
 
 def render_cell(value: Any, column: ShownColumn | None = None) -> str:

@@ -40,7 +40,12 @@ def _is_file_model(cls: type[Any]) -> bool:
 
 def model_names(kind: Any = Any) -> tuple[str, ...]:
     """Names of all classes that a file may name, sorted; with an annotation `kind`, of those that it allows."""
-    return tuple(sorted(name for name, cls in _registry().items() if allows(kind, cls)))
+    if kind not in _NAMES:
+        _NAMES[kind] = tuple(sorted(name for name, cls in _registry().items() if allows(kind, cls)))
+    return _NAMES[kind]
+
+
+_NAMES: dict[Any, tuple[str, ...]] = {}
 
 
 def allows(kind: Any, cls: type[Any]) -> bool:
