@@ -1,4 +1,5 @@
-"""Every command that distributes its work gives, on the workers of a Dask cluster, what one process gives."""
+"""Every command that distributes its work gives, on the workers of a Dask cluster, what one process gives; a problem,
+too, is solved there."""
 
 from __future__ import annotations
 
@@ -13,6 +14,9 @@ from scenario_files import HELD_FILL, HELD_STUDY, MUSCLE_FILE, PRESSURE_LOOP
 
 from airmuscle import Recording, load, load_data
 from airmuscle.bench import write
+from airmuscle.design import dask_cluster
+from airmuscle.engine import solve
+from airmuscle.files import load_scenario
 
 COMMANDS = {
     "compare": ("fit", "map.csv", "--compare", "--characteristic", "Sarosi2012", "--characteristic", "Hunt2017"),
@@ -22,8 +26,8 @@ COMMANDS = {
     "benchmark": ("benchmark", "--controller", "PID", "--task", "step", "--budget", 112, "--truths", 1, "--runs", 2),
     "campaign": ("campaign", "map.csv", "loop.csv", "--resting-length", "300 mm"),
 }
-FEW = ("compare",)
-"""The command that runs by default; a plant that is sent to a cluster is a test of the studies."""
+FEW = ("study",)
+"""The command that runs by default, whose workers start in a third of the time of those that compare laws."""
 
 
 @pytest.fixture(scope="module")
@@ -72,3 +76,10 @@ def test_a_command_on_a_cluster_gives_what_one_process_gives(folder: Path, clust
     assert [(folder / "there" / table).read_bytes() for table in tables] == [
         (folder / "alone" / table).read_bytes() for table in tables
     ]
+
+
+def test_a_worker_of_dask_solves_a_problem_that_was_sent_to_it(folder: Path, cluster: str):
+    problem = load_scenario(folder / "scenario.toml").problem
+    with dask_cluster(cluster) as executor:
+        there = executor.submit(solve, problem).result()
+    np.testing.assert_array_equal(there.recording["pressure"], solve(problem).recording["pressure"])

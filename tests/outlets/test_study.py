@@ -267,13 +267,6 @@ def local_dask():
         yield executor
 
 
-def test_a_worker_of_dask_solves_a_problem_that_was_sent_to_it(folder: Path):
-    problem = load_scenario(folder / "scenario.toml").problem
-    with local_dask() as executor:
-        there = executor.submit(solve, problem).result()
-    np.testing.assert_array_equal(there.recording["pressure"], solve(problem).recording["pressure"])
-
-
 def test_each_worker_of_a_pool_has_one_thread_of_linear_algebra_and_its_share_of_the_cores(monkeypatch):
     monkeypatch.delenv("OPENBLAS_NUM_THREADS", raising=False)
     environment = functools.partial(subprocess.check_output, shell=True, text=True)
