@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from joints import chosen_muscle, joint, joint_start
 
+import airmuscle as am
 from airmuscle.engine import Problem, Rodas4, Schedule, simulate, solve
 from airmuscle.engine.compile import compile_system
 from airmuscle.errors import AirmuscleError, ParameterError
@@ -219,3 +220,22 @@ def test_python_control_receives_the_nonlinear_system():
     for label, values in zip(system.output_labels, found.outputs, strict=True):
         scale = np.abs(expected[label]).max()
         assert np.abs(values - expected[label]).max() <= 1e-9 * (scale or 1.0), label
+
+
+def test_a_regulator_that_rests_is_named_as_a_kink_and_one_that_fills_is_not():
+    """At rest its valves neither fill nor vent: a lower set point discharges, a higher one fills, with another flow."""
+    plant = am.load("joint-dmsp-20-regulators").plant
+    rest = find_equilibrium(plant, pressure=2e5)
+    setpoints = dict.fromkeys(("left.setpoint", "right.setpoint"), 2e5)
+    at_rest = linearise(plant, rest, setpoints)
+    assert {"left.lagged_setpoint", "right.lagged_setpoint", "angle"} <= set(at_rest.kinks)
+    assert "one-sided by" in repr(at_rest)
+    assert at_rest.select(outputs=["angle"]).kinks == at_rest.kinks
+    filling = {**rest, "left.lagged_setpoint": 2.3e5, "right.lagged_setpoint": 2.3e5}
+    assert linearise(plant, filling, setpoints).kinks == ()
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_a_smooth_state_and_inputs_within_their_range_have_no_kink(case):
+    plant, inputs = CASES[case]
+    assert linearise(plant, moving(plant), inputs).kinks == ()

@@ -51,7 +51,7 @@ def test_another_optimum_of_nearly_the_same_residual_is_named_with_its_values() 
     optima = distinct_optima(values, costs, np.ones(2))
     assert [each.searches for each in optima] == [1, 1, 1]
     first, second = describe_optima(optima, estimates, costs)
-    assert "one search of 3 ended where the rms residual is only 1.0 % greater" in first
+    assert "1 search of 3 ended where the rms residual is only 1.0 % greater" in first
     assert "valve.critical_ratio 0.69 instead of 0.5;" in first
     assert "conductance" not in first
     assert "only one of 3 searches reached this optimum" in second

@@ -46,6 +46,7 @@ from .absolute_pressure import check_above_vacuum as check_above_vacuum
 from .annotation import abridged as abridged
 from .annotation import check_field_types as check_field_types
 from .annotation import check_whole as check_whole
+from .annotation import counted as counted
 from .annotation import one_line as one_line
 from .annotation import within as within
 from .arrays import BLAS_THREADS as BLAS_THREADS

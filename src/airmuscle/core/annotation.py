@@ -139,6 +139,11 @@ def abridged(value: Any) -> str:
     return _shortened(repr, value)
 
 
+def counted(number: int, noun: str) -> str:
+    """A number of things as a text."""
+    return f"{number} {noun}{'' if number == 1 else 'es' if noun.endswith('ch') else 's'}"
+
+
 def one_line(value: Any) -> str:
     """The text of a value for a message, on one line with at most 80 characters."""
     return _shortened(lambda each: " ".join(str(each).split()), value)

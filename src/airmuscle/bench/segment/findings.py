@@ -5,7 +5,7 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from ...core import Array, ColumnError, Hint, HintedText
+from ...core import Array, ColumnError, Hint, HintedText, counted
 from ...recording.columns import ZERO_NOT_STATED, quantity_of
 from ...recording.recording import Recording
 from ..readers.time_base import UNIFORM, WITHOUT_TIME
@@ -71,12 +71,12 @@ def _time_findings(recording: Recording, sampling: Sampling | None) -> Iterator[
     for rows, verb in ((sampling.repeated_rows, "repeats"), (sampling.backward_rows, "decreases")):
         if rows:
             hints = (UNIFORM, WITHOUT_TIME) if sampling.rounded else (WITHOUT_TIME,)
-            text = f"time {verb} in {_count(len(rows), 'row')}, first in row {rows[0] + 1}. Sort the rows, delete "
+            text = f"time {verb} in {counted(len(rows), 'row')}, first in row {rows[0] + 1}. Sort the rows, delete "
             yield Finding(HintedText(f"{text}duplicates, or write two runs to two files.", *hints), serious=True)
     if sampling.gaps:
         longest = max(sampling.gaps, key=lambda gap: gap.duration)
         yield Finding(
-            f"{_count(len(sampling.gaps), 'gap')} in time, the longest of {longest.duration:.4g} s after row "
+            f"{counted(len(sampling.gaps), 'gap')} in time, the longest of {longest.duration:.4g} s after row "
             f"{longest.row + 1} (sample time {sampling.sample_time:.4g} s). Do not fit dynamics across gaps."
         )
 
@@ -93,7 +93,7 @@ def _sensor_findings(recording: Recording, sensors: Mapping[str, Sensor]) -> Ite
             if count:
                 yield Finding(
                     f"the {name} sensor saturates at its {adjective} limit, {limit:.4g}{unit}, in "
-                    f"{_count(count, 'row')} ({100 * fraction:.0f} %). These rows are bounds (censored), not values.",
+                    f"{counted(count, 'row')} ({100 * fraction:.0f} %). These rows are bounds (censored), not values.",
                     serious=fraction >= MAX_SATURATED_FRACTION,
                 )
 
@@ -182,7 +182,3 @@ def _is_ramp(pressure: Array, rows: int) -> bool:
     """Whether the pressure changes in the last rows as much as it usually does in as many, as in a sweep."""
     changes = np.abs(np.diff(pressure[::-rows]))
     return bool(abs(changes[0] - np.median(changes)) <= RAMP_TOLERANCE * np.median(changes))
-
-
-def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

@@ -9,11 +9,10 @@ import numpy as np
 from ...core import Array, ParameterError, ShortRepr, flatten
 from ...engine.loop import ColumnSensor, ControlLaw, rebuilt
 from ...engine.run.compiled_law import TracedSample, trace_sample
+from ...physics.analysis.linear_model import one_sided
 
 KINK = 1e-3
 """Relative difference of the slopes on both sides above which a law is at a kink (chosen)."""
-STEP = 1e-5
-"""Part of the size of a measured column by which the sides of a kink are told apart (chosen)."""
 STEPS = 25
 """Newton steps for the memory that gives wanted commands (chosen)."""
 
@@ -127,25 +126,22 @@ def _moved(sample: _Sample, point: Point, wanted: Array) -> Point:
 
 def _check_sides(sample: _Sample, point: Point, sizes: Sequence[float]) -> None:
     """Raise ParameterError where the slopes of the commands differ on both sides, or nothing reaches the commands."""
-    n, (values, slopes) = sample.count, sample(point)
+    n, slopes = sample.count, sample(point)[1]
     if not np.any(slopes[n:]):
         raise ParameterError(
             f"linearise_loop: no command of {type(sample.law).__name__} depends on memory, measurements or set points "
             "at this working point: it is at a limit, or switches. Choose another one."
         )
-    for i, size in enumerate(sizes):
-        move = np.zeros(point.measured.size)
-        move[i] = STEP * size
-        after, before = (sample(point._replace(measured=point.measured + side * move))[0] for side in (1.0, -1.0))
-        up, down = after - values, values - before
-        scale = KINK * max(np.abs(up[n:]).max(), np.abs(down[n:]).max(), 1e-300)
-        exact = slopes[:, n + i] * move[i]
-        if np.abs(up - exact)[n:].max() > scale or np.abs(down - exact)[n:].max() > scale:
-            raise ParameterError(
-                f"linearise_loop: the slopes of {type(sample.law).__name__} by '{sample.law.measured_columns[i]}' "
-                "differ on both sides of this working point (a closed valve in split range, a limit, a dead zone). "
-                "Choose one on a side: give inputs that are open by a little, such as {'fill': 0.01}."
-            )
+
+    def commands(measured: Array) -> Array:
+        return sample(point._replace(measured=measured))[0][n:]
+
+    for i in one_sided(commands, point.measured, slopes[n:, n : n + len(sizes)], np.array(sizes), KINK):
+        raise ParameterError(
+            f"linearise_loop: the slopes of {type(sample.law).__name__} by '{sample.law.measured_columns[i]}' "
+            "differ on both sides of this working point (a closed valve in split range, a limit, a dead zone). "
+            "Choose one on a side: give inputs that are open by a little, such as {'fill': 0.01}."
+        )
 
 
 def _observed(by_memory: Array, n: int) -> list[int]:

@@ -8,13 +8,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core import Array, ParameterError, PhysicsError, ShortRepr, SimulationError
+from ...core import Array, PhysicsError, ShortRepr, SimulationError, counted
 from ...engine.distribution import DistributedCalls
 from ...engine.loop import Controller
 from ...engine.processes import Workers, process_pool
 from ...recording import Recording
 from ..tuning import Tuning
-from ..tuning.case import with_gains
+from ..tuning.case import check_names, with_gains
 from .commissioning import (
     COMMISSIONING_RUNS,
     SETS_PER_GAIN,
@@ -190,8 +190,8 @@ def benchmark_controllers(
 
     A run that fails has a reason and no metrics. Raises ParameterError for a contender that does not suit the joint.
     """
-    _check_names("contender", [each.name for each in contenders])
-    _check_names("task", [each.name for each in tasks])
+    check_names("benchmark_controllers", "contender", [each.name for each in contenders])
+    check_names("benchmark_controllers", "task", [each.name for each in tasks])
     show = progress or (lambda text, done, total: None)
     found: dict[str, tuple[ContenderResult, ...]] = {}
     with process_pool(workers) as executor:
@@ -259,15 +259,3 @@ def run_task(joint: BenchmarkJoint, truth: BenchmarkTruth, law: Controller, task
     except (PhysicsError, SimulationError) as error:
         return BenchmarkRun(None, None, str(error))
     return BenchmarkRun(track(joint, truth.plant, task, task_signals(joint, task), record), record)
-
-
-def counted(number: int, noun: str) -> str:
-    """A number of things as a text."""
-    return f"{number} {noun}{'' if number == 1 else 'es' if noun.endswith('ch') else 's'}"
-
-
-def _check_names(kind: str, names: Sequence[str]) -> None:
-    if not names:
-        raise ParameterError(f"benchmark_controllers: there is no {kind}; give at least one.")
-    if twice := [name for name in names if names.count(name) > 1]:
-        raise ParameterError(f"benchmark_controllers: two {kind}s are named '{twice[0]}'; give each its own name.")

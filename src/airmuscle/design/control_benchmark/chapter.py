@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from ...core import Reference, cite, conversion
+from ...core import Reference, cite, conversion, counted
 from ...report.chapter import Chapter, NamedValue, Table, TableColumn
-from .benchmark import REST_LIFE, REST_TASK, BenchmarkResult, Group, counted
+from .benchmark import REST_LIFE, REST_TASK, BenchmarkResult, Group
 from .commissioning import RESTARTS, SEARCH_SPREAD
 from .learning import LearningCurve
 from .plots import benchmark_plots

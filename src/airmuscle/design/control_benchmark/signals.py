@@ -17,6 +17,7 @@ from ...engine.loop import ControlLaw, Controller, ControlLoop, Driver, SampledS
 from ...physics.plant.plant import Plant
 from ...physics.pneumatics import REFERENCE_DENSITY, FillDischarge, WithTubes, absolute_pressure
 from ...recording import Recording
+from ..study.metrics import time_mean
 from .contenders import SensedController
 from .joints import BenchmarkJoint
 from .tasks import ControlTask, JointMotion
@@ -211,13 +212,13 @@ def track(
     magnitude, t = np.abs(error[judged]), time[judged]
     strokes = _strokes(plant, record, judged)
     return TrackingMetrics(
-        rmse=math.sqrt(_mean(t, error[judged] ** 2)),
+        rmse=math.sqrt(time_mean(t, error[judged] ** 2)),
         max_error=float(magnitude.max()),
         itae=float(np.trapezoid((t - t[0]) * magnitude, t)),
         settling=_settling(task, time, error),
         overshoot=_overshoot(task, wanted, angle, judged),
-        steady=_mean(time[late], np.abs(error[late])) if task.event is not None else math.nan,
-        air=_mean(t, _drawn_flow(plant, record)[judged]) / REFERENCE_DENSITY * 1e3,
+        steady=time_mean(time[late], np.abs(error[late])) if task.event is not None else math.nan,
+        air=time_mean(t, _drawn_flow(plant, record)[judged]) / REFERENCE_DENSITY * 1e3,
         strokes=float(strokes.sum()),
         valve_life=2.0 * RATED_STROKES / float(strokes.max()) / 3600.0 if strokes.max() > 0 else math.inf,
         stiffness_error=_stiffness_error(joint, plant, signals, record, late),
@@ -239,11 +240,6 @@ def _overshoot(task: ControlTask, wanted: Array, angle: Array, judged: Mask) -> 
     if task.event is None or task.torque or task.stiffening or change == 0.0:
         return math.nan
     return max(0.0, 100.0 * float(((angle - wanted[-1]) / change)[judged].max()))
-
-
-def _mean(time: Array, values: Array) -> float:
-    """The mean over time of values (N,) at times (N,)."""
-    return float(np.trapezoid(values, time) / (time[-1] - time[0]))
 
 
 def _drawn_flow(plant: Plant, record: Recording) -> Array:
@@ -279,4 +275,4 @@ def _stiffness_error(joint: BenchmarkJoint, plant: Plant, signals: TaskSignals, 
     reached = stiffness_of(plant, first, second, np.asarray(record["angle"])[late])
     time = np.asarray(record["time"])[late]
     wanted = np.interp(time, signals.time, signals.stiffness)
-    return 100.0 * math.sqrt(_mean(time, (reached / wanted - 1.0) ** 2))
+    return 100.0 * math.sqrt(time_mean(time, (reached / wanted - 1.0) ** 2))

@@ -108,7 +108,7 @@ class Mean(Scalar):
     """Mean over time."""
 
     def _evaluate(self, window: Window) -> float:
-        return _time_mean(window.time, window.values)
+        return time_mean(window.time, window.values)
 
 
 class RootMeanSquare(Scalar):
@@ -229,7 +229,8 @@ METRICS: dict[str, type[Any]] = {
 """The metrics that a study file may name."""
 
 
-def _time_mean(time: Array, values: Array) -> float:
+def time_mean(time: Array, values: Array) -> float:
+    """The mean over time of values (N,) at times (N,), by the trapezoidal rule."""
     duration = float(time[-1] - time[0])
     return float(np.trapezoid(values, time)) / duration if duration > 0 else float(values[0])
 

@@ -152,10 +152,7 @@ def check_cases(cases: Sequence[LoopCase]) -> tuple[LoopCase, ...]:
     if wrong or not given:
         what = f"contain {abridged(wrong[0])}" if wrong else "are empty"
         raise ParameterError(f"tune: the cases {what}; give a list of LoopCase.")
-    names = [case.name for case in given]
-    twice = sorted({name for name in names if names.count(name) > 1})
-    if twice:
-        raise ParameterError(f"tune: two cases are named '{twice[0]}'; give each its own name.")
+    check_names("tune", "case", [case.name for case in given])
     first = given[0].controller
     for case in given[1:]:
         if structure(case.controller) is not structure(first):
@@ -165,6 +162,14 @@ def check_cases(cases: Sequence[LoopCase]) -> tuple[LoopCase, ...]:
                 "another law, state controller_path."
             )
     return given
+
+
+def check_names(where: str, kind: str, names: Sequence[str]) -> None:
+    """Raise ParameterError, which begins with `where`, for no name, and for a name that two things have."""
+    if not names:
+        raise ParameterError(f"{where}: there is no {kind}; give at least one.")
+    if twice := [name for name in names if names.count(name) > 1]:
+        raise ParameterError(f"{where}: two {kind}s are named '{twice[0]}'; give each its own name.")
 
 
 def with_gains(controller: Any, gains: Mapping[str, float]) -> Any:

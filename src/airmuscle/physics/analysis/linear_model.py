@@ -2,7 +2,7 @@
 
 import dataclasses
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from ...core import Array, ParameterError, System, check_known
 from ...core.system import check_system, state_vector
-from ...engine.compile.function import derivatives
+from ...engine.compile.function import Derivatives, derivatives
 from ...engine.compile.program import CompiledSystem, compile_system
 from ...recording.columns import column_units
 from ..equilibrium import complete_inputs
@@ -30,6 +30,9 @@ from .static_stiffness import Stiffness, stiffness
 
 ROUNDING = 1e-12
 """Part of the fastest pole below which real and imaginary parts are rounding errors."""
+STEP, KINK = 1e-5, 1e-2
+"""Part of the size of a number by which the sides of a kink are told apart, and relative difference of the slopes of a
+plant there (chosen)."""
 MAX_PADE = 10
 """Greatest order of a Pade approximation; higher ones lose digits."""
 
@@ -54,6 +57,8 @@ class LinearModel:
     system          the system that was linearised
     stiffness       of a Plant: its stiffness at constant pressure and with closed valves; None for another system
     delays          dead time [s] of inputs by name, before they act; none unless given (`with_delay`)
+    kinks           states and inputs by which the derivatives of the rates are those of one side alone: even small
+                    oscillations about the operating point do not obey the model
     """
 
     A: Array
@@ -71,6 +76,7 @@ class LinearModel:
     output_values: Mapping[str, float] = dataclasses.field(default_factory=dict)
     system: System | None = None
     delays: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    kinks: tuple[str, ...] = ()
 
     @property
     def poles(self) -> tuple[Pole, ...]:
@@ -165,7 +171,7 @@ class LinearModel:
         more = ", ..." if len(self.states) > 6 else ""
         return (
             f"LinearModel({len(self.states)} states, inputs {', '.join(self.inputs) or 'none'}, {len(self.outputs)} "
-            f"outputs; poles {slow}{more} 1/s)"
+            f"outputs; poles {slow}{more} 1/s{'; one-sided by ' if self.kinks else ''}{', '.join(self.kinks)})"
         )
 
 
@@ -208,8 +214,8 @@ def linearise(plant: System, state: Mapping[str, float], inputs: Mapping[str, fl
 
     At a kink (a valve that starts to open, a muscle that becomes slack, an end stop in first contact) the derivatives
     are those of one side, and where two kinks coincide, as in the centre position of a valve without overlap, of one
-    side of each: choose a state that is not at a kink. The state need not be an equilibrium; at an equilibrium, `rates`
-    is zero. Raises ParameterError for an unknown or missing name, or an input beyond its range.
+    side of each: `kinks` names them; choose a state that is not at a kink. The state need not be an equilibrium; at an
+    equilibrium, `rates` is zero. Raises ParameterError for an unknown or missing name, or an input beyond its range.
     """
     check_system("linearise", plant)
     x = state_vector(plant, state).tolist()
@@ -227,8 +233,37 @@ def linearise(plant: System, state: Mapping[str, float], inputs: Mapping[str, fl
         column_units(plant, compiled.output_names), dict(zip(names, x, strict=True)), values, at.rates,
         stiffness(plant, state) if isinstance(plant, Plant) else None,
         {**dict(zip(compiled.output_names, at.outputs.tolist(), strict=True)), **dict(zip(names, x, strict=True))},
-        plant,
+        plant, kinks=_kinks(plant, compiled, np.array([*x, *u]), at),
     )  # fmt: skip
+
+
+def _kinks(plant: System, compiled: CompiledSystem, point: Array, at: Derivatives) -> tuple[str, ...]:
+    """The states and inputs, other than those at an end of their range, on whose sides the slopes of rates differ."""
+    n, inputs = len(plant.states), plant.input_variables
+    sizes = np.maximum(np.abs(point), [*(abs(state.nominal) for state in plant.states), *[1e-3] * len(inputs)])
+    slopes = np.hstack([at.rates_by_state, at.rates_by_input])
+
+    def rates(x: Array) -> Array:
+        return derivatives(compiled, x[:n].tolist(), x[n:].tolist()).rates
+
+    found = one_sided(rates, point, slopes, sizes, KINK)
+    names = (*(state.name for state in plant.states), *(each.name for each in inputs))
+    return tuple(names[i] for i in found if i < n or inputs[i - n].minimum < point[i] < inputs[i - n].maximum)
+
+
+def one_sided(
+    response: Callable[[Array], Array], point: Array, slopes: Array, sizes: Array, tolerance: float
+) -> list[int]:
+    """The coordinates of a point (k,), of these sizes (k,), on one of whose sides a response (r,) leaves its slopes.
+
+    slopes     (r, k) of the response at the point
+    tolerance  relative to the largest change of a row by any coordinate
+    """
+    here, moves, expected = response(point), np.diag(STEP * sizes), STEP * (slopes * sizes).T
+    sides = np.array([[response(point + move) - here, here - response(point - move)] for move in moves])
+    largest = np.maximum(np.abs(sides).max(axis=1), np.abs(expected).max(axis=0))
+    missed = np.abs(sides - expected[:, None]).max(axis=1) > tolerance * largest
+    return np.flatnonzero(missed.any(axis=1)).tolist()
 
 
 def _places(kind: str, wanted: Sequence[str] | None, known: tuple[str, ...]) -> list[int]:

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
-from ....core import Array
+from ....core import Array, counted
 from ..result import Estimate
 
 SAME_COST = 1e-3
@@ -102,9 +102,9 @@ def describe_optima(
         if increase > SIMILAR_RMS or not differences:
             continue
         notes.append(
-            f"the problem has several optima: {_count(other.searches)} of {costs.size} ended where the rms residual is "
-            f"only {100 * increase:.1f} % greater, with {', '.join(differences)}; the standard errors describe one "
-            "optimum and do not contain this difference"
+            f"the problem has several optima: {counted(other.searches, 'search')} of {costs.size} ended where the rms "
+            f"residual is only {100 * increase:.1f} % greater, with {', '.join(differences)}; the standard errors "
+            "describe one optimum and do not contain this difference"
         )
         break
     if searches_at_lowest(costs) == 1 and costs.size >= MIN_SEARCHES:
@@ -113,10 +113,6 @@ def describe_optima(
             "are not reliable; repeat the fit with more starts, or with narrower bounds"
         )
     return notes
-
-
-def _count(number: int) -> str:
-    return "one search" if number == 1 else f"{number} searches"
 
 
 def _magnitudes(estimates: Sequence[Estimate], margins: Array | None) -> Array:
