@@ -1,9 +1,9 @@
 """Settings of all tests: Ctrl-C interrupts, random examples are few, figures of one kind are drawn once.
 
 Ctrl-C interrupts here too, where a shell that runs the tests in the background has it ignored. `--hypothesis-profile
-thorough` draws 300 examples in place of 10. A figure whose axes contain the same kinds of curves and areas as one that
-was drawn before gets the files of that one, except in tests with the marker `drawn`, which look at the files; its image
-has a low resolution. A command that is called within a test uses one process, because the tests themselves run on all
+thorough` draws 300 examples in place of 10. A figure with the kinds of curves and areas alone that were drawn before gets
+the files of one of those, except in tests with the marker `drawn`, which look at the files; its image has a low
+resolution. A command that is called within a test uses one process, because the tests themselves run on all
 cores; tests of several processes state their number. A kernel that is missing in the cache is compiled by one worker,
 while others wait for it. Objects that exist after the collection of tests are no longer searched by the garbage
 collector. The configuration file of the user is not read. Where Python must not write bytecode beside the sources, that
@@ -52,32 +52,35 @@ processes.available_cores = lambda: 1
 
 
 class OneOfAKind:
-    """`plotting.rendered`, which draws one figure of each kind."""
+    """`plotting.rendered`, which draws a figure if it has something of a kind that was not drawn before."""
 
     def __init__(self) -> None:
         self.draw, self.draws_all = plotting.rendered, False
-        self.files: dict[Any, dict[str, bytes]] = {}
+        self.drawn: dict[str, set[Any]] = {}
+        self.files: dict[str, dict[str, bytes]] = {}
 
     def __call__(self, figure: Any, *options: Any, **named: Any) -> dict[str, bytes]:
         if self.draws_all:
             return self.draw(figure, *options, **named)
-        kind = kind_of(figure), repr((options, sorted(named.items())))
-        if kind not in self.files:
+        way = repr((options, sorted(named.items())))
+        drawn = self.drawn.setdefault(way, set())
+        if way not in self.files or not kinds_of(figure) <= drawn:
             with mock.patch.dict(plotting._STYLE, {"savefig.dpi": 40}):
-                self.files[kind] = self.draw(figure, *options, **named)
-        return self.files[kind]
+                self.files[way] = self.draw(figure, *options, **named)
+            drawn |= kinds_of(figure)
+        return self.files[way]
 
 
-def kind_of(figure: Any) -> Any:
-    """The kinds of its axes: curves, areas and texts, scales, and whether a title or a label contains a formula."""
-    return frozenset(
-        (
-            frozenset(type(child).__name__ for child in axes.get_children()),
-            (axes.get_xscale(), axes.get_yscale()),
-            any("$" in text for text in (axes.get_title(), axes.get_xlabel(), axes.get_ylabel())),
-        )
+def kinds_of(figure: Any) -> set[Any]:
+    """Its curves, areas and texts, each with the scales of its axes, and whether a title or a label has a formula."""
+    return {
+        (kind, axes.get_xscale(), axes.get_yscale())
         for axes in figure.axes
-    )
+        for kind in (
+            *(type(child).__name__ for child in axes.get_children()),
+            *("$" for text in (axes.get_title(), axes.get_xlabel(), axes.get_ylabel()) if "$" in text),
+        )
+    }
 
 
 ONE_OF_A_KIND = OneOfAKind()
