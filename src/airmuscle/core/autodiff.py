@@ -52,10 +52,10 @@ def _trace_with_derivatives(obj: Any, method: str, count: int) -> Any:
     if key not in _traced_functions:
         model, parameters = symbolic(obj)
         arguments = [casadi.SX.sym(f"x{i}") for i in range(count)]
-        value = casadi.SX(getattr(model, method)(*arguments))
+        value = casadi.densify(casadi.SX(getattr(model, method)(*arguments)))
         check_finite(value, f"{type(obj).__name__}.{method}")
-        outputs = [value, *(casadi.jacobian(value, x) for x in arguments), casadi.jacobian(value, parameters)]
-        _traced_functions[key] = casadi.Function("law", [*arguments, parameters], casadi.cse(outputs))
+        slopes = [casadi.densify(casadi.jacobian(value, x)) for x in (*arguments, parameters)]
+        _traced_functions[key] = casadi.Function("law", [*arguments, parameters], casadi.cse([value, *slopes]))
     return _traced_functions[key]
 
 
@@ -69,19 +69,29 @@ def _evaluate_traced(obj: Any, method: str, arguments: tuple[Any, ...]) -> tuple
 def _call_traced(
     function: Any, parameters: Sequence[Any], arguments: Sequence[Any]
 ) -> tuple[list[Any], tuple[int, ...]]:
-    """Return the outputs of a traced function at numbers or arrays, and their shape.
+    """Return the outputs of a traced function at numbers or arrays, all numbers of one point after the other, and the
+    shape of the points.
 
-    Parameters may be arrays as well, for example one value per plant.
+    Parameters may be arrays as well, for example one value per plant. The outputs are rows without structural zeros;
+    with buffers a call takes half the time that it takes with matrices.
     """
     many = any(isinstance(value, np.ndarray) and value.size > 1 for value in parameters)
     broadcast = np.broadcast_arrays(*(np.asarray(x, dtype=float) for x in (*arguments, *(parameters if many else ()))))
-    rows = [x.reshape(1, -1) for x in broadcast]
-    count = len(arguments)
+    shape, size, count = broadcast[0].shape, broadcast[0].size, len(arguments)
+    if not size:  # a map of no points is none
+        return [np.zeros((function.numel_out(i), 0)) for i in range(function.n_out())], shape
     numbers = [value.item() if isinstance(value, np.ndarray) else value for value in parameters if not many]
-    vector = np.vstack(rows[count:]) if many else np.array(numbers, dtype=float)
-    if not broadcast[0].size:  # CasADi evaluates a function of no points at one point
-        return [np.zeros((function.numel_out(i), 0)) for i in range(function.n_out())], broadcast[0].shape
-    return [r.full() for r in function(*rows[:count], vector)], broadcast[0].shape
+    vectors = [x.ravel() for x in broadcast]
+    vectors[count:] = [np.stack(vectors[count:], axis=-1).ravel() if many else np.tile(np.array(numbers, float), size)]
+    mapped = function.map(size)
+    results = [np.empty(mapped.nnz_out(i)) for i in range(mapped.n_out())]
+    buffer, call = mapped.buffer()
+    for place, vector in enumerate(vectors):
+        buffer.set_arg(place, vector.data)
+    for place, result in enumerate(results):
+        buffer.set_res(place, result.data)
+    call()
+    return results, shape
 
 
 def derivative(obj: Any, method: str, *arguments: Any, wrt: int = 0) -> Any:
@@ -165,10 +175,10 @@ def value_and_derivative(obj: Any, method: str, count: int, wrt: int = 0) -> Cal
     if key not in _traced_functions:
         model, symbols = symbolic(obj)
         x = [casadi.SX.sym(f"x{i}") for i in range(count)]
-        value = casadi.SX(getattr(model, method)(*x))
+        value = casadi.densify(casadi.SX(getattr(model, method)(*x)))
         check_finite(value, f"{type(obj).__name__}.{method}")
         _traced_functions[key] = casadi.Function(
-            "law", [*x, symbols], casadi.cse([value, casadi.jacobian(value, x[wrt])])
+            "law", [*x, symbols], casadi.cse([value, casadi.densify(casadi.jacobian(value, x[wrt]))])
         )
     function, parameters = _traced_functions[key], [leaf.value for leaf in tree.leaves(obj)]
     if any(isinstance(value, np.ndarray) for value in parameters):
