@@ -96,9 +96,8 @@ class PlantVectorEnv(gymnasium.vector.VectorEnv):  # type: ignore[misc, unused-i
         if mask is not None:
             return self._reset_some(mask, seed), {}
         self._seed(seed)
-        plants = self._plants
-        further = np.arange(self.num_envs, plants.blocks * plants.width)  # plants that fill the last block
-        self._place(further, *self._draw.begin(np.full((1, self._draw.dimension), 0.5)))
+        filling = np.arange(self.num_envs, self._plants.blocks * self._plants.width)  # the last block
+        self._place(filling, *self._draw.begin(np.full((1, self._draw.dimension), 0.5)))
         self._begin(np.arange(self.num_envs))
         self._over[:] = False
         return self._observed()[0], {}
@@ -143,8 +142,7 @@ class PlantVectorEnv(gymnasium.vector.VectorEnv):  # type: ignore[misc, unused-i
         terms = {"closeness": rewards + effort, "effort": effort}
         over: Booleans = terminated | truncated
         if not self._at_once:
-            present = ~self._over
-            self._over = over
+            present, self._over = ~self._over, over
             return observations, rewards, terminated, truncated, _masked(terms, present)
         info = _masked(terms, ~over)
         if over.any():
