@@ -15,6 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from control_plants import JOINT, LIFT
+from widths import widened
 
 import airmuscle as am
 from airmuscle.engine import Double, RungeKutta4, Single, Stepper
@@ -127,7 +128,7 @@ def test_an_episode_of_a_vector_ends_where_the_task_ends_it():
     assert observations[0, 1] == 0.0
 
 
-@pytest.mark.parametrize("name", ["Joint", "Lift", "Arm"])
+@pytest.mark.parametrize("name", widened(["Joint", "Lift", "Arm"], lambda name: name == "Arm"))
 def test_a_picture_shows_the_present_state(name):
     env = gymnasium.make(f"airmuscle/{name}-v0", render_mode="rgb_array")
     env.reset(seed=1)

@@ -74,8 +74,8 @@ def wide(folder: Path, columns: int) -> Path:
 
 def test_a_table_of_more_columns_than_any_test_rig_has_is_refused(tmp_path: Path):
     start = time.process_time()
-    with pytest.raises(ColumnError, match=r"wide\.csv: the table has 200000 columns; at most 5000 are read\. Export"):
-        read(wide(tmp_path, 200_000))
+    with pytest.raises(ColumnError, match=r"wide\.csv: the table has 50000 columns; at most 5000 are read\. Export"):
+        read(wide(tmp_path, 50_000))
     assert len(list(read(wide(tmp_path, 2000))[0])) == 2000
     assert time.process_time() - start < LIMIT
 

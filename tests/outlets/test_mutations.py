@@ -122,7 +122,7 @@ def test_a_damaged_binary_file(tmp_path: Path, suffix: str, count: int):
 
 
 @pytest.mark.filterwarnings("ignore")
-@pytest.mark.parametrize("count", [60, pytest.param(1500, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [40, pytest.param(1500, marks=pytest.mark.slow)])
 @pytest.mark.parametrize(
     ("source", "open_file"),
     [
