@@ -52,7 +52,8 @@ def test_a_controller_that_is_called_meets_the_same_sensors_and_the_same_actuati
     with pytest.raises(ParameterError, match="commands angle; allowed are 'difference'"):
         complete(JOINT, Contender("wrong", Called(PassedSignals(("angle",)))))
     with pytest.raises(
-        ParameterError, match=r"measures 'left\.force'; the joint has sensors of .* with tune and simulate"
+        ParameterError,
+        match=r"measures 'left\.force'; the joint has sensors of .* airmuscle tune FILE.toml, whose table",
     ):
         complete(JOINT, Contender("wrong", Called(PassedSignals(("left.force",)))))
 

@@ -351,7 +351,9 @@ def test_an_inspection_finds_the_muscles_of_each_joint_and_that_the_sensors_lag(
 def test_pressures_without_an_effect_are_not_assigned():
     rng = np.random.default_rng(1)
     found = inspect_episodes(changed(JOINT, pressure=lambda p: rng.uniform(0.0, 3e5, p.shape)))
-    with pytest.raises(IdentificationError, match="joint 1: 0 pressures raise its angle and 0 lower it with certainty"):
+    with pytest.raises(
+        IdentificationError, match="joint 1: 0 pressures with certainty for raising its angle, 0 for lowering it; one"
+    ):
         _ = found.pairs
 
 
@@ -375,6 +377,7 @@ def dead(pressure):
         ({"angle": lambda q: 0.1 + 0 * q}, "angle 1 never varies, it is 0.1 to 0.1 rad in 98 % of the rows"),
         ({"angle": np.degrees}, r"angle 1 reaches .* rad, further than a joint turns: state its unit .* \[angles\]"),
         ({"pressure": lambda p: 1e3 * p}, r"pressure 1 reaches .* Pa, more than a muscle bears: .* \[pressures\]"),
+        ({"speed": np.degrees}, 'speeds multiplied by 0.0173., as speeds in degrees have: unit = "deg/s". State'),
         ({"speed": lambda v: v / 1.5}, "angles move 1.49 times as fast as the speeds say: the sample time of 10 ms"),
     ],
 )
@@ -404,6 +407,17 @@ def test_saturated_readings_and_counts_are_remarked():
     assert "they are whole numbers, as counts" in counts
 
 
+def test_angles_whose_range_is_that_of_another_unit_are_remarked():
+    """Eight degrees labelled rad, and radians labelled deg, were fitted without a word."""
+    for change, text in (
+        (lambda q: np.degrees(0.1 * q), "degrees read as radians"),
+        (np.radians, "radians read as deg"),
+    ):
+        (remark,) = inspect_episodes(changed(JOINT, angle=change, speed=change)).remarks
+        assert remark.startswith("angle 1 spans ")
+        assert text in remark
+
+
 def test_a_sample_time_that_nothing_confirms_is_remarked(tmp_path, mapping):
     write_npz(tmp_path, JOINT.runs[0], 0)
     stated = COLUMNS.replace('time = "t"', 'sample_time = "10 ms"')
@@ -421,7 +435,12 @@ def test_episodes_shorter_than_a_window_are_refused():
     mixed = replace(JOINT, runs=(*JOINT.runs[:4], *made_episodes(2, rows=45).runs))
     kept, (remark,) = long_enough(mixed, 40)
     assert kept.runs == JOINT.runs[:4]
-    assert remark == "2 of 6 episodes are shorter than a window of 52 rows and are left out: episode 1, episode 2"
+    assert remark == (
+        "2 of 6 episodes, shorter than a window of 52 rows, left out: episode 1 (45 rows), episode 2 (45 rows)"
+    )
+    assert remark in inspect_episodes(mixed).remarks
+    assert not inspect_episodes(mixed, rows=30).remarks
+    assert "the longest has 45 rows, a window needs 52" in inspect_episodes(made_episodes(20, rows=45)).errors[0]
 
 
 def test_a_window_reads_no_pressure_after_its_end():

@@ -145,9 +145,15 @@ def test_a_joint_that_does_not_move_is_not_seen(fitted):
         estimate_angles(fit, made_episodes(1, joints=2))
 
 
-@pytest.mark.parametrize("increments", [True, False])
-def test_a_regulator_is_found_from_commands_and_pressures(increments):
-    """Pressures of a known regulator: limited level, two lags, two rows of delay; the prediction sees commands alone."""
+@pytest.mark.parametrize(
+    ("increments", "pascals", "step"),
+    widened([(True, 3e5, 2e-4), (False, 1.0, 1.0), (True, 75.0, 1e-3)], lambda _, pascals, step: pascals != 75.0),
+)
+def test_a_regulator_is_found_from_commands_and_pressures(increments, pascals, step):
+    """Pressures of a known regulator: limited level, two lags, two rows of delay; the prediction sees commands alone.
+
+    Readings in counts or shares of a range, and commands in counts, are as good (35 and 3.7 kPa before).
+    """
     rng = np.random.default_rng(0)
     truth = RegulatorLag((2e-1, 0.7, 0.4, 0.0, 0.0, 0.0, 3.0, 0.5), 2, increments)
     runs = []
@@ -158,13 +164,22 @@ def test_a_regulator_is_found_from_commands_and_pressures(increments):
         for i in range(2):
             whole = np.full((1, len(settled)), 1e5)
             pressure[:, i] = truth.pressures(whole, settled[None, :, i])[0, 10:]
-        runs.append(replace(run, pressure=pressure, command=command))
+        runs.append(replace(run, pressure=pressure / pascals, command=np.round(command / step, 3)))
     episodes = replace(EPISODES, runs=tuple(runs))
     (found, _) = fit_regulator_lags(episodes, 40)
     assert (found.increments, found.delay) == (increments, 2)
-    assert found.values[0] == pytest.approx(0.2, rel=0.1)
+    assert found.values[0] * pascals / step == pytest.approx(0.2, rel=0.1)
     pressure, command = (np.array([getattr(run, name)[:, 0] for run in runs]) for name in ("pressure", "command"))
-    assert np.sqrt(np.mean((found.pressures(pressure, command) - pressure) ** 2)) < 5e3
+    assert pascals * np.sqrt(np.mean((found.pressures(pressure, command) - pressure) ** 2)) < 1e3
+
+
+def test_commands_that_act_late_are_found_and_those_that_explain_nothing_are_named(fitted):
+    """Pressures follow 7 rows after the commands; of constant commands nothing follows."""
+    runs = [replace(run, command=np.concatenate([run.pressure[7:], run.pressure[-7:]])) for run in EPISODES.runs[:12]]
+    assert [found.delay for found in fit_regulator_lags(replace(EPISODES, runs=tuple(runs)), 40)] == [7, 7]
+    still = fit_joint(changed(EPISODES[:8], command=lambda u: 0.0 * u), left_out=0.5, rows=12)
+    assert any("the commands hardly explain the pressures of muscle 1, 2: they never" in r for r in still.remarks)
+    assert not any("hardly explain" in remark for remark in fitted[0].remarks)
 
 
 def test_commands_predict_the_angle_where_they_are_the_pressures(fitted):

@@ -3,6 +3,7 @@
 The readings of the pressures have zeros of their own, and the search starts from the numbers of the library.
 """
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -71,6 +72,21 @@ def test_the_numbers_of_the_plant_are_found_within_their_standard_errors(episode
     np.testing.assert_allclose(zeros, ZEROS, atol=1500.0)
     assert lines[0].startswith("8 parameters")
     np.testing.assert_allclose(fit.uncertainty().covariance.shape, (6, 6))
+
+
+def test_numbers_that_no_such_joint_has_are_named(episodes):
+    """A sample time of 100 ms in place of 10 ms predicts well (skill 0.95), with a hundred times the inertia."""
+    assert not [r for r in fit_known_joint(episodes, JOINT).remarks if "wrong sample time" in r]
+    slow = replace(
+        episodes, sample_time=10 * STEP, runs=tuple(replace(run, speed=run.speed / 10) for run in episodes.runs)
+    )
+    (remark,) = [r for r in fit_known_joint(slow, JOINT).remarks if "wrong sample time" in r]
+    assert re.match(r"mechanism.inertia is 3.\d+, 6\d.\d times its first value; mechanism.damping is 1", remark)
+    assert "lags[0] is 0.39" in remark
+    tenth = replace(
+        episodes, runs=tuple(replace(run, angle=run.angle / 10, speed=run.speed / 10) for run in episodes.runs)
+    )
+    assert any("zeros[1] ends at the limit of its range, -5e+05" in r for r in fit_known_joint(tenth, JOINT).remarks)
 
 
 def test_only_the_named_numbers_change(episodes):

@@ -33,7 +33,18 @@ from airmuscle.design.tuning.optimisation import EvolutionStrategy
 from airmuscle.engine import ColumnSensor, ControlLaw, ControlLoop, Schedule, WithSensors
 from airmuscle.errors import ColumnError, ParameterError, SimulationError
 from airmuscle.files.library import ParameterUncertainty
-from airmuscle.physics import HangingMass, Isometric, Plant, ProportionalRegulator, SecondOrderLag, Supply, Valve
+from airmuscle.physics import (
+    HangingMass,
+    Isometric,
+    MuscleRoute,
+    Plant,
+    ProportionalRegulator,
+    SecondOrderLag,
+    SerialArm,
+    SpatialLink,
+    Supply,
+    Valve,
+)
 
 STEPS = Schedule({"pressure": ((0, 1e5), (0.1, 2e5))})
 LOOP = ControlLoop(PRESSURE, 0.01, STEPS)
@@ -253,6 +264,15 @@ def test_the_family_is_the_nominal_plant_and_one_case_for_each_perturbation():
     heavy = joint.cases[2].plant.mechanism
     assert (heavy.inertia, heavy.weight_torque) == (2 * JOINT.mechanism.inertia, 2 * JOINT.mechanism.weight_torque)
     assert joint.cases[2].plant.muscles == MUSCLES
+
+
+def test_the_load_of_an_arm_without_masses_is_its_inertia():
+    """An identified joint has all its inertia about its axis: cases with another load were copies of the nominal one."""
+    routes = (MuscleRoute((1,), (0.03,)), MuscleRoute((1,), (-0.03,)))
+    arm = dataclasses.replace(JOINT, mechanism=SerialArm((SpatialLink((0, 0, 1), rotor_inertia=0.1),), routes))
+    loop = ControlLoop(PID("joint1.angle", "left.fill", gain=1.0), 0.01, Schedule({"joint1.angle": ((0, 0.0),)}))
+    family = perturbed_family(arm, loop, Perturbations(supplies=(), leak=0.0, draws=0, delay=0))
+    assert [case.plant.mechanism.links[0].rotor_inertia for case in family.cases] == [0.1, 0.05, 0.2]
 
 
 def test_a_perturbation_that_the_plant_does_not_have_is_noted():

@@ -66,6 +66,7 @@ from .declaration import as_float as as_float
 from .declaration import attribute_hint as attribute_hint
 from .declaration import check_field as check_field
 from .declaration import check_structure as check_structure
+from .declaration import parts_of as parts_of
 from .diagnostics import ColumnLimit as ColumnLimit
 from .diagnostics import Status as Status
 from .display import chosen_scale as chosen_scale

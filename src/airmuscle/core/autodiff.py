@@ -239,7 +239,6 @@ def parameter_derivatives(obj: Any, method: str, arguments: Sequence[Any], leave
     return jacobian(obj, method, *points)[1][:, list(leaves)]
 
 
-@functools.cache
 def is_traceable(cls: type[Any]) -> bool:
     """Return whether a class of models can be traced; a class that cannot declares `traceable = False`."""
     return bool(getattr(cls, "traceable", True))

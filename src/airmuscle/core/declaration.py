@@ -8,6 +8,7 @@ import dataclasses
 import functools
 import math
 import warnings
+from collections.abc import Iterator
 from typing import Any, TypeVar, dataclass_transform
 
 import numpy as np
@@ -244,13 +245,19 @@ def _check_size(label: str, value: int | str) -> None:
 
 def check_structure(obj: Any) -> None:
     """Raise ParameterError if a component, at any depth of a model, is not an instance of its field's class."""
-    if isinstance(obj, tuple):
-        for item in obj:
-            check_structure(item)
-    elif dataclasses.is_dataclass(obj) and not isinstance(obj, type):
-        _check_annotations(obj)
-        for field in dataclasses.fields(obj):
-            check_structure(getattr(obj, field.name))
+    for _, part in parts_of(obj):
+        _check_annotations(part)
+
+
+def parts_of(thing: Any, path: str = "") -> Iterator[tuple[str, Any]]:
+    """A model, or a tuple of models, and all models inside it, each with its path."""
+    if isinstance(thing, tuple):
+        for i, item in enumerate(thing):
+            yield from parts_of(item, f"{path}[{i}]")
+    elif dataclasses.is_dataclass(thing) and not isinstance(thing, type):
+        yield path, thing
+        for field in dataclasses.fields(thing):
+            yield from parts_of(getattr(thing, field.name), f"{path}.{field.name}" if path else field.name)
 
 
 def check_field(cls: type[Any], name: str) -> None:

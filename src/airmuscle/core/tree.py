@@ -135,17 +135,16 @@ def leaves(obj: Any, path: str = "") -> Iterator[Leaf]:
     if isinstance(obj, tuple):
         for i, item in enumerate(obj):
             yield from leaves(item, f"{path}[{i}]")
-    elif _is_model(obj):
-        declared = {p.name: p for p in parameters(obj)}
-        for field in dataclasses.fields(obj):
-            value = getattr(obj, field.name)
-            inner = f"{path}.{field.name}" if path else field.name
-            if field.name not in declared:
+    else:
+        kind: Any = type(obj)
+        for name, declared in _fields(kind) or ():
+            value, inner = getattr(obj, name), f"{path}.{name}" if path else name
+            if declared is None:
                 yield from leaves(value, inner)
             elif isinstance(value, tuple):
-                yield from (Leaf(f"{inner}[{i}]", v, declared[field.name]) for i, v in enumerate(value))
+                yield from (Leaf(f"{inner}[{i}]", v, declared) for i, v in enumerate(value))
             else:
-                yield Leaf(inner, value, declared[field.name])
+                yield Leaf(inner, value, declared)
 
 
 def unflatten(obj: T, values: Sequence[Any]) -> T:
@@ -155,12 +154,12 @@ def unflatten(obj: T, values: Sequence[Any]) -> T:
 
 
 @functools.cache
-def _fields(cls: type[Any]) -> tuple[tuple[str, bool], ...] | None:
-    """The fields of a model class, each with whether it is declared; None for any other class."""
+def _fields(cls: type[Any]) -> tuple[tuple[str, Parameter | None], ...] | None:
+    """The fields of a model class, each with its declaration or None; None for any other class."""
     if not dataclasses.is_dataclass(cls):
         return None
-    declared = {p.name for p in parameters(cls)}
-    return tuple((field.name, field.name in declared) for field in dataclasses.fields(cls))
+    declared = {p.name: p for p in parameters(cls)}
+    return tuple((field.name, declared.get(field.name)) for field in dataclasses.fields(cls))
 
 
 def _unflatten(obj: Any, values: Iterator[Any]) -> Any:
@@ -173,7 +172,7 @@ def _unflatten(obj: Any, values: Iterator[Any]) -> Any:
     new = object.__new__(type(obj))
     for name, declared in fields:
         value = getattr(obj, name)
-        if not declared:
+        if declared is None:
             value = _unflatten(value, values)
         elif isinstance(value, tuple):
             value = tuple([next(values) for _ in value])

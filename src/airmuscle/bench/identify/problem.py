@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ...core import Array, Hint, IdentificationError, Leaf, ParameterError, alternatives, as_slice, autodiff, tree
+from ...core import Array, Hint, IdentificationError, ParameterError, alternatives, as_slice, autodiff, parts_of, tree
 from ...physics.muscle.characteristic import Characteristic, ContractionLaw, ForceLaw, PooledLengthLaw, PressureLaw
 from ...recording import Recording
 from ...recording.columns import QUANTITIES
@@ -94,7 +94,7 @@ class FitProblem:
     """0 uncensored, 1 the law may lie below the target, -1 the law may lie above it; shape (N,)."""
     weights: Array
     """Factors of the residuals, with a root mean square of 1; shape (N,)."""
-    leaves: tuple[Leaf, ...]
+    leaves: tuple[tree.Leaf, ...]
     free: tuple[int, ...]
     """Indices of the leaves that are fitted."""
 
@@ -191,7 +191,7 @@ class FitProblem:
 
     def partial_jacobian(self, values: Array, which: Sequence[int]) -> Array:
         """The columns of `jacobian` of these free parameters, shape (N, len(which))."""
-        if _is_traceable(self.law):
+        if all(autodiff.is_traceable(type(part)) for _, part in parts_of(self.law)):
             leaves, method = [self.free[i] for i in which], self.fitted_quantity.method
             return self._join([autodiff.parameter_derivatives(law, method, x, leaves) for law, x in self._laws(values)])
         return self._finite_differences(values, which)
@@ -206,17 +206,6 @@ class FitProblem:
             up[i], down[i] = min(value + step, high[i]), max(value - step, low[i])
             columns.append((self.predict(up) - self.predict(down)) / (up[i] - down[i]))
         return np.column_stack(columns)
-
-
-def _is_traceable(thing: Any) -> bool:
-    """Whether a law and all models inside it are closed-form expressions."""
-    if isinstance(thing, tuple):
-        return all(_is_traceable(item) for item in thing)
-    kind: type[Any] = type(thing)
-    if not dataclasses.is_dataclass(kind):
-        return True
-    inside = (getattr(thing, field.name) for field in dataclasses.fields(thing))
-    return autodiff.is_traceable(kind) and all(_is_traceable(item) for item in inside)
 
 
 def make_problem(
@@ -242,7 +231,7 @@ def make_problem(
     return FitProblem(law, quantity, data, target, signs, weights, leaves, free)
 
 
-def _check_known(law: Characteristic, leaves: Sequence[Leaf], fixed: Collection[str]) -> None:
+def _check_known(law: Characteristic, leaves: Sequence[tree.Leaf], fixed: Collection[str]) -> None:
     known = list(dict.fromkeys(name for leaf in leaves for name in (leaf.path.partition("[")[0], leaf.path)))
     for name in fixed:
         if name not in known:

@@ -32,7 +32,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core import Array, ColumnError, FileError, alternatives, check_known, quantity
+from ...core import Array, ColumnError, FileError, alternatives, check_known, counted, quantity
 from ..readers.file_kind import read_toml
 from .episode_formats import Arrays, find_episode_files, read_arrays
 from .episodes import Episode, Episodes, join, speed_of
@@ -171,7 +171,7 @@ def read_episodes(source: str | Path, mapping: str | Path | EpisodeMapping) -> E
     files = find_episode_files(path)
     found = join([_episodes_of(each, rules) for each in files])
     kinds = sorted({each.suffix or "bags" for each in files})
-    count = f"{len(found)} episodes from {len(files)} file{'s' if len(files) > 1 else ''} ({', '.join(kinds)})"
+    count = f"{counted(len(found), 'episode')} from {counted(len(files), 'file')} ({', '.join(kinds)})"
     return dataclasses.replace(found, notes=(count, *found.notes))
 
 

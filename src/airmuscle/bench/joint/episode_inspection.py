@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...core import Array, IdentificationError
-from .episodes import HISTORY, Episode, Episodes, Windows, speed_of
+from ...core import Array, IdentificationError, counted
+from .episodes import ROWS, Episode, Episodes, long_enough, speed_of
+from .pressures import saturated
 
 MAX_DELAY = 8
 """Greatest delay of the pressure sensors that is looked for [rows] (chosen)."""
@@ -15,6 +16,8 @@ CERTAIN, CLEAR = 5.0, 1.25
 """t-value from which a pressure acts on an angle, and its ratio to that of the next joint (chosen)."""
 TURN, BURST = 10.0, 1e7
 """Greatest angle [rad] of a joint and gauge pressure [Pa] of a muscle (chosen)."""
+WIDE, NARROW = 1.5 * np.pi, 0.035
+"""Range of an angle [rad] above and below which its unit is doubted (chosen)."""
 PIECES = 20
 """Independent pieces of the record at least, from which a t-value comes (chosen)."""
 DEAD = 0.01
@@ -23,10 +26,6 @@ JUMP = np.pi
 """Change of an angle between two rows [rad] that no arm makes."""
 SPEED_RATIO = 1.15
 """Ratio of the slope of the angles to the speeds, or of its inverse, that a wrong sample time explains (chosen)."""
-SATURATED = 0.02
-"""Share of rows exactly at an end of the range of a reading that counts as saturation (chosen)."""
-SETTLED, LEAST = 3, 0.2
-"""Rows after which a wrong reading is forgotten before the start of a window; least share of rows of a fit (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -75,8 +74,9 @@ class EpisodeInspection:
             up, down = [a.muscle for a in own if a.sign > 0], [a.muscle for a in own if a.sign < 0]
             if (len(up), len(down)) != (1, 1):
                 raise IdentificationError(
-                    f"joint {joint}: {len(up)} pressures raise its angle and {len(down)} lower it with certainty; "
-                    "one of each is needed. State the muscles of each joint in the mapping file: pairs = [[1, 2], ...]."
+                    f"joint {joint}: {counted(len(up), 'pressure')} with certainty for raising its angle, {len(down)} "
+                    "for lowering it; one of each is needed. State the muscles of each joint in the mapping file: "
+                    "pairs = [[1, 2], ...]."
                 )
             found.append((up[0], down[0]))
         return tuple(found)
@@ -86,9 +86,9 @@ class EpisodeInspection:
         lengths = [len(run) for run in e.runs]
         total, rows = sum(lengths) * e.sample_time, " to ".join(dict.fromkeys(map(str, (min(lengths), max(lengths)))))
         lines = [
-            f"{len(e)} episodes of {rows} rows at {1 / e.sample_time:.4g} Hz, {total:.4g} s; "
-            f"{e.joints} joint{'s' * (e.joints > 1)}, {e.muscles} pressures that lag the motion by {self.delay} rows "
-            f"({1e3 * self.delay * e.sample_time:.3g} ms)",
+            f"{counted(len(e), 'episode')} of {rows} rows at {1 / e.sample_time:.4g} Hz, {total:.4g} s; "
+            f"{counted(e.joints, 'joint')}, {counted(e.muscles, 'pressure')} with a lag of "
+            f"{counted(self.delay, 'row')} ({1e3 * self.delay * e.sample_time:.3g} ms) behind the motion",
             *e.notes,
             *(_range_line(f"angle {i}", np.degrees(x), "deg") for i, x in enumerate(e.rows("angle").T, 1)),
             *(_range_line(f"pressure {i}", x / 1e3, "kPa") for i, x in enumerate(e.rows("pressure").T, 1)),
@@ -99,13 +99,22 @@ class EpisodeInspection:
         return "\n".join(lines)
 
 
-def inspect_episodes(episodes: Episodes, pairs: Sequence[tuple[int, int]] = ()) -> EpisodeInspection:
-    """Inspect episodes before a fit; with `pairs`, the muscles that are said to raise and lower each angle."""
+def inspect_episodes(
+    episodes: Episodes, pairs: Sequence[tuple[int, int]] = (), rows: int = ROWS
+) -> EpisodeInspection:  # fmt: skip
+    """Inspect episodes before a fit over `rows` rows; with `pairs`, the muscles that are said to raise and lower each
+    angle."""
     errors = [*_units(episodes), *_jumps(episodes), *_constant(episodes)] or _sample_time(episodes)
+    short = list[str]()
+    try:
+        _, short = long_enough(episodes, rows)
+    except IdentificationError as error:
+        errors.append(str(error))
     delay, actions = (0, ()) if errors else _actions(episodes)
     errors += _exchanged(actions, pairs)
-    remarks = [*(text for *_, text in _saturated(episodes)), *_scale(episodes), *_unconfirmed(episodes)]
-    return EpisodeInspection(episodes, delay, actions, tuple(errors), tuple(remarks))
+    ends = [text for *_, text in saturated(episodes)]
+    remarks = (*short, *_doubtful(episodes), *ends, *_scale(episodes), *_unconfirmed(episodes))
+    return EpisodeInspection(episodes, delay, actions, tuple(errors), remarks)
 
 
 def check_episodes(inspection: EpisodeInspection) -> None:
@@ -144,6 +153,18 @@ def _jumps(episodes: Episodes) -> list[str]:
     return []
 
 
+def _doubtful(episodes: Episodes) -> list[str]:
+    """Remarks on angles whose range is that of another unit."""
+    spans = np.ptp(np.quantile(episodes.rows("angle"), (0.01, 0.99), axis=0), axis=0)
+    kinds = [
+        (i, x, "degrees read as radians" if x > WIDE else "radians read as degrees") for i, x in enumerate(spans, 1)
+    ]
+    return [
+        f"angle {i} spans {np.degrees(x):.3g} deg, as {kind} do: check its unit in the mapping file, [angles]"
+        for i, x, kind in kinds if not NARROW < x < WIDE
+    ]  # fmt: skip
+
+
 def _constant(episodes: Episodes) -> list[str]:
     found = []
     for name, unit in (("pressure", "Pa"), ("angle", "rad")):
@@ -164,10 +185,11 @@ def _sample_time(episodes: Episodes) -> list[str]:
     ratio = np.median(np.sum(slope * speed, axis=0) / np.maximum(np.sum(speed**2, axis=0), 1e-12))
     if 1 / SPEED_RATIO < ratio < SPEED_RATIO:
         return []
+    hint = ', as speeds in degrees have: unit = "deg/s"' if 1 / SPEED_RATIO < np.degrees(ratio) < SPEED_RATIO else ""
     return [
         f"angles move {ratio:.3g} times as fast as the speeds say: the sample time of {1e3 * episodes.sample_time:.4g} "
         f"ms or the scale of the speeds is wrong. They agree with {1e3 * ratio * episodes.sample_time:.4g} ms, or with "
-        f"speeds multiplied by {ratio:.4g}. State sample_time or speeds.scale in the mapping file."
+        f"speeds multiplied by {ratio:.4g}{hint}. State sample_time or speeds.scale in the mapping file."
     ]
 
 
@@ -239,41 +261,6 @@ def _exchanged(actions: Sequence[PressureAction], pairs: Sequence[tuple[int, int
                     "Correct pairs in the mapping file."
                 )
     return found
-
-
-def _saturated(episodes: Episodes) -> list[tuple[int, float, str]]:
-    """Muscle, from 0, end of its readings at which they saturate, and a remark on it."""
-    found, pressure = [], episodes.rows("pressure")
-    causes = ("the muscle is empty", "it has the pressure of its supply")
-    for i, values in enumerate(pressure.T):
-        for edge, cause in zip((values.min(), values.max()), causes, strict=True):
-            count = int(np.sum(values == edge))
-            if count > SATURATED * len(values) and np.ptp(values) > 0.0:
-                text = (
-                    f"pressure {i + 1} is {edge:.4g} Pa in {count} of {len(values)} rows "
-                    f"({100 * count / len(values):.0f} %): its reading saturates there, or {cause}"
-                )
-                found.append((i, float(edge), text))
-    return found
-
-
-def without_saturated(windows: Windows, episodes: Episodes) -> tuple[Windows, list[str]]:
-    """The windows of a fit, in which rows after a reading at an upper end at which it saturates do not count, and a
-    remark on these; all rows count where less than LEAST would be left."""
-    top = np.full(episodes.muscles, np.inf)
-    for muscle, edge, _ in _saturated(episodes):
-        if edge == episodes.rows("pressure")[:, muscle].max():
-            top[muscle] = edge
-    ends = np.any(windows.pressure[:, HISTORY - SETTLED :] >= top, axis=-1)
-    hit = np.cumsum(ends, axis=1)[:, SETTLED:] > 0
-    few = hit[:, 1:].mean() <= 1.0 - LEAST
-    text = (
-        f"{hit[:, 1:].sum()} of {hit[:, 1:].size} rows of the fit follow a pressure reading at its upper end, whose "
-        "true value is unknown: they "
-        + ("do not count, except in the errors of the report" if few else "are too many to leave out")
-    )
-    counts = np.concatenate([windows.counts[:, :HISTORY], ~hit], axis=1)
-    return dataclasses.replace(windows, counts=counts) if few else windows, [text] if hit.any() else []
 
 
 def _scale(episodes: Episodes) -> list[str]:

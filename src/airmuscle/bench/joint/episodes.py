@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ...core import Array, IdentificationError, ParameterError, ShortRepr
+from ...core import Array, IdentificationError, ParameterError, ShortRepr, counted
 from ...engine import InputSignal, PiecewiseLinear
 from ...physics import PressureDriven, WithStickSlip
 
@@ -185,10 +185,10 @@ def long_enough(episodes: Episodes, rows: int) -> tuple[Episodes, list[str]]:
             f"no episode is as long as a window: the longest has {max(map(len, episodes.runs))} rows, a window needs "
             f"{needed} ({HISTORY} before its start). Give longer episodes, or a shorter horizon (--horizon)."
         )
-    short = [run.name for run in episodes.runs if len(run) < needed]
-    names = ", ".join(short[:3]) + (", ..." if len(short) > 3 else "")
+    short = [f"{run.name} ({len(run)} rows)" for run in episodes.runs if len(run) < needed]
     text = (
-        f"{len(short)} of {len(episodes)} episodes are shorter than a window of {needed} rows and are left out: {names}"
+        f"{len(short)} of {counted(len(episodes), 'episode')}, shorter than a window of {needed} rows, left out: "
+        f"{', '.join(short[:3])}{', ...' if len(short) > 3 else ''}"
     )
     return dataclasses.replace(episodes, runs=kept), [text] if short else []
 

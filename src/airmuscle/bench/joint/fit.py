@@ -10,9 +10,10 @@ from ...core import Array, ParameterError, tree
 from ...physics import Braid, Muscle, MuscleRoute, PressureDriven, SerialArm, SpatialLink, StickSlip, WithStickSlip
 from ...physics.muscle.characteristic.linear_in_pressure import LinearInPressure
 from .descent import CLIP, Descent, SearchStage, gradients, typical_size
-from .episode_inspection import EpisodeInspection, check_episodes, inspect_episodes, without_saturated
+from .episode_inspection import EpisodeInspection, check_episodes, inspect_episodes
 from .episodes import HISTORY, ROWS, Episodes, Windows, band, count_fitted, cut, in_pairs, long_enough, rms
-from .free_run import baseline_errors, fit_regulator_lags, free_run, from_commands, judged_residual
+from .free_run import baseline_errors, free_run, judged_residual
+from .pressures import fit_regulator_lags, from_commands, unexplained, without_saturated
 from .result import ArmFit, ArmParameter
 
 STRENGTHS = (1.0, 6.0)
@@ -53,7 +54,7 @@ def fit_joint(
     """
     episodes, short = long_enough(episodes, rows)
     split = count_fitted(episodes, left_out)
-    inspection, found = _inspected(episodes, tuple(pairs), tuple(axes))
+    inspection, found = _inspected(episodes, tuple(pairs), tuple(axes), rows)
     progress(f"delay of the pressures: {inspection.delay} rows")
     ordered = in_pairs(episodes, found)
     fitted, left, delay = ordered[:split], ordered[split:], inspection.delay
@@ -68,7 +69,7 @@ def fit_joint(
     errors = free_run(arm, judge) - judge.angle[:, HISTORY + 1 :]
     regulators = fit_regulator_lags(fitted, rows)
     commanded = from_commands(regulators, left, delay, rows) if regulators else None
-    remarks += _contacts(ordered, errors, judge, split)
+    remarks += _contacts(ordered, errors, judge, split) + (unexplained(commanded, judge, found) if commanded else [])
     return ArmFit(
         arm, inspection, found, errors, judge.episode, baseline_errors(fitted, left, rows), band(errors),
         tuple(e for each, _, _ in separated for e in each), tuple(dict.fromkeys(remarks)), split,
@@ -78,10 +79,10 @@ def fit_joint(
 
 
 def _inspected(
-    episodes: Episodes, pairs: tuple[tuple[int, int], ...], axes: tuple[tuple[int, int, int], ...]
+    episodes: Episodes, pairs: tuple[tuple[int, int], ...], axes: tuple[tuple[int, int, int], ...], rows: int
 ) -> tuple[EpisodeInspection, tuple[tuple[int, int], ...]]:
     """The inspection of episodes that may be fitted, and the pairs; raises for impossible arguments."""
-    inspection = inspect_episodes(episodes, pairs)
+    inspection = inspect_episodes(episodes, pairs, rows)
     check_episodes(inspection)
     found = pairs or inspection.pairs
     if (axes and len(axes) != episodes.joints) or len(found) != episodes.joints:

@@ -9,10 +9,11 @@ from ...core import Array, ParameterError, StateVariable, System, Value, Values,
 from ...engine import WithSensitivities, sensitivity
 from ...physics import PressureDriven
 from .descent import CLIP, OUTLIER, over, with_values
-from .episode_inspection import check_episodes, inspect_episodes, without_saturated
+from .episode_inspection import check_episodes, inspect_episodes
 from .episodes import HISTORY, ROWS, Episodes, Windows, WindowSignal, band, count_fitted, cut, lagged, long_enough
 from .fit import not_separated, separated
 from .free_run import baseline_errors
+from .pressures import without_saturated
 from .result import ArmFit, ArmParameter
 
 FIELDS = ("inertia", "damping", "offset", "weight_torque", "coulomb_torque")
@@ -21,6 +22,8 @@ READINGS = {"zeros": " Pa", "gains": ""}
 """Names that stand for the zeros and the gains of all pressures, with the units of their values."""
 SAMPLE, EVALUATIONS = 300, 40
 """Windows and evaluations of the search (chosen)."""
+FAR = 10.0
+"""Ratio of an estimate to its first value, or of what must be positive its inverse, that is doubted (chosen)."""
 SIZES = {"zeros": 1e4, "gains": 1.0, "offset": 0.05}
 """Typical sizes [SI] of parameters that may start at 0 (chosen)."""
 
@@ -86,7 +89,7 @@ def fit_known_joint(
             f"fit_known_joint: the mapping states the pairs {list(pairs)}, the joint has {list(own)}; leave pairs out "
             "of the mapping file, or order its columns of pressures as the muscles of the joint."
         )
-    inspection = inspect_episodes(episodes, own)
+    inspection = inspect_episodes(episodes, own, rows)
     check_episodes(inspection)
     system = ReadPressures(arm, (1.0,) * count, (0.0,) * count)
     paths = _paths(system, free)
@@ -204,4 +207,23 @@ class KnownSearch:
             f"{float(f'{each.standard_error:.2g}'):g}{READINGS[field]}"
             for each in estimates for field, _, number in [each.path.partition("[")] if field in READINGS
         ]  # fmt: skip
-        return estimates, covariance, remarks + not_separated("", names, shares)
+        return estimates, covariance, remarks + self._implausible(names, values) + not_separated("", names, shares)
+
+    def _implausible(self, names: Sequence[str], values: Array) -> list[str]:
+        """Remarks on estimates that no such joint has: far from their first values, or at a limit of their range."""
+        rows = list(zip(names, values.tolist(), self.start.tolist(), self.low, self.high, strict=True))
+        far = [
+            f"{name} is {value:.3g}, {value / own:.3g} times its first value"
+            for name, value, own, low, _ in rows
+            if abs(value) > FAR * abs(own) > 0.0 or (low > 0.0 and value < own / FAR)
+        ]  # fmt: skip
+        far += [
+            f"{name} ends at the limit of its range, {v:.3g}"
+            for name, v, _, *ends in rows
+            if v and np.isclose(v, ends, 1e-3).any()
+        ]
+        text = (
+            f"{'; '.join(far)}: another joint, or a wrong sample time (inertia grows with its square, damping and lags "
+            "with it), or a wrong scale of angles or pressures; do not use the numbers before this is explained"
+        )
+        return [text] if far else []

@@ -210,13 +210,13 @@ def complete(joint: BenchmarkJoint, contender: Contender, seed: int = 1) -> Comp
     return CompleteLaw(SensedController(contender.law, law, limited, sense), tuned, commissioned)
 
 
-def _check_columns(joint: BenchmarkJoint, contender: Contender) -> None:
-    """Raise ParameterError where a law measures a column without a sensor."""
+def _check_columns(joint: BenchmarkJoint, contender: Contender, path: str | Path = "FILE.toml") -> None:
+    """Raise ParameterError where a law, of the scenario `path`, measures a column without a sensor."""
     known = [sensor.column for sensor in joint.sensors]
     if without := [name for name in contender.law.measured_columns if name not in known]:
         raise ParameterError(
             f"contender '{contender.name}' measures '{without[0]}'; the joint has sensors of {', '.join(known)}. "
-            "Judge a controller of another plant, such as a fitted arm, with tune and simulate."
+            f"{_elsewhere(path)}"
         )
 
 
@@ -262,6 +262,16 @@ def scenario_contender(joint: BenchmarkJoint, path: str | Path) -> Contender:
         raise ParameterError(
             f"{scenario.location.inside('input').inside('controller')}: the law commands {', '.join(law.inputs)}; "
             f"allowed are '{DIFFERENCE}', the pressures {', '.join(joint.pressures)}, or all valves "
-            f"{', '.join(sorted(allowed[2]))}. Judge a controller of another plant with tune and simulate."
+            f"{', '.join(sorted(allowed[2]))}. {_elsewhere(path)}"
         )
-    return Contender(Path(path).stem, law, select_prefix(prefix, scenario.bounds()))
+    contender = Contender(Path(path).stem, law, select_prefix(prefix, scenario.bounds()))
+    _check_columns(joint, contender, path)
+    return contender
+
+
+def _elsewhere(path: str | Path) -> str:
+    """Where a controller of another plant than the joint of the benchmark is judged."""
+    return (
+        f"A controller of another plant, such as a fitted arm, is judged by airmuscle tune {path}, whose table has the "
+        "error of its present gains and of tuned ones on perturbed plants; give each controller a scenario of its own."
+    )

@@ -1,6 +1,7 @@
 """Perturbations of a plant and its loop: the family of cases for which gains are tuned."""
 
 import dataclasses
+import functools
 import math
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
@@ -19,7 +20,9 @@ from ...physics.pneumatics import Valve, WithLeak
 from .case import LoopCase
 
 LOADS = ("mass", "inertia", "weight_torque", "payload", "force")
-"""Parameters of a mechanism that a factor of the load multiplies."""
+"""Parameters of a mechanism that a factor of the load multiplies; where all are 0, as in an identified joint, those of
+ROTORS."""
+ROTORS = ("rotor_inertia",)
 LEAK_CRITICAL_RATIO = 0.3
 """Critical pressure ratio of the leak (chosen)."""
 MAX_ATTEMPTS = 1000
@@ -82,13 +85,14 @@ def perturbed_family(
     """
     cases, notes = [LoopCase("nominal", plant, loop, initial_state(plant))], list[str]()
     changed: list[tuple[str, Plant]] = []
-    for factors, symbol, chosen in (
-        (perturbations.loads, "load", _is_load),
-        (perturbations.supplies, "supply", _is_supply),
+    for factors, symbol, kinds in (
+        (perturbations.loads, "load", [functools.partial(_is_load, names=names) for names in (LOADS, ROTORS)]),
+        (perturbations.supplies, "supply", [_is_supply]),
     ):
-        if factors and not any(chosen(leaf) for leaf in leaves(plant)):
+        chosen = next((kind for kind in kinds if any(kind(leaf) for leaf in leaves(plant))), None)
+        if factors and chosen is None:
             notes.append(f"no case with another {symbol}: the plant has no parameter of that kind")
-        elif factors:
+        elif chosen is not None:
             changed += [(f"{symbol} x {factor:g}", _multiplied(plant, chosen, factor, symbol)) for factor in factors]
     if perturbations.leak:
         leaking = _leaking(plant, perturbations.leak)
@@ -111,8 +115,8 @@ def perturbed_family(
     return PerturbedFamily(tuple(cases), tuple(notes))
 
 
-def _is_load(leaf: Leaf) -> bool:
-    return leaf.path.startswith("mechanism.") and leaf.declared.name in LOADS
+def _is_load(leaf: Leaf, names: Sequence[str]) -> bool:
+    return leaf.path.startswith("mechanism.") and leaf.declared.name in names and leaf.value != 0.0
 
 
 def _is_supply(leaf: Leaf) -> bool:

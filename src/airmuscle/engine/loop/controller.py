@@ -1,11 +1,10 @@
 """Controllers (interface): from measured columns to commanded inputs, and the units of their signals and parameters."""
 
 import abc
-import dataclasses
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
-from ...core import Parameter, Value, parameters
+from ...core import Parameter, Value, parameters, parts_of
 
 RELATIVE = ("u", "y", "u/y", "u/s")
 """Units of a controller's parameters that follow from the loop: u is the unit of the commanded input, y that of the
@@ -123,7 +122,7 @@ def failure_notes(owner: str, program: str, failures: int) -> tuple[str, ...]:
 
 def named_signal_units(controller: Any) -> dict[str, str]:
     """Units of the signals that a controller and the laws inside it name, and that are no columns of a plant."""
-    laws = [part for _, part in _parts(controller, "") if isinstance(part, Controller)]
+    laws = [part for _, part in parts_of(controller) if isinstance(part, Controller)]
     return {name: unit for law in laws for name, unit in law.signal_units.items()}
 
 
@@ -136,7 +135,7 @@ def parameter_units(controller: Any, units: Mapping[str, str]) -> dict[str, str]
     named = named_signal_units(controller)
     known = {**named, **{name: unit or named.get(name, "") for name, unit in units.items()}}
     unit_of_each: dict[str, str] = {}
-    for path, part in _parts(controller, ""):
+    for path, part in parts_of(controller):
         for declared in parameters(part):
             name = f"{path}.{declared.name}" if path else declared.name
             value = getattr(part, declared.name)
@@ -160,15 +159,3 @@ def _unit_or_one(part: Any, declared: Parameter, index: int, units: Mapping[str,
         return unit_of(part, declared, index, units)
     except KeyError:
         return "1"
-
-
-def _parts(thing: Any, path: str) -> Iterator[tuple[str, Any]]:
-    """A model and all models inside it, each with its path."""
-    if isinstance(thing, tuple):
-        for i, item in enumerate(thing):
-            yield from _parts(item, f"{path}[{i}]")
-    elif dataclasses.is_dataclass(thing) and not isinstance(thing, type):
-        yield path, thing
-        for field in dataclasses.fields(thing):
-            if "unit" not in field.metadata:
-                yield from _parts(getattr(thing, field.name), f"{path}.{field.name}" if path else field.name)

@@ -10,7 +10,7 @@ import typer
 from ...bench.identify.dynamic import DynamicFit, fit_regulator
 from ...bench.identify.dynamic.dynamic_chapter import dynamic_chapters, regulator_chapters
 from ...bench.segment import inspect
-from ...core import check_writable
+from ...core import check_writable, counted
 from ...files.library import list_files, part_toml, scenario_toml
 from ...files.scenario.identification import DynamicFitSetup, load_dynamic_fit
 from ...recording.recording import row_notes
@@ -63,7 +63,7 @@ def fit_dynamic(study: Study, request: DynamicFitRequest, out: Folder = Path("dy
     findings = _findings(loaded)
     if not json:
         counts = ((len(loaded.experiments), "record"), (loaded.starts, "start"))
-        echo("  " + ", ".join(f"{count} {noun}{'s' * (count != 1)}" for count, noun in counts), err=True)
+        echo("  " + ", ".join(counted(*each) for each in counts), err=True)
     fit = loaded.fit()
     cross = loaded.cross_predictions(fit)
     fit = fit.with_scatter_of_records([each.common for each in cross])

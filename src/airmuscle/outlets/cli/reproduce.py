@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from ...core import AirmuscleError
+from ...core import AirmuscleError, counted
 from ...engine.processes import available_cores
 from ...papers.run import reproduce as reproduce_papers
 from ...papers.run import select_papers
@@ -89,7 +89,7 @@ def _print_counts(claims: list[Claim]) -> None:
         total = sum(counts.values())
         listed = ", ".join(f"{count} {verdict}" for verdict, count in counts.items())
         if total:
-            echo(f"{total} {kind.value}{'s' if total > 1 else ''}: {listed}")
+            echo(f"{counted(total, kind.value)}: {listed}")
 
 
 def _reproduced(statement: Statement) -> str:

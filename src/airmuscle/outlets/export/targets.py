@@ -5,7 +5,7 @@ import dataclasses
 from collections.abc import Sequence
 from typing import Any, ClassVar
 
-from ...core import Leaf, ParameterError, autodiff, leaves, one_line
+from ...core import Leaf, ParameterError, autodiff, leaves, one_line, parts_of
 from ...engine.compile.functions import PARAMETERS, Printer
 from ...engine.compile.ir.emission import TargetLanguage
 from ...engine.compile.text.programs import DEFINITION, CLanguage, JavaScriptLanguage, MatlabLanguage
@@ -124,17 +124,12 @@ def print_law(law: Characteristic, name: str, title: str) -> PrintedLaw:
 
 def check_closed_form(model: Any) -> None:
     """Raise ParameterError, with its class, for a model of which a part has no closed form."""
-    if isinstance(model, tuple):
-        for item in model:
-            check_closed_form(item)
-    elif dataclasses.is_dataclass(model) and not isinstance(model, type):
-        if not autodiff.is_traceable(type(model)):
+    for _, part in parts_of(model):
+        if not autodiff.is_traceable(type(part)):
             raise ParameterError(
-                f"{type(model).__name__} has no closed form and cannot be exported. Approximate it first, with its "
+                f"{type(part).__name__} has no closed form and cannot be exported. Approximate it first, with its "
                 "error: as_force_law(law, validity_range) for a characteristic, as_polynomial for a geometry."
             )
-        for field in dataclasses.fields(model):
-            check_closed_form(getattr(model, field.name))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -72,7 +72,7 @@ class JointFitRequest:
 def inspect_requested(source: Path, request: JointFitRequest) -> EpisodeInspection:
     """What the record contains. Raises RequestError without a mapping file, with a proposal."""
     rules = _mapping(source, request)
-    return inspect_episodes(read_episodes(source, rules), rules.pairs)
+    return inspect_episodes(read_episodes(source, rules), rules.pairs, request.horizon)
 
 
 def _mapping(source: Path, request: JointFitRequest) -> EpisodeMapping:

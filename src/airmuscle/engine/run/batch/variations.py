@@ -1,13 +1,14 @@
 """Variations: parameters of N plants by path, checked as if each plant were constructed; their initial states."""
 
 import dataclasses
-from collections.abc import Callable, Iterator, Mapping
+import itertools
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from ....core import AirmuscleError, Array, ParameterError, PhysicsError, System, check_known, one_line, tree
+from ....core import AirmuscleError, Array, ParameterError, PhysicsError, System, check_known, one_line, parts_of, tree
 from ....core.declaration import check_together
 
 
@@ -56,15 +57,16 @@ class Variations:
 
     def check_consistent(self) -> None:
         """Raise ParameterError, naming the row, where parameters of a model do not go together."""
-        for part in _checking(self.as_columns()):
-            if not _has_column(part):
+        for _, part in parts_of(self.as_columns()) if self.paths else ():
+            values = [leaf.value for leaf in tree.leaves(part)]
+            if not any(isinstance(value, np.ndarray) for value in values):
                 continue
             try:
                 check_together(part)
             except (TypeError, ValueError, AirmuscleError):  # rows differ, or one of them is impossible: row by row
-                of_row = _rows_of(part)
-                for row in range(len(self.values)):
-                    _check_row(row, part if of_row is None else of_row(row))
+                columns = [v.tolist() if isinstance(v, np.ndarray) else itertools.repeat(v) for v in values]
+                for row, numbers in enumerate(zip(*columns, strict=False)):
+                    _check_row(row, tree.unflatten(part, numbers))
 
 
 class Column(np.ndarray):
@@ -82,54 +84,6 @@ def _check_row(row: int, part: Any) -> None:
         check_together(part)
     except ParameterError as error:
         raise error.located(f"variations, row {row}") from None
-
-
-def _checking(thing: Any) -> Iterator[Any]:
-    """Every model within a model, itself too, whose parameters must fulfil something together."""
-    if isinstance(thing, tuple):
-        for item in thing:
-            yield from _checking(item)
-    elif dataclasses.is_dataclass(thing):
-        yield thing
-        for field in dataclasses.fields(thing):
-            yield from _checking(getattr(thing, field.name))
-
-
-def _has_column(thing: Any) -> bool:
-    """Whether there is a column anywhere inside a model."""
-    if isinstance(thing, tuple):
-        return any(_has_column(item) for item in thing)
-    if dataclasses.is_dataclass(thing):
-        return any(_has_column(getattr(thing, field.name)) for field in dataclasses.fields(thing))
-    return isinstance(thing, np.ndarray)
-
-
-def _rows_of(thing: Any) -> Callable[[int], Any] | None:
-    """A function from a row to the model with the numbers of that row instead of its columns (N,); None where it has no
-    column."""
-    if isinstance(thing, np.ndarray):
-        numbers = thing.tolist()
-        return lambda row: numbers[row]
-    if isinstance(thing, tuple):
-        items = [_rows_of(item) for item in thing]
-        if not any(items):
-            return None
-        return lambda row: tuple(item if of is None else of(row) for item, of in zip(thing, items, strict=True))
-    if not dataclasses.is_dataclass(thing):
-        return None
-    inside = {field.name: _rows_of(getattr(thing, field.name)) for field in dataclasses.fields(thing)}
-    changed = [(name, of_row) for name, of_row in inside.items() if of_row is not None]
-    fields = {field.name: getattr(thing, field.name) for field in dataclasses.fields(thing)}
-
-    def with_numbers(row: int) -> Any:
-        new = object.__new__(type(thing))
-        for name, value in fields.items():
-            object.__setattr__(new, name, value)
-        for name, of_row in changed:
-            object.__setattr__(new, name, of_row(row))
-        return new
-
-    return with_numbers if changed else None
 
 
 def variations_of(system: Any, given: Mapping[str, npt.ArrayLike], count: int | None) -> Variations:
