@@ -127,14 +127,12 @@ class Descent:
         self.arm = with_values(self.arm, self.names, self.values)
 
 
-def over(
-    windows: Windows, system: System, inputs: list[WindowSignal], state: Mapping[str, Array], keep: list[str]
-) -> BatchSolution:
-    """Columns (N, rows + 1) of a system over all windows."""
+def over(system: System, inputs: Array, step: float, state: Mapping[str, Array], keep: list[str]) -> BatchSolution:
+    """Columns (N, R) of a system from states (N,) under inputs (N, R, m) at rows of `step` [s], linear between them."""
+    times = step * np.arange(inputs.shape[1])
     return simulate_batch(
-        system, {}, inputs, duration=windows.rows * windows.sample_time, initial_states=state, keep=keep,
-        output_times=windows.sample_time * np.arange(windows.rows + 1),
-        integrator=RungeKutta4(windows.sample_time / SUBSTEPS),
+        system, {}, [WindowSignal(np.ascontiguousarray(each), step) for each in inputs], duration=float(times[-1]),
+        initial_states=state, keep=keep, output_times=times, integrator=RungeKutta4(step / SUBSTEPS),
     )  # fmt: skip
 
 
@@ -142,7 +140,8 @@ def joint_errors(arm: PressureDriven, joint: int, windows: Windows) -> Array:
     """Errors (N, rows) [rad] of the free run of one joint; the other joints move as measured."""
     system, known = OneJoint(arm, joint), start_of(arm, windows)
     angle = system.states[0].name
-    run = over(windows, system, signals(system, windows), {s.name: known[s.name] for s in system.states}, [angle])
+    state = {s.name: known[s.name] for s in system.states}
+    run = over(system, inputs_of(system, windows), windows.sample_time, state, [angle])
     return np.asarray(run[angle][:, 1:] - windows.angle[:, HISTORY + 1 :, joint])
 
 
@@ -162,7 +161,7 @@ def gradients(arm: PressureDriven, joint: int, paths: Sequence[str], windows: Wi
     angle = system.states[0].name
     observed = WithSensitivities(system, columns, (1.0,) * len(paths), observed=(angle,))
     keep = [angle, *(sensitivity(angle, k) for k in range(len(paths)))]
-    run = over(windows, observed, signals(system, windows), state, keep)
+    run = over(observed, inputs_of(system, windows), windows.sample_time, state, keep)
     error = run[angle][:, 1:] - windows.angle[:, HISTORY + 1 :, joint]
     gradient = np.stack([run[name][:, 1:] for name in keep[1:]], axis=-1)
     lost = ~np.isfinite(error) | (np.abs(error) > OUTLIER) | ~np.isfinite(gradient).all(axis=-1)
@@ -178,13 +177,12 @@ def _start_slope(arm: PressureDriven, path: str, known: Mapping[str, Array], win
     return {name: (moved[name] - known[name]) / step for name in known}
 
 
-def signals(system: "OneJoint", windows: Windows) -> list[WindowSignal]:
-    """The inputs of one joint in every window: pressures, and the measured motion of the other joints."""
+def inputs_of(system: "OneJoint", windows: Windows) -> Array:
+    """The inputs (N, R, m) of one joint in every window: pressures, and the measured motion of the other joints."""
     motion = [
         column[:, HISTORY:, i] for i in system.others for column in (windows.angle, windows.rate, windows.acceleration)
     ]
-    stacked = np.concatenate([windows.pressure[:, HISTORY:], *(m[..., None] for m in motion)], axis=-1)
-    return [WindowSignal(np.ascontiguousarray(each), windows.sample_time) for each in stacked]
+    return np.concatenate([windows.pressure[:, HISTORY:], *(m[..., None] for m in motion)], axis=-1)
 
 
 def with_values(arm: Arm, paths: Sequence[str], values: Sequence[float] | Array) -> Arm:

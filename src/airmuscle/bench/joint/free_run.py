@@ -7,12 +7,11 @@ from typing import cast
 import numpy as np
 
 from ...core import Array, tree
-from ...engine import RungeKutta4, simulate_batch
 from ...physics import GaussianResidual, PressureDriven, WithStickSlip
 from .. import baselines
 from ..baselines import ARX, DEPTH, PERSISTENCE
-from .descent import SUBSTEPS, Descent, SearchStage
-from .episodes import HISTORY, ROWS, Episodes, Windows, WindowSignal, cut, rms, start_of
+from .descent import Descent, SearchStage, over
+from .episodes import HISTORY, ROWS, Episodes, Windows, cut, rms, start_of
 from .pressures import without_saturated
 
 
@@ -28,12 +27,8 @@ def free_run(arm: PressureDriven, windows: Windows) -> Array:
 
 def angles(arm: PressureDriven, pressure: Array, start: Mapping[str, Array], sample_time: float) -> Array:
     """Angles (N, R, J) [rad] under the pressures (N, R, M) from states (N,)."""
-    names, rows = [c.name for c in arm.mechanism.coordinates], pressure.shape[1]
-    run = simulate_batch(
-        arm, {}, [WindowSignal(np.ascontiguousarray(p), sample_time) for p in pressure],
-        duration=(rows - 1) * sample_time, initial_states=start, output_times=sample_time * np.arange(rows),
-        integrator=RungeKutta4(sample_time / SUBSTEPS), keep=names,
-    )  # fmt: skip
+    names = [c.name for c in arm.mechanism.coordinates]
+    run = over(arm, pressure, sample_time, start, names)
     return np.stack([run[name] for name in names], axis=-1)
 
 

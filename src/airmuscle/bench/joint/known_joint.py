@@ -10,7 +10,7 @@ from ...engine import WithSensitivities, sensitivity
 from ...physics import PressureDriven
 from .descent import CLIP, OUTLIER, over, with_values
 from .episode_inspection import check_episodes, inspect_episodes
-from .episodes import HISTORY, ROWS, Episodes, Windows, WindowSignal, band, count_fitted, cut, lagged, long_enough
+from .episodes import HISTORY, ROWS, Episodes, Windows, band, count_fitted, cut, lagged, long_enough
 from .fit import not_separated, separated
 from .free_run import baseline_errors
 from .pressures import without_saturated
@@ -147,14 +147,14 @@ def _run(system: ReadPressures, paths: Sequence[str], windows: Windows) -> tuple
     for i, (prefix, lag) in enumerate(zip(arm.prefixes, arm.lags, strict=True)):
         state[f"{prefix}pressure"] = lagged(windows.pressure[:, : HISTORY + 1, i], lag, windows.sample_time)
     names = [c.name for c in arm.mechanism.coordinates]
-    signals = [WindowSignal(np.ascontiguousarray(p[HISTORY:]), windows.sample_time) for p in windows.pressure]
+    inputs, step = windows.pressure[:, HISTORY:], windows.sample_time
     if not paths:
-        run, moved = over(windows, system, signals, state, names), np.zeros((count, windows.rows, len(names), 0))
+        run, moved = over(system, inputs, step, state, names), np.zeros((count, windows.rows, len(names), 0))
     else:
         observed = WithSensitivities(system, tuple((p,) for p in paths), (1.0,) * len(paths), observed=tuple(names))
         columns = [[sensitivity(name, k) for k in range(len(paths))] for name in names]
         state |= {sensitivity(s, k): np.zeros(count) for s in list(state) for k in range(len(paths))}
-        run = over(windows, observed, signals, state, [*names, *(each for row in columns for each in row)])
+        run = over(observed, inputs, step, state, [*names, *(each for row in columns for each in row)])
         moved = np.stack([np.stack([run[n][:, 1:] for n in row], axis=-1) for row in columns], axis=2)
     error = np.stack([run[name][:, 1:] for name in names], axis=-1) - windows.angle[:, HISTORY + 1 :]
     counts = windows.counts[:, HISTORY + 1 :, None]
