@@ -26,8 +26,8 @@ def short_search():
     """Few iterations, because the episodes are few and made."""
     module = importlib.import_module("airmuscle.bench.joint.fit")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(module, "TRIALS", tuple(replace(each, iterations=25, batch=60) for each in module.TRIALS))
-        patch.setattr(module, "SEARCH", replace(module.SEARCH, iterations=60, batch=80))
+        *trials, search = (replace(each, iterations=25, batch=60) for each in module.STAGES)
+        patch.setattr(module, "STAGES", (*trials, replace(search, iterations=60, batch=80)))
         yield
 
 
@@ -43,6 +43,40 @@ def test_the_free_run_is_far_better_than_persistence_and_arx(fitted):
     assert fit.skill[0] > 0.8
     assert fit.best_baseline == ("ARX of depth 4",)
     assert lines[0].startswith("delay of the pressures: ")
+
+
+class Search:
+    """A search whose stages end with given costs; None is an interruption."""
+
+    def __init__(self, *costs):
+        self.costs, self.stopped, self.arm = list(costs), False, self
+
+    def run(self, stage):
+        if (cost := self.costs.pop(0)) is None:
+            raise KeyboardInterrupt
+        return cost
+
+
+def test_the_search_that_ends_lower_is_taken_whatever_its_first_stages_say():
+    module = importlib.import_module("airmuscle.bench.joint.fit")
+    ahead, later, broken = Search(1.0, 1.0, 3.0), Search(2.0, 2.0, 1.0), Search(1.0, None)
+    assert module._best([ahead, later]) == (1.0, later)
+    other = Search(1.0, 1.0, 1.0)
+    with pytest.raises(KeyboardInterrupt):
+        module._best([other, broken])
+    assert other.stopped
+
+
+def test_the_last_joint_is_judged_in_the_free_run_of_all(monkeypatch):
+    """An error of the other joints counts as soon as all are identified: their measured motion does not show it."""
+    module, used = importlib.import_module("airmuscle.bench.joint.fit"), []
+    monkeypatch.setattr(module, "Descent", lambda arm, *_, errors: used.append(errors) or Search(1.0, 1.0, 1.0))
+    windows, arm = module.cut(made_episodes(2, joints=2), 0, 40), module.reduced_arm(np.zeros(2))
+    monkeypatch.setattr(module, "_best", lambda searches: (1.0, arm))
+    module._search(made_episodes(2, joints=2), windows, (), 0, lambda text: None)
+    assert used == [module.joint_errors] * 2 + [module.free_errors] * 2
+    alone = module.joint_errors(arm, 1, windows)
+    np.testing.assert_allclose(module.free_errors(arm, 1, windows), alone, atol=1e-9)  # the joints are not coupled
 
 
 def test_the_band_grows_with_the_horizon_and_holds_what_it_says(fitted):

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from ...core import Array, IdentificationError, SolveError, contraction_text, quantity_text
-from ...physics.muscle.characteristic import Characteristic, ValidityRange
+from ...core import IdentificationError, SolveError, contraction_text, quantity_text
+from ...physics.muscle.characteristic import Characteristic, ValidityRange, forces_or_nan
 from ...recording import Recording
 from ...report.chapter import Chapter, NamedValue, Table, TableColumn
 from ...report.shown import parameter_table
@@ -100,7 +100,7 @@ def approximate(law: Characteristic, other: Characteristic, validity_range: Vali
         target = dataclasses.replace(target, max_force=2.0 * float(data["force"].max()))
     model = fit(target, data, censoring=UNCENSORED).model
     check_points = sample_on_grid(law, validity_range, GRID_POINTS + 1)
-    difference = _evaluate_force(model, check_points["pressure"], check_points["contraction"]) - check_points["force"]
+    difference = forces_or_nan(model, check_points["pressure"], check_points["contraction"]) - check_points["force"]
     missing = np.flatnonzero(~np.isfinite(difference))
     if missing.size:
         p, c = check_points["pressure"][missing[0]], check_points["contraction"][missing[0]]
@@ -126,7 +126,7 @@ def sample_on_grid(law: Characteristic, validity_range: ValidityRange, count: in
     (p_low, p_high), (c_low, c_high) = validity_range.pressure, validity_range.contraction
     pressure, contraction = np.meshgrid(p_low + (p_high - p_low) * nodes, c_low + (c_high - c_low) * nodes)
     p, c = pressure.ravel(), contraction.ravel()
-    force = _evaluate_force(law, p, c)
+    force = forces_or_nan(law, p, c)
     pulls = force > 0
     if not pulls.any():
         raise SolveError(
@@ -135,16 +135,3 @@ def sample_on_grid(law: Characteristic, validity_range: ValidityRange, count: in
         )
     columns = {"pressure": p[pulls], "contraction": c[pulls], "force": force[pulls]}
     return Recording(columns, type(law).__name__)
-
-
-def _evaluate_force(law: Characteristic, pressure: Array, contraction: Array) -> Array:
-    """Forces [N]; NaN where the law has none. Such points are isolated by bisection of the arrays."""
-    try:
-        force = np.asarray(law.force(pressure, contraction), dtype=float)
-    except SolveError:
-        if pressure.size == 1:
-            return np.array([np.nan])
-        half = pressure.size // 2
-        parts = (_evaluate_force(law, pressure[s], contraction[s]) for s in (slice(None, half), slice(half, None)))
-        return np.concatenate(list(parts))
-    return np.asarray(force + np.zeros(pressure.size))

@@ -2,7 +2,7 @@
 
 import dataclasses
 import functools
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TypeVar, cast
 
 import numpy as np
@@ -20,7 +20,7 @@ CLIP, OUTLIER = 0.3, 3.0
 MEMORY, RATE, DAMPING, LATE_DAMPING, MAX_CHANGE = 0.9, 0.3, 1e-2, 1e-3, 0.4
 """Share of the past in the running averages, step, damping and that of the second half of a stage, without which a
 search stops far up a valley of two parameters that act alike; greatest relative change of a parameter (chosen)."""
-CHECKED, LOST, SAMPLE = 10, 1.5, 400
+CHECKED, LOST, SAMPLE = 10, 1.5, 1600
 """Iterations after which the cost of their mean is checked, its ratio to the best one from which the search has lost
 its way, and windows from which it is computed (chosen)."""
 PRIOR = 5.0
@@ -34,6 +34,15 @@ SIZES = {
     "bearing_arms": 0.05,
 }  # fmt: skip
 """Typical sizes [SI] of parameters that may start at 0 (chosen)."""
+
+
+def joint_errors(arm: PressureDriven, joint: int, windows: Windows) -> Array:
+    """Errors (N, rows) [rad] of the free run of one joint; the other joints move as measured."""
+    system, known = OneJoint(arm, joint), start_of(arm, windows)
+    angle = system.states[0].name
+    state = {s.name: known[s.name] for s in system.states}
+    run = over(system, inputs_of(system, windows), windows.sample_time, state, [angle])
+    return np.asarray(run[angle][:, 1:] - windows.angle[:, HISTORY + 1 :, joint])
 
 
 @dataclasses.dataclass(frozen=True)
@@ -57,6 +66,10 @@ class Descent:
     prior: Mapping[str, float] = dataclasses.field(default_factory=dict)
     """Values towards which parameters are drawn that the record hardly determines, by path; with `ridge` as weight."""
     ridge: float = PRIOR
+    errors: Callable[[PressureDriven, int, Windows], Array] = joint_errors
+    """Errors (N, rows) [rad] of the joint, from which the cost comes: in its own free run or in that of all joints."""
+    stopped: bool = False
+    """Whether another thread has ended the search."""
 
     def __post_init__(self) -> None:
         leaves = {leaf.path: leaf for leaf in tree.leaves(self.arm)}
@@ -77,6 +90,8 @@ class Descent:
         rows = min(schedule.rows, self.windows.rows)
         best, cost = self.values.copy(), self._cost(self.values, rows)
         for step in range(1, schedule.iterations + 1):
+            if self.stopped:
+                break
             which = self.rng.permutation(len(self.windows))[: schedule.batch]
             batch = self.windows.part(np.sort(which), rows)
             new_normal, new_slope = self._equations(batch)
@@ -102,7 +117,7 @@ class Descent:
         some = self.windows.part(
             np.linspace(0, len(self.windows) - 1, min(SAMPLE, len(self.windows))).astype(int), rows
         )
-        errors = joint_errors(arm, self.joint, some)
+        errors = self.errors(arm, self.joint, some)
         errors = np.where(np.isfinite(errors), np.clip(np.abs(errors), 0.0, OUTLIER), OUTLIER)
         errors = errors[some.counts[:, HISTORY + 1 :]]
         return float(np.mean(2 * CLIP**2 * (np.sqrt(1 + (errors / CLIP) ** 2) - 1)))
@@ -134,15 +149,6 @@ def over(system: System, inputs: Array, step: float, state: Mapping[str, Array],
         system, {}, [WindowSignal(np.ascontiguousarray(each), step) for each in inputs], duration=float(times[-1]),
         initial_states=state, keep=keep, output_times=times, integrator=RungeKutta4(step / SUBSTEPS),
     )  # fmt: skip
-
-
-def joint_errors(arm: PressureDriven, joint: int, windows: Windows) -> Array:
-    """Errors (N, rows) [rad] of the free run of one joint; the other joints move as measured."""
-    system, known = OneJoint(arm, joint), start_of(arm, windows)
-    angle = system.states[0].name
-    state = {s.name: known[s.name] for s in system.states}
-    run = over(system, inputs_of(system, windows), windows.sample_time, state, [angle])
-    return np.asarray(run[angle][:, 1:] - windows.angle[:, HISTORY + 1 :, joint])
 
 
 def gradients(arm: PressureDriven, joint: int, paths: Sequence[str], windows: Windows) -> tuple[Array, Array]:

@@ -113,8 +113,7 @@ def inspect_episodes(
     delay, actions = (0, ()) if errors else _actions(episodes)
     errors += _exchanged(actions, pairs)
     ends = [text for *_, text in saturated(episodes)]
-    remarks = (*short, *_doubtful(episodes), *ends, *_scale(episodes), *_unconfirmed(episodes))
-    return EpisodeInspection(episodes, delay, actions, tuple(errors), remarks)
+    return EpisodeInspection(episodes, delay, actions, tuple(errors), (*short, *ends, *_doubtful(episodes)))
 
 
 def check_episodes(inspection: EpisodeInspection) -> None:
@@ -154,15 +153,29 @@ def _jumps(episodes: Episodes) -> list[str]:
 
 
 def _doubtful(episodes: Episodes) -> list[str]:
-    """Remarks on angles whose range is that of another unit."""
+    """Remarks on what may have another unit or scale: ranges of angles, sizes of pressures, and the sample time."""
     spans = np.ptp(np.quantile(episodes.rows("angle"), (0.01, 0.99), axis=0), axis=0)
     kinds = [
         (i, x, "degrees read as radians" if x > WIDE else "radians read as degrees") for i, x in enumerate(spans, 1)
     ]
-    return [
+    found = [
         f"angle {i} spans {np.degrees(x):.3g} deg, as {kind} do: check its unit in the mapping file, [angles]"
         for i, x, kind in kinds if not NARROW < x < WIDE
     ]  # fmt: skip
+    pressure = episodes.rows("pressure")
+    high, whole = float(np.quantile(np.abs(pressure), 0.99)), bool(np.all(pressure == np.round(pressure)))
+    if high < 1e4 or whole:
+        kind = "whole numbers, as counts" if whole else "small, as shares of a range"
+        found.append(
+            f"pressures look like a scale and not like Pa: they are {kind}, up to {high:.4g}. Zero and gain are "
+            "absorbed by the reduced law; state pressures.scale for forces of the right size"
+        )
+    if not episodes.confirmed:
+        found.append(
+            f"the sample time of {1e3 * episodes.sample_time:.4g} ms cannot be checked, because the record has neither "
+            "times nor speeds: with another one other inertias, dampings and lags explain the same rows"
+        )
+    return found
 
 
 def _constant(episodes: Episodes) -> list[str]:
@@ -190,15 +203,6 @@ def _sample_time(episodes: Episodes) -> list[str]:
         f"angles move {ratio:.3g} times as fast as the speeds say: the sample time of {1e3 * episodes.sample_time:.4g} "
         f"ms or the scale of the speeds is wrong. They agree with {1e3 * ratio * episodes.sample_time:.4g} ms, or with "
         f"speeds multiplied by {ratio:.4g}{hint}. State sample_time or speeds.scale in the mapping file."
-    ]
-
-
-def _unconfirmed(episodes: Episodes) -> list[str]:
-    if episodes.confirmed:
-        return []
-    return [
-        f"the sample time of {1e3 * episodes.sample_time:.4g} ms cannot be checked, because the record has neither "
-        "times nor speeds: with another one other inertias, dampings and lags explain the same rows"
     ]
 
 
@@ -261,16 +265,3 @@ def _exchanged(actions: Sequence[PressureAction], pairs: Sequence[tuple[int, int
                     "Correct pairs in the mapping file."
                 )
     return found
-
-
-def _scale(episodes: Episodes) -> list[str]:
-    pressure = episodes.rows("pressure")
-    high = float(np.quantile(np.abs(pressure), 0.99))
-    whole = bool(np.all(pressure == np.round(pressure)))
-    if high < 1e4 or whole:
-        kind = "whole numbers, as counts" if whole else "small, as shares of a range"
-        return [
-            f"pressures look like a scale and not like Pa: they are {kind}, up to {high:.4g}. Zero and gain are "
-            "absorbed by the reduced law; state pressures.scale for forces of the right size"
-        ]
-    return []

@@ -1,6 +1,7 @@
 """Identification of an arm from episodes of pressures and angles, by multiple shooting of its free run."""
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -9,19 +10,17 @@ from scipy.linalg import block_diag
 from ...core import Array, ParameterError, tree
 from ...physics import Braid, Muscle, MuscleRoute, PressureDriven, SerialArm, SpatialLink, StickSlip, WithStickSlip
 from ...physics.muscle.characteristic.linear_in_pressure import LinearInPressure
-from .descent import CLIP, Descent, SearchStage, gradients, typical_size
+from .descent import CLIP, Descent, SearchStage, gradients, joint_errors, typical_size
 from .episode_inspection import EpisodeInspection, check_episodes, inspect_episodes
 from .episodes import HISTORY, ROWS, Episodes, Windows, band, count_fitted, cut, in_pairs, long_enough, rms
-from .free_run import baseline_errors, free_run, judged_residual
+from .free_run import baseline_errors, free_errors, free_run, judged_residual
 from .pressures import fit_regulator_lags, from_commands, unexplained, without_saturated
 from .result import ArmFit, ArmParameter
 
 STRENGTHS = (1.0, 6.0)
 """Ratios of force and inertia from which the search of each joint starts (chosen)."""
-TRIALS = (SearchStage(12, 30, 120), SearchStage(40, 50, 120))
-"""Short and then long windows of every trial (chosen)."""
-SEARCH = SearchStage(40, 120, 160)
-"""The search of each joint from its best trial (chosen)."""
+STAGES = (SearchStage(12, 30, 120), SearchStage(40, 50, 120), SearchStage(40, 120, 160))
+"""Short and then long windows of every search (chosen)."""
 CONTACT = 5.0
 """Ratio of the greatest error in an episode to the rms error from which a contact is suspected (chosen)."""
 
@@ -110,12 +109,24 @@ def _search(
     paths: dict[int, list[str]] = {}
     for joint in _by_coupling(axes, episodes.joints):
         paths[joint] = [*own_parameters(arm, joint), *(shared if not paths else [])]
-        trials = [Descent(stronger(arm, joint, f), windows, joint, paths[joint], seed, prior) for f in STRENGTHS]
-        best = trials[int(np.argmin([[trial.run(stage) for stage in TRIALS][-1] for trial in trials]))]
-        cost = best.run(SEARCH)
-        arm = best.arm
+        judge = free_errors if len(paths) == episodes.joints else joint_errors  # all others are identified
+        starts = [stronger(arm, joint, factor) for factor in STRENGTHS]
+        cost, arm = _best([Descent(a, windows, joint, paths[joint], seed, prior, errors=judge) for a in starts])
         progress(f"joint {joint + 1}: {np.degrees(np.sqrt(cost)):.3g} deg, robust mean over the windows")
     return arm, dict(sorted(paths.items()))
+
+
+def _best(searches: Sequence[Descent]) -> tuple[float, PressureDriven]:
+    """The smallest cost, and its arm, of searches to the end in parallel threads; an interruption stops them all."""
+    pool = ThreadPoolExecutor(len(searches))
+    try:
+        costs = list(pool.map(lambda search: [search.run(stage) for stage in STAGES][-1], searches))
+    finally:
+        for search in searches:
+            search.stopped = True
+        pool.shutdown()
+    best = int(np.argmin(costs))
+    return costs[best], searches[best].arm
 
 
 def _by_coupling(axes: tuple[tuple[int, int, int], ...], joints: int) -> list[int]:

@@ -25,6 +25,11 @@ def free_run(arm: PressureDriven, windows: Windows) -> Array:
     return np.where(np.isfinite(found) & (np.abs(found - kept) < 2 * np.pi), found, kept)
 
 
+def free_errors(arm: PressureDriven, joint: int, windows: Windows) -> Array:
+    """Errors (N, rows) [rad] of one joint in the free run of all joints."""
+    return np.asarray(_errors(arm, windows)[..., joint])
+
+
 def angles(arm: PressureDriven, pressure: Array, start: Mapping[str, Array], sample_time: float) -> Array:
     """Angles (N, R, J) [rad] under the pressures (N, R, M) from states (N,)."""
     names = [c.name for c in arm.mechanism.coordinates]

@@ -211,17 +211,12 @@ class KnownSearch:
 
     def _implausible(self, names: Sequence[str], values: Array) -> list[str]:
         """Remarks on estimates that no such joint has: far from their first values, or at a limit of their range."""
-        rows = list(zip(names, values.tolist(), self.start.tolist(), self.low, self.high, strict=True))
-        far = [
-            f"{name} is {value:.3g}, {value / own:.3g} times its first value"
-            for name, value, own, low, _ in rows
-            if abs(value) > FAR * abs(own) > 0.0 or (low > 0.0 and value < own / FAR)
-        ]  # fmt: skip
-        far += [
-            f"{name} ends at the limit of its range, {v:.3g}"
-            for name, v, _, *ends in rows
-            if v and np.isclose(v, ends, 1e-3).any()
-        ]
+        far = []
+        for name, value, own, *ends in zip(names, values, self.start, self.low, self.high, strict=True):
+            if abs(value) > FAR * abs(own) > 0.0 or (ends[0] > 0.0 and value < own / FAR):
+                far.append(f"{name} is {value:.3g}, {value / own:.3g} times its first value")
+            elif value and np.isclose(value, ends, 1e-3).any():
+                far.append(f"{name} ends at the limit of its range, {value:.3g}")
         text = (
             f"{'; '.join(far)}: another joint, or a wrong sample time (inertia grows with its square, damping and lags "
             "with it), or a wrong scale of angles or pressures; do not use the numbers before this is explained"

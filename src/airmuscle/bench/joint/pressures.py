@@ -107,20 +107,14 @@ def fit_regulator_lags(episodes: Episodes, rows: int = ROWS) -> tuple[RegulatorL
     pressure, command = cut(episodes, 0, rows).pressure, _commands(episodes, rows)
     some = np.linspace(0, len(pressure) - 1, min(SAMPLE, len(pressure))).astype(int)
     columns = zip(pressure[some].transpose(2, 0, 1), command[some].transpose(2, 0, 1), strict=True)
-    return tuple(_fit_scaled(p, u) for p, u in columns)
-
-
-def _fit_scaled(p: Array, u: Array) -> RegulatorLag:
-    """The regulator of readings (N, R) in any unit: the search sees a high pressure of LEVEL and commands that vary by
-    1."""
-    scale, unit = (float(np.quantile(np.abs(p), 0.99)) or LEVEL) / LEVEL, float(np.std(u)) or 1.0
-    found = _fit(p / scale, u / unit)
-    gain, *dimensionless = found.values[:5]
-    levels = [scale * value for value in found.values[5:]]
-    return dataclasses.replace(found, values=(gain * scale / unit, *dimensionless, *levels))
+    return tuple(_fit(p, u) for p, u in columns)
 
 
 def _fit(p: Array, u: Array) -> RegulatorLag:
+    """The regulator of readings (N, R) in any unit: the search sees a high pressure of LEVEL and commands that vary by
+    1."""
+    scale, unit = (float(np.quantile(np.abs(p), 0.99)) or LEVEL) / LEVEL, float(np.std(u)) or 1.0
+    p, u = p / scale, u / unit
     low, high = np.quantile(p, (0.01, 0.99)) / UNIT
     spread = high - low + 1e-6
 
@@ -147,7 +141,9 @@ def _fit(p: Array, u: Array) -> RegulatorLag:
     while best[1].delay == longest < HISTORY:
         longest += 1
         best = min(best, search(dataclasses.replace(best[1], delay=longest), TRIED), key=lambda trial: trial[0])
-    return search(best[1], REFINED)[1]
+    found = search(best[1], REFINED)[1]
+    gain, *shares = found.values[:5]
+    return dataclasses.replace(found, values=(gain * scale / unit, *shares, *(scale * v for v in found.values[5:])))
 
 
 def from_commands(regulators: Sequence[RegulatorLag], episodes: Episodes, delay: int, rows: int) -> Windows:

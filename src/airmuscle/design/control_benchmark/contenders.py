@@ -17,6 +17,12 @@ from .joints import BenchmarkJoint
 from .tasks import StuckValve
 from .truths import SIDES
 
+ELSEWHERE = (
+    "A controller of another plant, such as a fitted arm, is judged by airmuscle tune {}, whose table has the error of "
+    "its present gains and of tuned ones on perturbed plants; give each controller a scenario of its own."
+)
+"""What to do with a controller that does not fit the joint, by the path of its scenario."""
+
 COMMANDED = "commanded."
 """Prefix of the set points by which the actuation receives the commands of a controller."""
 
@@ -216,7 +222,7 @@ def _check_columns(joint: BenchmarkJoint, contender: Contender, path: str | Path
     if without := [name for name in contender.law.measured_columns if name not in known]:
         raise ParameterError(
             f"contender '{contender.name}' measures '{without[0]}'; the joint has sensors of {', '.join(known)}. "
-            f"{_elsewhere(path)}"
+            f"{ELSEWHERE.format(path)}"
         )
 
 
@@ -262,16 +268,8 @@ def scenario_contender(joint: BenchmarkJoint, path: str | Path) -> Contender:
         raise ParameterError(
             f"{scenario.location.inside('input').inside('controller')}: the law commands {', '.join(law.inputs)}; "
             f"allowed are '{DIFFERENCE}', the pressures {', '.join(joint.pressures)}, or all valves "
-            f"{', '.join(sorted(allowed[2]))}. {_elsewhere(path)}"
+            f"{', '.join(sorted(allowed[2]))}. {ELSEWHERE.format(path)}"
         )
     contender = Contender(Path(path).stem, law, select_prefix(prefix, scenario.bounds()))
     _check_columns(joint, contender, path)
     return contender
-
-
-def _elsewhere(path: str | Path) -> str:
-    """Where a controller of another plant than the joint of the benchmark is judged."""
-    return (
-        f"A controller of another plant, such as a fitted arm, is judged by airmuscle tune {path}, whose table has the "
-        "error of its present gains and of tuned ones on perturbed plants; give each controller a scenario of its own."
-    )

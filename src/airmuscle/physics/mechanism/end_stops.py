@@ -5,7 +5,7 @@ from typing import ClassVar
 
 from ...core import ParameterError, Reference, Value, Values, check_structure, model, ops, parameter, published
 from .base import Coordinate, Mechanism
-from .wrapper import MechanismWrapper
+from .wrapper import MechanismWrapper, check_choice
 
 HUNT_CROSSLEY1975 = published("hunt-crossley-1975")
 
@@ -68,26 +68,11 @@ class EndStops(MechanismWrapper):
 
     def check(self) -> None:
         check_structure(self)
-        candidates = [c.name for c in self.inner.coordinates if c.unit == self.unit]
-        name = type(self).__name__
-        if self.coordinate and self.coordinate not in candidates:
-            raise ParameterError(
-                f"{name}: no coordinate '{self.coordinate}' in {self.unit}; {type(self.inner).__name__} has "
-                f"{', '.join(candidates) or 'none'}."
-            )
-        if not candidates:
-            raise ParameterError(
-                f"{name}: {type(self.inner).__name__} has no coordinate in {self.unit}; use another mechanism or other "
-                "end stops."
-            )
-        if not self.coordinate and len(candidates) > 1:
-            raise ParameterError(
-                f"{name}: {type(self.inner).__name__} has {len(candidates)} coordinates in {self.unit}; set coordinate "
-                f"to the one with end stops: {' or '.join(candidates)}."
-            )
+        check_choice(self, self.unit, self.coordinate, "end stops")
         low, high = self.stop_positions
         if not low < high:
-            raise ParameterError(f"{name}: lower_stop is {low:g}; it must be less than upper_stop, {high:g}.")
+            owner = type(self).__name__
+            raise ParameterError(f"{owner}: lower_stop is {low:g}; it must be less than upper_stop, {high:g}.")
 
     @property
     def stopped_coordinate(self) -> Coordinate:

@@ -97,6 +97,24 @@ class WithOffsets(MechanismWrapper):
         return tuple(offset + contraction for offset, contraction in zip(self.offsets, inner, strict=True))
 
 
+def check_choice(wrapper: MechanismWrapper, unit: str, coordinate: str, what: str) -> None:
+    """Raise ParameterError where a mechanism has not one coordinate of this unit on which something acts, or several of
+    which none is chosen."""
+    name, inner = type(wrapper).__name__, type(wrapper.inner).__name__
+    candidates = [c.name for c in wrapper.inner.coordinates if c.unit == unit]
+    if coordinate and coordinate not in candidates:
+        raise ParameterError(
+            f"{name}: no coordinate '{coordinate}' in {unit}; {inner} has {', '.join(candidates) or 'none'}."
+        )
+    if not candidates:
+        raise ParameterError(f"{name}: {inner} has no coordinate in {unit}; use another mechanism.")
+    if not coordinate and len(candidates) > 1:
+        raise ParameterError(
+            f"{name}: {inner} has {len(candidates)} coordinates in {unit}; set coordinate to the one with {what}: "
+            f"{' or '.join(candidates)}."
+        )
+
+
 @model
 class JointWithFriction(MechanismWrapper):
     """Regularised Coulomb friction of a joint: Q_f = -T_c w/sqrt(w^2 + w_0^2).
@@ -116,20 +134,7 @@ class JointWithFriction(MechanismWrapper):
 
     def check(self) -> None:
         check_structure(self)
-        angles = [c.name for c in self.inner.coordinates if c.unit == "rad"]
-        owner = type(self.inner).__name__
-        if not angles:
-            raise ParameterError(f"JointWithFriction: {owner} has no angle; use another mechanism.")
-        if self.coordinate and self.coordinate not in angles:
-            raise ParameterError(
-                f"JointWithFriction: its coordinate is '{self.coordinate}'; allowed are the angles of {owner}: "
-                f"{', '.join(angles)}."
-            )
-        if not self.coordinate and len(angles) > 1:
-            raise ParameterError(
-                f"JointWithFriction: {owner} has {len(angles)} angles; set coordinate to the one with friction: "
-                f"{' or '.join(angles)}."
-            )
+        check_choice(self, "rad", self.coordinate, "friction")
 
     @property
     def angle(self) -> Coordinate:

@@ -66,7 +66,10 @@ class Variations:
             except (TypeError, ValueError, AirmuscleError):  # rows differ, or one of them is impossible: row by row
                 columns = [v.tolist() if isinstance(v, np.ndarray) else itertools.repeat(v) for v in values]
                 for row, numbers in enumerate(zip(*columns, strict=False)):
-                    _check_row(row, tree.unflatten(part, numbers))
+                    try:
+                        check_together(tree.unflatten(part, numbers))
+                    except ParameterError as error:
+                        raise error.located(f"variations, row {row}") from None
 
 
 class Column(np.ndarray):
@@ -77,13 +80,6 @@ class Column(np.ndarray):
         if answers.any() and not answers.all():
             raise ValueError("the rows differ")
         return bool(answers.any())
-
-
-def _check_row(row: int, part: Any) -> None:
-    try:
-        check_together(part)
-    except ParameterError as error:
-        raise error.located(f"variations, row {row}") from None
 
 
 def variations_of(system: Any, given: Mapping[str, npt.ArrayLike], count: int | None) -> Variations:
