@@ -116,6 +116,7 @@ def test_a_contender_takes_the_gains_of_another_one_by_the_ends_of_their_paths()
         "speed_noise": "controller.design.speed_noise",
         "disturbance_noise": "controller.design.disturbance_noise",
         "pressure_time": "controller.design.pressure_time",
+        "speed_deviation": "controller.design.speed_deviation",
         "gain": "actuation.inner.gain",
     }  # fmt: skip
     assert {leaf.path for leaf in leaves(lqg)} >= set(tuned)

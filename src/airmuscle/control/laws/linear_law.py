@@ -8,7 +8,7 @@ import numpy as np
 
 from ...core import Array, ParameterError, ShortRepr, flatten
 from ...engine.loop import ColumnSensor, ControlLaw, rebuilt
-from ...engine.run.compiled_law import TracedSample, trace_sample
+from ...engine.run.compiled_law import trace_sample
 from ...physics.analysis.linear_model import one_sided
 
 KINK = 1e-3
@@ -55,10 +55,11 @@ class _Sample:
     def __init__(self, law: ControlLaw, sample_time: float) -> None:
         import casadi
 
-        self.law, traced = law, trace_sample(law)
-        by = casadi.vertcat(traced.memory, traced.measured, traced.setpoints)
-        values = casadi.vertcat(traced.later, casadi.fmin(casadi.fmax(traced.commands, traced.minimum), traced.maximum))
-        self._function: Any = casadi.Function("sample", _arguments(traced), [values, casadi.jacobian(values, by)])
+        self.law, t = law, trace_sample(law)
+        by = casadi.vertcat(t.memory, t.measured, t.setpoints)
+        values = casadi.vertcat(t.later, casadi.fmin(casadi.fmax(t.commands, t.minimum), t.maximum))
+        given = [t.measured, t.setpoints, t.memory, t.minimum, t.maximum, t.sample_time, t.parameters]
+        self._function: Any = casadi.Function("sample", given, [values, casadi.jacobian(values, by)])
         self._last = [sample_time, flatten(law)]
         self.count = len(law.initial_memory)
 
@@ -66,10 +67,6 @@ class _Sample:
         """Memory after the sample and commands (n + m,), and their slopes by memory, measurements and set points."""
         values, slopes = self._function(*point, *self._last)
         return np.asarray(values, dtype=float)[:, 0], np.asarray(slopes, dtype=float)
-
-
-def _arguments(t: TracedSample) -> list[Any]:
-    return [t.measured, t.setpoints, t.memory, t.minimum, t.maximum, t.sample_time, t.parameters]
 
 
 def ideal(part: Any) -> Any:

@@ -200,14 +200,11 @@ def _rms(errors: Array) -> float:
 
 def alike(law: Controller, gains: Mapping[str, float]) -> dict[str, float]:
     """Gains of another law under the paths of this one that have most of their last names in common."""
-    known = [leaf.path for leaf in leaves(law)]
-    return {max(known, key=lambda path, of=name: _common(path, of)): value for name, value in gains.items()}  # type: ignore[misc]
-
-
-def _common(path: str, other: str) -> int:
-    """The number of last names that two paths have in common."""
-    pairs = zip(reversed(path.split(".")), reversed(other.split(".")), strict=False)
-    return next((i for i, (a, b) in enumerate(pairs) if a != b), len(path))
+    known, found = [leaf.path for leaf in leaves(law)], dict[str, float]()
+    for name, value in gains.items():
+        ends = (name.split(".", i)[-1] for i in range(name.count(".") + 1))
+        found[next(path for end in ends for path in known if f".{path}".endswith(f".{end}"))] = value
+    return found
 
 
 def run_loop(joint: BenchmarkJoint, truth: BenchmarkTruth, law: Controller, task: ControlTask) -> Recording:

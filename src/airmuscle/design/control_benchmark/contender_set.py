@@ -9,8 +9,8 @@ from ...control.laws.open_loop import FrictionFeedForward, MotionFeedForward, Se
 from ...control.laws.pressures import DIFFERENCE
 from ...core import with_prefix
 from ...engine.loop import ControlLaw
-from .contenders import Bounds, Contender
-from .designed_controllers import AlongMotion, DeviationLaw, JointDesign, RejectionDesign, joint_design_model
+from . import designed_controllers as designed
+from .contenders import Bounds, Contender, PassedSignals
 from .joints import BenchmarkJoint
 
 MAX_LEAD = 0.03
@@ -76,13 +76,15 @@ def standard_contenders(joint: BenchmarkJoint) -> tuple[Contender, ...]:
     pid = PID("angle", DIFFERENCE, gain=2e5, integral_time=0.3, derivative_time=0.02, derivative_filter=5.0)
     sliding = SlidingMode("angle", DIFFERENCE, 5e4, sliding_time=0.05, boundary_layer=0.1, filter_time=0.004)
     twisting = SuperTwisting("angle", DIFFERENCE, 1e5, 1e5, sliding_time=0.05, filter_time=0.004)
-    model, ours = joint_design_model(joint), functools.partial(_beside_feed_forward, joint)
-    design = JointDesign(model, 0.1, 7.0, 200.0, 0.005)
+    model, ours = designed.joint_design_model(joint), functools.partial(_beside_feed_forward, joint)
+    design = designed.JointDesign(model, 0.1, 7.0, 200.0, 0.005, 0.05)
+    passed = designed.DeviationLaw(PassedSignals((designed.READING, designed.SPEED_READING)), model.speed_lag)
+    readings = WithSetpointDelay(passed, _delay(joint))
     quadratic = ours(
-        "feed-forward + LQG", DeviationLaw(design),
+        "feed-forward + LQG", designed.DeviationLaw(design, model.speed_lag),
         with_prefix("law.", {
             "permitted_angle": PERMITTED_ANGLE, "speed_noise": (0.1, 100.0), "disturbance_noise": (10.0, 1e4),
-            "pressure_time": (3e-3, 0.1),
+            "pressure_time": (3e-3, 0.1), "speed_deviation": (1e-3, 1.0),
         }),
         {"law.permitted_angle": PERMITTED_ANGLE},
     )  # fmt: skip
@@ -94,11 +96,11 @@ def standard_contenders(joint: BenchmarkJoint) -> tuple[Contender, ...]:
              {"amplitude": (5e3, 2e5), "sliding_time": _SLIDING, "boundary_layer": (3e-3, 1.0)}),
         ours("feed-forward + super-twisting", twisting,
              {"proportional": (1e4, 1e6), "integral": (1e4, 3e6), "sliding_time": _SLIDING}),
-        ours("feed-forward + ADRC", DeviationLaw(RejectionDesign(model, 20.0, 60.0)),
+        ours("feed-forward + ADRC", designed.DeviationLaw(designed.RejectionDesign(model, 20.0, 60.0), model.speed_lag),
              with_prefix("law.", {"bandwidth": BANDWIDTH, "observer_bandwidth": (10.0, 500.0)}),
              {"law.bandwidth": BANDWIDTH}),
         quadratic,
-        Contender("feed-forward + MPC", AlongMotion(_feed_forward(), design, _delay(joint)), {},
+        Contender("feed-forward + MPC", designed.AlongMotion(_feed_forward(), readings, design), {},
                   {**with_prefix("feed_forward.", COMMISSIONED), "design.permitted_angle": PERMITTED_ANGLE}, quadratic),
         _angle_and_stiffness(joint),
     )  # fmt: skip

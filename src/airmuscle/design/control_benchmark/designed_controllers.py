@@ -2,7 +2,7 @@
 
 import functools
 from collections.abc import Callable, Mapping
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -11,14 +11,15 @@ from ...control.estimation.predictive_design import design_predictive
 from ...control.laws.linear_model_predictive import RAWLINGS2017, LinearModelPredictive
 from ...control.laws.pressures import DIFFERENCE
 from ...control.laws.state_feedback import FRANKLIN1998, StateFeedback
-from ...core import Reference, Value, model, parameter, within
+from ...core import Reference, Value, model, ops, parameter, select_prefix, united, with_prefix
 from ...engine.loop import ControlLaw, Controller, EnclosingLaw, LawDesign, Measurement, Memory, Sampled
 from ...physics.analysis.linear_model import LinearModel
 from .joints import ENCODER_STEP, BenchmarkJoint
 from .signals import angular_acceleration
 
-READING = "reading"
-"""Name of the delayed angle, the measured column of a design."""
+Law = TypeVar("Law")
+READING, SPEED_READING = "reading", "speed_reading"
+"""Names of the delayed angle and of the lagged and delayed speed, the measured columns of a design."""
 PERMITTED_DIFFERENCE, PRESSURE_SPREAD = 1e5, 1e3
 """Permitted deviation of the command [Pa], to which the permitted errors are relative, and deviation of the present
 pressure difference after 1 s [Pa] (chosen)."""
@@ -28,6 +29,9 @@ samples that nobody knows. Without it the loop amplifies errors near its bandwid
 HORIZON, MAX_RATE = 40, 6e6
 """Samples of the horizon of the predictive controller, and greatest rate [Pa/s] of the half pressure difference that it
 plans, about that of the model with its valves fully open (chosen)."""
+ZERO_DRIFT = 1.0
+"""Deviation of the rate of a reading's zero error after 1 s [rad/s2] (chosen): 7 mrad/s of the speed, as predictive
+control needs an unknown disturbance for each reading."""
 STEPS = (1e-3, 1e-2, 1e3)
 """Steps of angle [rad], speed [rad/s] and half pressure difference [Pa] of the linearisation (chosen)."""
 
@@ -36,8 +40,8 @@ STEPS = (1e-3, 1e-2, 1e3)
 class JointDesignModel:
     """Linear model of a joint about an angle of 0: theta'' = -k theta - c theta' + g d,  T d' = u - d,  with dead time.
 
-    u commanded and d present half pressure difference. The dead time of the encoder is approximated by two lags of half
-    of it.
+    u commanded and d present half pressure difference. The dead time of both sensors is approximated by two lags of
+    half of it; that of the speed has a lag of its own before.
     """
 
     from_file: ClassVar[bool] = False
@@ -45,25 +49,27 @@ class JointDesignModel:
     stiffness: float = parameter("1/s2", "k", "stiffness over inertia", fitted=False)
     damping: float = parameter("1/s", "c", "damping over inertia", fitted=False)
     gain: float = parameter("rad/(Pa s2)", "g", "acceleration by half the pressure difference", fitted=False)
-    dead_time: float = parameter("s", "T_s", "dead time of the encoder", bounds=(1e-6, 1.0), fitted=False)
+    dead_time: float = parameter("s", "T_s", "dead time of the sensors", bounds=(1e-6, 1.0), fitted=False)
+    speed_lag: float = parameter("s", "T_omega", "lag of the speed sensor", bounds=(1e-6, 1.0), fitted=False)
     sample_time: float = parameter("s", "h", "sample time", bounds=(1e-6, 1.0), fitted=False)
 
     def linear_model(self, pressure_time: float) -> LinearModel:
         """The model with a lag of the pressures of this time constant [s]."""
-        lag = 2.0 / self.dead_time
-        a = np.zeros((5, 5))
-        a[0, 1] = 1.0
-        a[1, :3] = -self.stiffness, -self.damping, self.gain
-        a[2, 2] = -1.0 / pressure_time
-        a[3, [0, 3]] = lag, -lag
-        a[4, [3, 4]] = lag, -lag
-        b = np.zeros((5, 1))
-        b[2] = 1.0 / pressure_time
-        states = ("angle", "angular_speed", "half_difference", "delayed", READING)
+        late = 0.5 * self.dead_time
+        lags = {
+            "delayed": ("angle", late), READING: ("delayed", late), "lagged": ("angular_speed", self.speed_lag),
+            "lagged_delayed": ("lagged", late), SPEED_READING: ("lagged_delayed", late),
+        }  # fmt: skip
+        states = ("angle", "angular_speed", "half_difference", *lags)
+        a, b = np.zeros((8, 8)), np.zeros((8, 1))
+        a[0, 1], a[1, :3] = 1.0, (-self.stiffness, -self.damping, self.gain)
+        a[2, 2], b[2] = -1.0 / pressure_time, 1.0 / pressure_time
+        for i, (source, lag) in enumerate(lags.values(), 3):
+            a[i, [states.index(source), i]] = 1.0 / lag, -1.0 / lag
         zeros = dict.fromkeys(states, 0.0)
         return LinearModel(
-            a, b, np.eye(5), np.zeros((5, 1)), states, (DIFFERENCE,), states, {}, zeros, {DIFFERENCE: 0.0},
-            np.zeros(5), output_values=zeros,
+            a, b, np.eye(8), np.zeros((8, 1)), states, (DIFFERENCE,), states, {}, zeros, {DIFFERENCE: 0.0},
+            np.zeros(8), output_values=zeros,
         )  # fmt: skip
 
 
@@ -75,14 +81,17 @@ def joint_design_model(joint: BenchmarkJoint) -> JointDesignModel:
         point[i] = step
         above, below = (angular_acceleration(joint, joint.model, *(sign * point)) for sign in (1.0, -1.0))
         slopes.append((above - below) / (2.0 * step))
-    delay = next(sensor.delay for sensor in joint.sensors if sensor.column == "angle")
-    dead_time = max(delay, 1) * joint.sample_time + RESERVE
-    return JointDesignModel(-slopes[0], -slopes[1], slopes[2], dead_time, joint.sample_time)
+    sensors = {sensor.column: sensor for sensor in joint.sensors}
+    dead_time = max(sensors["angle"].delay, 1) * joint.sample_time + RESERVE
+    lag = max(sensors["angular_speed"].lag, 0.5 * joint.sample_time)
+    return JointDesignModel(-slopes[0], -slopes[1], slopes[2], dead_time, lag, joint.sample_time)
 
 
 @model
 class JointDesign(LawDesign):
     """Design of a controller of the reading with an observer of a disturbance torque, from weights.
+
+    The observer measures angle and speed: between the steps of the encoder, the speed damps the joint.
 
     `law` is that of `control.design_lqg`, `predictive` that of `control.design_predictive` with the same weights and
     the range and the rate of the command as limits; references there.
@@ -96,6 +105,7 @@ class JointDesign(LawDesign):
     speed_noise: float = parameter("rad/s", "q_omega", "deviation of the speed after 1 s", bounds=(1e-4, 1e4))
     disturbance_noise: float = parameter("rad/s2", "q_d", "deviation of the disturbance after 1 s", bounds=(1e-2, 1e6))
     pressure_time: float = parameter("s", "T", "time constant of the pressures", bounds=(1e-4, 1.0))
+    speed_deviation: float = parameter("rad/s", "r_omega", "deviation of the speed sensor", bounds=(1e-5, 1e3))
 
     @functools.cached_property
     def law(self) -> ControlLaw:
@@ -105,30 +115,27 @@ class JointDesign(LawDesign):
     @functools.cached_property
     def predictive(self) -> LinearModelPredictive:
         """The predictive controller with its observer."""
-        controller: LinearModelPredictive = self.designed(
-            design_predictive, horizon=HORIZON, max_rate={DIFFERENCE: MAX_RATE}
-        )
-        return controller
+        return self.designed(design_predictive, (SPEED_READING,), horizon=HORIZON, max_rate={DIFFERENCE: MAX_RATE})
 
-    def designed(self, design: Callable[..., Any], **further: Any) -> Any:
-        """What a function of `control` designs with these weights."""
+    def designed(self, design: Callable[..., Law], drifting: tuple[str, ...] = (), **further: Any) -> Law:
+        """What a function of `control` designs with these weights; `drifting` readings have an unknown zero error."""
         noise = {
             "angular_speed": self.speed_noise, "half_difference": PRESSURE_SPREAD,
             "angular_speed.disturbance": self.disturbance_noise,
+            **{f"{name}.disturbance": ZERO_DRIFT for name in drifting},
         }  # fmt: skip
         return design(
-            self.plant.linear_model(self.pressure_time), self.plant.sample_time, measured=(READING,),
-            controlled=(READING,), disturbed=("angular_speed",), process_noise=noise,
+            self.plant.linear_model(self.pressure_time), self.plant.sample_time, measured=(READING, SPEED_READING),
+            controlled=(READING,), disturbed=("angular_speed", *drifting), process_noise=noise,
             permitted={"angle": self.permitted_angle, DIFFERENCE: PERMITTED_DIFFERENCE},
-            measurement_noise={READING: ENCODER_STEP}, **further,
+            measurement_noise={READING: ENCODER_STEP, SPEED_READING: self.speed_deviation}, **further,
         )  # fmt: skip
 
 
 @functools.lru_cache(maxsize=64)
 def _quadratic(design: JointDesign) -> StateFeedback:
     """Equal designs, which a search makes once for each of its tasks and models, are computed once."""
-    feedback: StateFeedback = design.designed(design_lqg)
-    return feedback
+    return design.designed(design_lqg)
 
 
 @model
@@ -153,76 +160,88 @@ class RejectionDesign(LawDesign):
 
 @model
 class DeviationLaw(EnclosingLaw):
-    """u = law(y - r; 0): the law receives the deviation of the angle from its set point, and 0 as its own set point.
+    """u = law(y - r, v - v_r; 0): the law receives the deviations of its columns from the motion, 0 as its set point.
 
-    The deviation from a motion that the model can follow obeys the linearised model, whatever the motion.
+    The deviation from a motion that the model can follow obeys the linearised model, whatever the motion. y reading of
+    the angle, v that of the speed if the law measures it; the speed v_r of the motion passes the lag of its sensor.
     """
 
     from_file: ClassVar[bool] = False
 
     law: ControlLaw
+    speed_lag: float = parameter("s", "T_omega", "lag of the speed sensor", bounds=(1e-6, 1.0), fitted=False)
 
     @property
     def measured_columns(self) -> tuple[str, ...]:
-        return ("angle",)
+        return ("angle", "angular_speed")[: len(self.law.measured_columns)]
+
+    setpoints = measured_columns
 
     @property
-    def setpoints(self) -> tuple[str, ...]:
-        return ("angle",)
+    def initial_memory(self) -> Mapping[str, float]:
+        """Whether it has started (0 or 1), the lagged speed of the motion, and the values of the law."""
+        return {"started": 0.0, "speed": 0.0, **with_prefix("law.", dict(self.law.initial_memory))}
 
     def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
-        deviation = measurement.columns["angle"] - measurement.setpoints["angle"]
-        return self.law.step(memory, Measurement({READING: deviation}, {READING: 0.0}, measurement.ranges), dt)
+        columns, points = measurement.columns, measurement.setpoints
+        speed, deviations = memory["speed"], {READING: columns["angle"] - points["angle"]}
+        if SPEED_READING in self.law.measured_columns:
+            lagged = speed + (1.0 - ops.exp(-dt / self.speed_lag)) * (points["angular_speed"] - speed)
+            speed = ops.where(memory["started"] > 0, lagged, points["angular_speed"])
+            deviations[SPEED_READING] = columns["angular_speed"] - speed
+        seen = Measurement(deviations, {READING: 0.0}, measurement.ranges)
+        command, later = self.law.step(select_prefix("law.", memory), seen, dt)
+        return command, {"started": 1.0, "speed": speed, **with_prefix("law.", later)}
 
 
 class MotionMemory(NamedTuple):
-    """Memories of the feed-forward and of the designed controller, and the angles on their way, the oldest first."""
+    """Memories of the feed-forward, of the deviations and of the designed controller."""
 
     feed_forward: Any
+    deviation: Any
     controller: Any
-    angles: tuple[float, ...]
 
 
 @model
 class AlongMotion(Controller):
-    """u = u_ff + u_c:  predictive control u_c of the deviation y - r(t - T_s) beside the feed-forward of the model.
+    """u = u_ff + u_c:  predictive control u_c of the deviation from the motion beside the feed-forward of the model.
 
-    It is the sum of a law and a `DeviationLaw` for a controller that is called at each sample. The designed controller
-    sees the range of the command less the feed-forward: the sum keeps it. `delay` [samples] is that of the encoder.
+    It is the sum of a law and a `DeviationLaw` for a controller that is called at each sample: `deviation` delivers the
+    deviations of the readings. The designed controller sees the range of the command less the feed-forward: the sum
+    keeps it.
     """
 
     from_file: ClassVar[bool] = False
 
     feed_forward: ControlLaw
+    deviation: ControlLaw
     design: JointDesign
-    delay: int = within(0, 1000)
 
     @property
     def measured_columns(self) -> tuple[str, ...]:
-        return ("angle",)
+        return self.deviation.measured_columns
 
     @property
     def setpoints(self) -> tuple[str, ...]:
-        return ("angle", *self.feed_forward.setpoints)
+        return united(self.deviation.setpoints, self.feed_forward.setpoints)
 
     @property
     def inputs(self) -> tuple[str, ...]:
         return self.feed_forward.inputs
 
     def init(self) -> MotionMemory:
-        return MotionMemory(self.feed_forward.init(), self.design.predictive.init(), ())
+        return MotionMemory(self.feed_forward.init(), self.deviation.init(), self.design.predictive.init())
 
     def step(
         self, memory: MotionMemory, measurement: Measurement, dt: float
     ) -> tuple[Mapping[str, float], MotionMemory]:
         ahead, forward = self.feed_forward.step(memory.feed_forward, measurement, dt)
-        angles = (*memory.angles, measurement.setpoints["angle"])[-self.delay - 1 :]
-        deviation = measurement.columns["angle"] - angles[0]
+        deviations, passed = self.deviation.step(memory.deviation, measurement, dt)
         low, high = measurement.ranges[DIFFERENCE]
         command = float(ahead[DIFFERENCE])
-        seen = Measurement({READING: deviation}, {READING: 0.0}, {DIFFERENCE: (low - command, high - command)})
+        seen = Measurement(deviations, {READING: 0.0}, {DIFFERENCE: (low - command, high - command)})
         back, later = self.design.predictive.step(memory.controller, seen, dt)
-        return {DIFFERENCE: command + back[DIFFERENCE]}, MotionMemory(forward, later, angles)
+        return {DIFFERENCE: command + back[DIFFERENCE]}, MotionMemory(forward, passed, later)
 
     def notes(self, memory: MotionMemory) -> tuple[str, ...]:
         """The remarks of the designed controller."""

@@ -21,6 +21,8 @@ from .truths import JOINT, SIDES, SUPPLY, TRUTH_SEEDS, BenchmarkTruth, random_tr
 
 ENCODER_STEP = 2.0 * math.pi / 4096
 PRESSURE_NOISE, PRESSURE_STEP = 500.0, 1e6 / 4096
+SPEED_NOISE = 1e-3
+"""Noise of the speed [rad/s] (chosen): that of a rate gyroscope with 0.01 degrees/s/sqrt(Hz) behind a lag of 10 ms."""
 DEAD_TIME = 6e-3
 PROPORTIONAL_CONDUCTANCE, MATRIX_CONDUCTANCE = 1e-8, 2.6167e-9
 PROPORTIONAL_GAINS = (1.7e-5, 60e-5)
@@ -92,28 +94,20 @@ class BenchmarkJoint(ShortRepr):
 
     def describe(self, truth: BenchmarkTruth) -> dict[str, str]:
         """The kinds of a truth, and its numbers relative to the model."""
-        inner, ours = (plant.mechanism.inner for plant in (truth.plant, self.model))  # type: ignore[attr-defined]
-        circuit = truth.plant.circuits[0]
-        tube = next((f"{value:.2g} m" for path, value in _numbers(circuit) if path.endswith("orifice.length")), "–")
-        flow, nominal = (
-            next(value for path, value in _numbers(plant) if path.endswith("fill.conductance"))
-            for plant in (truth.plant, self.model)
-        )
-        ratios = {name: getattr(inner, name) / getattr(ours, name) for name in ("inertia", "weight_torque", "offset")}
-        kinds = {kind: ", ".join(sorted(names)) for kind, names in kinds_of(truth.plant).items()}
-        further = {name.replace("_", " "): f"{ratio:.2f}" for name, ratio in ratios.items()}
+        plants = (self.model, truth.plant)
+        ours, theirs = ({".".join(leaf.path.split(".")[-2:]): leaf.value for leaf in leaves(each)} for each in plants)
+        ratios = {name: f"{value / ours[name]:.2f}" for name, value in theirs.items() if ours.get(name)}
         return {
-            **kinds, "flow": f"{flow / nominal:.2f}", "tube": tube, **further,
+            **{kind: ", ".join(sorted(names)) for kind, names in kinds_of(truth.plant).items()},
+            "flow": ratios["fill.conductance"],
+            "tube": f"{theirs['orifice.length']:.2g} m" if "orifice.length" in theirs else "–",
+            **{name.replace("_", " "): ratios[f"inner.{name}"] for name in ("inertia", "weight_torque", "offset")},
             "unknown dead time": f"{1e3 * truth.extra_delay * self.sample_time:g} ms",
-        }  # fmt: skip
+        }
 
     def start(self, plant: Plant) -> dict[str, float]:
         """The initial state of a plant: its equilibrium at the mean pressure in both muscles."""
         return find_equilibrium(plant, pressure=self.mean_pressure)
-
-
-def _numbers(part: Any) -> list[tuple[str, float]]:
-    return [(leaf.path, leaf.value) for leaf in leaves(part)]
 
 
 def kinds_of(plant: Plant) -> dict[str, set[str]]:
@@ -179,14 +173,14 @@ def perturbed_models(conductance: float) -> dict[str, Plant]:
 
 
 def benchmark_sensors(sample_time: float) -> tuple[ColumnSensor, ...]:
-    """A 12-bit encoder, speed with a lag of 10 ms, pressures with 5 mbar of noise and 12 bits, for a sample time [s].
+    """A 12-bit encoder, speed with a lag of 10 ms and 1 mrad/s of noise, pressures with 5 mbar of noise and 12 bits.
 
-    All have a dead time of 6 ms. These numbers are chosen.
+    All have a dead time of 6 ms, in samples of the sample time [s]. These numbers are chosen.
     """
     delay = round(DEAD_TIME / sample_time)
     return (
         ColumnSensor("angle", resolution=ENCODER_STEP, delay=delay),
-        ColumnSensor("angular_speed", lag=0.01, delay=delay),
+        ColumnSensor("angular_speed", lag=0.01, noise=SPEED_NOISE, delay=delay),
         *(ColumnSensor(f"{n}.pressure", resolution=PRESSURE_STEP, noise=PRESSURE_NOISE, delay=delay) for n in SIDES),
     )
 

@@ -23,11 +23,11 @@ from ...physics.pneumatics.valve import Orifice, SubsonicIndexValve
 
 SIDES = ("left", "right")
 SUPPLY = 6e5
-TRUTH_SEEDS = tuple(range(23, 29))
-"""Seeds of the truths of a benchmark: the first row of six after 20 in which every class of the family occurs."""
+TRUTH_SEEDS = tuple(range(29, 35))
+"""Seeds of the truths of a benchmark: the first row of six after 28, the last one seen before, with every class."""
 DEVELOPMENT_SEEDS = tuple(range(1, 7))
 """Seeds of the truths for which the controllers of the package were developed."""
-SEALED_SEED = 20_270_319
+SEALED_SEED = 20_261_128
 """Seed of the truth that no tuning has seen; it is drawn for the published page alone."""
 LAWS = ("sarosi-dmsp-20-200n", "sarosi-dmsp-20-400n", "tondu-lopez")
 JOINT = AntagonisticJoint(radius=0.04, inertia=0.05, damping=0.2, weight_torque=2.0, offset=0.11)
@@ -36,6 +36,7 @@ MAX_EXTRA_DELAY = 2
 """Greatest unknown part of the dead time [samples] (chosen)."""
 PRESLIDING = 5e-4
 """Deflection of a muscle at which its friction slides [m] (chosen)."""
+CRITICAL_RATIO = (2.0 / (HEAT_CAPACITY_RATIO + 1.0)) ** (HEAT_CAPACITY_RATIO / (HEAT_CAPACITY_RATIO - 1.0))
 SAINT_VENANT1839 = published("saint-venant-wantzel-1839")
 
 
@@ -58,13 +59,10 @@ class IsentropicNozzle(Orifice):
 
     def mass_flow(self, upstream: Value, downstream: Value, opening: Value, temperature: Value) -> Value:
         high, low = ops.maximum(upstream, downstream), ops.minimum(upstream, downstream)
-        ratio, critical = (
-            low / high,
-            (2.0 / (HEAT_CAPACITY_RATIO + 1.0)) ** (HEAT_CAPACITY_RATIO / (HEAT_CAPACITY_RATIO - 1.0)),
-        )
+        ratio = low / high
         laminar = _psi(self.laminar_ratio) * (1.0 - ratio) / (1.0 - self.laminar_ratio)
-        isentropic = _psi(ops.clip(ratio, critical, self.laminar_ratio))
-        part = ops.where(ratio > self.laminar_ratio, laminar, isentropic) / _psi(critical)
+        isentropic = _psi(ops.clip(ratio, CRITICAL_RATIO, self.laminar_ratio))
+        part = ops.where(ratio > self.laminar_ratio, laminar, isentropic) / _psi(CRITICAL_RATIO)
         flow = self.conductance * REFERENCE_DENSITY * ops.sqrt(REFERENCE_TEMPERATURE / temperature) * high * part
         return opening * ops.where(upstream >= downstream, flow, -flow)
 

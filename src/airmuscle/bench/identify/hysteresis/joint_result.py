@@ -68,7 +68,7 @@ def agreement_of_run(joint: Friction, own: HysteresisFit, description: str, pres
     rest = target + factor * joint_force
     variance = float(np.mean(rest**2)) * rest.size / max(effective_sample_size(rest), 1.0)
     joint_misfit, misfit = Misfit.of(joint, (run,)), Misfit.of(own.friction, (run,))
-    largest = max(_rms(own_force), _rms(joint_force), 1e-300)
+    largest = max(float(np.linalg.norm(force)) for force in (own_force, joint_force)) or 1e-300
     amplitude = force_amplitude(run, joint)
     return RunAgreement(
         origin=run.origin,
@@ -77,7 +77,7 @@ def agreement_of_run(joint: Friction, own: HysteresisFit, description: str, pres
         amplitude=factor * amplitude,
         amplitude_stderr=float(np.sqrt(variance / power)) * amplitude,
         joint_amplitude=amplitude,
-        deviation=_rms(own_force - joint_force) / largest,
+        deviation=float(np.linalg.norm(own_force - joint_force)) / largest,
         p_value=misfit.p_value(joint_misfit._replace(parameters=curve.shape[1])),
     )
 
@@ -85,10 +85,6 @@ def agreement_of_run(joint: Friction, own: HysteresisFit, description: str, pres
 def _without_static_part(force: Array, curve: Array) -> Array:
     """The force minus its projection on the columns of the static curve, which takes up this part."""
     return np.asarray(force - curve @ np.linalg.lstsq(curve, force, rcond=None)[0])
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(values**2)))
 
 
 def plot_amplitudes(runs: Sequence[RunAgreement], friction: Friction, name: str, *, ax: Any = None) -> Any:
