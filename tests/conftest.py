@@ -72,13 +72,13 @@ class OneOfAKind:
 
 
 def kinds_of(figure: Any) -> set[Any]:
-    """Its curves, areas and texts, each with the scales of its axes, and whether a title or a label has a formula."""
+    """Its curves, areas and texts, each with the scales of its axes, and the titles and labels with a formula."""
     return {
         (kind, axes.get_xscale(), axes.get_yscale())
         for axes in figure.axes
         for kind in (
             *(type(child).__name__ for child in axes.get_children()),
-            *("$" for text in (axes.get_title(), axes.get_xlabel(), axes.get_ylabel()) if "$" in text),
+            *(text for text in (axes.get_title(), axes.get_xlabel(), axes.get_ylabel()) if "$" in text),
         )
     }
 

@@ -9,11 +9,17 @@ import sys
 from pathlib import Path
 
 import pytest
+from widths import widened
 
 playwright = pytest.importorskip("playwright.sync_api", reason="needs the package playwright")
 CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
 OPTIONS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking", "--disable-component-update", "--disable-sync"]  # fmt: skip
 WAIT = 180_000
+PAGES = widened(
+    [(width, scheme) for width in (360, 768, 1600) for scheme in ("light", "dark")],
+    lambda width, scheme: (width == 768) == (scheme == "dark"),
+)
+"""Width and colours of a page: each width by default with one scheme, on which the layout does not depend."""
 REFUSED = "status of 422"
 """Message of the browser on a text that the server refused."""
 

@@ -315,7 +315,7 @@ def test_a_fill_is_predicted_by_the_others_within_one_per_cent_of_the_supply(one
 @pytest.fixture(scope="module")
 def isobaric_records():
     """The campaign of three isobaric records, its progress, and its stages in the order in which they ended."""
-    sweeps = {bar: MUSCLE.isobaric(bar, np.random.default_rng(3), rows=200) for bar in (1.0, 3.0, 5.0)}
+    sweeps = {bar: MUSCLE.isobaric(bar, np.random.default_rng(3), rows=100) for bar in (1.0, 3.0, 5.0)}
     runs = [recording(columns, f"{bar} bar") for bar, columns in sweeps.items()]
     fractions, ended = [], []
     campaign = identify_campaign(

@@ -88,10 +88,6 @@ def killed_at_random(folder: Path, kills: int) -> None:
         assert whole == (folder / "alone" / "results.csv").read_bytes()
 
 
-def test_a_killed_process_does_not_change_the_result(folder: Path):
-    killed_at_random(folder, 1)
-
-
 @pytest.mark.slow
 def test_thirty_kills_do_not_change_the_result(folder: Path):
     killed_at_random(folder, 30)

@@ -15,7 +15,7 @@ from airmuscle.files.scenario import build_scenario
 
 pytest.importorskip("starlette", reason="needs starlette")
 pytest.importorskip("playwright.sync_api", reason="needs the package playwright")
-from studio_browser import WAIT, address, browser, opened
+from studio_browser import PAGES, WAIT, address, browser, opened
 
 __all__ = ["address", "browser"]
 pytestmark = [
@@ -254,8 +254,7 @@ def test_print_is_dark_on_white_in_dark_mode(browser, address):
         assert not page.get_by_role("button", name="Save page").is_visible()
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("width", [360, 768, 1600])
+@pytest.mark.parametrize(("width", "scheme"), PAGES)
 def test_the_page_fits_every_width(browser, address, width, scheme):
     with opened(browser, address, width=width, scheme=scheme) as page:
         assert page.evaluate("document.documentElement.dataset.theme") == scheme

@@ -16,7 +16,7 @@ import airmuscle as am
 pytest.importorskip("starlette", reason="needs starlette")
 pytest.importorskip("playwright.sync_api", reason="needs the package playwright")
 from arm_episodes import made_episodes
-from studio_browser import WAIT, address, browser, opened
+from studio_browser import PAGES, WAIT, address, browser, opened
 
 __all__ = ["address", "browser"]
 pytestmark = pytest.mark.tool
@@ -174,8 +174,7 @@ def test_bad_files_and_lost_sets_are_explained(browser, address):
         page.get_by_text("picture.csv").first.wait_for(state="detached", timeout=WAIT)
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("width", [360, 768, 1600])
+@pytest.mark.parametrize(("width", "scheme"), PAGES)
 def test_the_tab_fits_every_width(browser, address, width, scheme):
     with fit_tab(browser, address, width=width, scheme=scheme) as page:
         drop(page, "bench with a long name of many words in it.csv", table().replace(b"pressure", b"pressure [bar]"))

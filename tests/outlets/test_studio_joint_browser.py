@@ -16,7 +16,7 @@ from airmuscle.physics import joint_statics
 
 pytest.importorskip("starlette", reason="needs starlette")
 pytest.importorskip("playwright.sync_api", reason="needs the package playwright")
-from studio_browser import address, browser, opened
+from studio_browser import PAGES, address, browser, opened
 
 __all__ = ["address", "browser"]
 pytestmark = [
@@ -181,8 +181,7 @@ def test_a_page_is_written_with_the_tab_joint(browser, tmp_path):
         assert "rms error" in panel.inner_text()
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"])
-@pytest.mark.parametrize("width", [360, 768, 1600])
+@pytest.mark.parametrize(("width", "scheme"), PAGES)
 def test_both_tabs_fit_every_width(browser, address, width, scheme):
     with opened(browser, address, width=width, scheme=scheme) as page:
         for tab in ("Joint", "Size"):
