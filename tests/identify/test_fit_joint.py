@@ -26,8 +26,8 @@ def short_search():
     """Few iterations, because the episodes are few and made."""
     module = importlib.import_module("airmuscle.bench.joint.fit")
     with pytest.MonkeyPatch.context() as patch:
-        *trials, search = (replace(each, iterations=25, batch=60) for each in module.STAGES)
-        patch.setattr(module, "STAGES", (*trials, replace(search, iterations=60, batch=80)))
+        *trials, search = (replace(each, iterations=15, batch=60) for each in module.STAGES)
+        patch.setattr(module, "STAGES", (*trials, replace(search, iterations=35, batch=80)))
         yield
 
 
