@@ -24,8 +24,8 @@ DEAD = 0.01
 """Spread of a reading, relative to the greatest of its kind, up to which it is none (chosen)."""
 JUMP = np.pi
 """Change of an angle between two rows [rad] that no arm makes."""
-SPEED_RATIO = 1.15
-"""Ratio of the slope of the angles to the speeds, or of its inverse, that a wrong sample time explains (chosen)."""
+SPEED_RATIO, TRAVEL = 1.15, 5
+"""Ratio of the motion to that of the speeds, or its inverse, that a wrong sample time explains; rows of it (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -192,10 +192,13 @@ def _constant(episodes: Episodes) -> list[str]:
 
 
 def _sample_time(episodes: Episodes) -> list[str]:
-    """Slope of the angles against the measured speeds, which a wrong sample time multiplies."""
-    slope = np.concatenate([speed_of(run.angle, episodes.sample_time) for run in episodes.runs])
-    speed = episodes.rows("speed")
-    ratio = np.median(np.sum(slope * speed, axis=0) / np.maximum(np.sum(speed**2, axis=0), 1e-12))
+    """Motion against that of the measured speeds, whose ratio a wrong sample time multiplies: medians of the quarter of
+    the rows with most motion, because single readings have noise and outliers."""
+    path = [np.cumsum(run.speed[1:] + run.speed[:-1], axis=0) * (0.5 * episodes.sample_time) for run in episodes.runs]
+    said = np.concatenate([each[TRAVEL:] - each[:-TRAVEL] for each in path])
+    moved = np.concatenate([run.angle[1 + TRAVEL :] - run.angle[1:-TRAVEL] for run in episodes.runs])
+    far = np.abs(said) >= np.maximum(np.quantile(np.abs(said), 0.75, axis=0), 1e-12)
+    ratio = np.nanmedian(np.nanmedian(np.where(far, moved, np.nan) / np.where(far, said, np.nan), axis=0))
     if 1 / SPEED_RATIO < ratio < SPEED_RATIO:
         return []
     hint = ', as speeds in degrees have: unit = "deg/s"' if 1 / SPEED_RATIO < np.degrees(ratio) < SPEED_RATIO else ""

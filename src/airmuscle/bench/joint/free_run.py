@@ -114,8 +114,8 @@ def fit_residual(
     arm      with stick-slip; its pressures are those of the episodes, in their order, `delay` rows later
     centres  number of the Gaussian functions
 
-    Physics stays as it is. The ridge draws towards the residual of the joints before; of its weights, the one with the
-    smallest error of the joint on the episodes held back is taken. A residual without any joint is zero.
+    Physics stays as it is. The ridge draws towards the residual of the joints before; of its weights that episodes held
+    back confirm, the one with the smallest error of the joint there is taken. A residual without any joint is zero.
     """
     split = max(1, round((1.0 - HELD_BACK) * len(episodes)))
     every, held = cut(episodes[:split], delay, rows, stride=max(1, rows // 2)), cut(episodes[split:], delay, rows)
@@ -136,7 +136,7 @@ def fit_residual(
             gain = ResidualGain(before, _errors(descent.arm, held), far)
             trials.append((float(rms(gain.hybrid)[joint]), descent.arm, gain))
             progress(f"residual of joint {joint + 1}, ridge of {ridge:g}: {gain}")
-        _, hybrid, gain = min(trials, key=lambda trial: trial[0])
+        _, hybrid, gain = min(trials, key=lambda trial: (not trial[2].accepts(joint), trial[0]))
         if gain.accepts(joint):
             found, accepted = hybrid, [*accepted, joint + 1]
     return found, accepted
