@@ -99,11 +99,8 @@ class EpisodeInspection:
         return "\n".join(lines)
 
 
-def inspect_episodes(
-    episodes: Episodes, pairs: Sequence[tuple[int, int]] = (), rows: int = ROWS
-) -> EpisodeInspection:  # fmt: skip
-    """Inspect episodes before a fit over `rows` rows; with `pairs`, the muscles that are said to raise and lower each
-    angle."""
+def inspect_episodes(episodes: Episodes, pairs: Sequence[tuple[int, int]] = (), rows: int = ROWS) -> EpisodeInspection:
+    """Inspect episodes before a fit over `rows` rows; `pairs` are the muscles said to raise and lower each angle."""
     errors = [*_units(episodes), *_jumps(episodes), *_constant(episodes)] or _sample_time(episodes)
     short = list[str]()
     try:

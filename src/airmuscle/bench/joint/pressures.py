@@ -111,8 +111,7 @@ def fit_regulator_lags(episodes: Episodes, rows: int = ROWS) -> tuple[RegulatorL
 
 
 def _fit(p: Array, u: Array) -> RegulatorLag:
-    """The regulator of readings (N, R) in any unit: the search sees a high pressure of LEVEL and commands that vary by
-    1."""
+    """The regulator of readings (N, R) in any unit; a high one is LEVEL, the deviation of commands 1 in the search."""
     scale, unit = (float(np.quantile(np.abs(p), 0.99)) or LEVEL) / LEVEL, float(np.std(u)) or 1.0
     p, u = p / scale, u / unit
     low, high = np.quantile(p, (0.01, 0.99)) / UNIT
