@@ -92,6 +92,22 @@ def test_commissioned_gains_follow_the_truth_better_than_those_before_and_the_en
         assert found.after < min(error({**found.gains, path: value}) for value in (low, high)), path
 
 
+def test_a_commissioning_counts_the_strokes_of_the_valves_as_the_tuning_does():
+    """As one more error, so that the mean square of all is that of the error and of the weighted strokes together."""
+    completed, truth = complete(JOINT, MINE), JOINT.truths[0]
+    task = replace(SHORT, begin=0.7)  # from which on a commissioning judges
+    errors = tracking_errors(JOINT, truth, completed.law, task)
+    strokes = run_task(JOINT, truth, completed.law, task).metrics.strokes
+    weighted = np.radians(JOINT.objective.travel_weight * strokes)
+    assert strokes > 1.0
+    assert errors[-1] == pytest.approx(weighted * np.sqrt(errors.size - 1), rel=1e-3)
+    careless = replace(JOINT, objective=replace(JOINT.objective, travel_weight=0.0))
+    np.testing.assert_array_equal(tracking_errors(careless, truth, completed.law, task), [*errors[:-1], 0.0])
+    switched = on_off_joint((11,))
+    law = complete(switched, next(each for each in standard_contenders(switched) if each.name == "PID")).law
+    assert tracking_errors(switched, switched.truths[0], law, task)[-1] == 0.0
+
+
 def test_a_commissioning_has_no_more_runs_than_it_is_given():
     contender = next(each for each in standard_contenders(JOINT) if each.name == "PID")
     completed = complete(JOINT, contender)

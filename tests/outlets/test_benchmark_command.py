@@ -30,7 +30,7 @@ def test_a_benchmark_writes_its_report_tables_and_figures(tmp_path):
     } <= names
     assert "data/searches.csv" not in names, "nothing was tuned"
     page = (tmp_path / "benchmark" / "report.html").read_text(encoding="utf-8")
-    for text in ("MaxwellSlip", "12-bit encoder", "1e-08 m3/(s Pa)", "weight x 2"):
+    for text in ("LuGre", "12-bit encoder", "1e-08 m3/(s Pa)", "weight x 2"):
         assert text in page, text
 
 
@@ -41,11 +41,11 @@ def test_json_contains_every_metric_of_every_run(tmp_path):
     assert [ranked[name] for name in ("controller", "score", "lowest", "highest")] == ["PID", 1.0, 1.0, 1.0]
     assert [row["group"] for row in content["metrics"]] == ["models only", "commissioned"]
     row = content["metrics"][0]
-    assert (row["controller"], row["truth"], row["task"]) == ("PID", "truth 29", "step")
+    assert (row["controller"], row["truth"], row["task"]) == ("PID", "truth 35", "step")
     assert 0 < row["rms_error"] < row["maximum_error"] < 0.5
     assert content["units"]["metrics.rms_error"] == "rad"
     assert row["settling_time"] is None or row["settling_time"] >= 0
-    found = {each["gain"].rpartition(".")[2] for each in content["gains"] if each["found_on"] == "truth 29"}
+    found = {each["gain"].rpartition(".")[2] for each in content["gains"] if each["found_on"] == "truth 35"}
     assert found == {"gain", "integral_time", "derivative_time"}
     assert all(each["found_on"] != "models" for each in content["gains"]), "nothing was tuned"
 

@@ -16,7 +16,7 @@ from ..tuning import LoopCase, RootMeanSquareError, Tuning, tune
 from ..tuning.case import GainRange, with_gains
 from .contenders import Contender, SensedController, complete
 from .joints import ENCODER_STEP, BenchmarkJoint
-from .signals import task_loop, task_signals
+from .signals import task_loop, task_signals, valve_travel
 from .tasks import DEGREE, TUNING_BEGIN, ControlTask
 from .truths import BenchmarkTruth
 
@@ -91,7 +91,7 @@ def _cases(joint: BenchmarkJoint, law: Controller) -> Iterator[LoopCase]:
 
 @dataclasses.dataclass(frozen=True)
 class Commissioning:
-    """The gains that follow the tasks best on a truth, by path [SI]; rms errors [rad] before and after; the runs."""
+    """The gains that suit a truth best, by path [SI]; rms errors with strokes [rad] before and after; the runs."""
 
     gains: Mapping[str, float]
     before: float
@@ -146,9 +146,10 @@ def commission(
     bounds  minimum and maximum [SI] of each gain by its path
 
     Each set of gains is tried in all tasks. Each run is judged by the error of set point and reading of the encoder,
-    whose dead time is known afterwards: Gauss-Newton steps in a trusted region that shrinks where a step does not help.
-    Their derivatives are difference quotients, corrected by what each step has shown (Broyden's update), and measured
-    again where a step does not help or hardly helps. Nothing but the sensors of the truth is used.
+    whose dead time is known afterwards, and by the strokes commanded of proportional valves: Gauss-Newton steps in a
+    trusted region that shrinks where a step does not help. Their derivatives are difference quotients, corrected by
+    what each step has shown (Broyden's update), and measured again where a step does not help or hardly helps. Nothing
+    but the sensors of the truth is used.
     """
     rig = _Rig(joint, truth, law, [GainRange(path, *pair) for path, pair in bounds.items()], tasks, runs)
     before = np.inf
@@ -226,7 +227,8 @@ def on_truth(law: SensedLaw, delay: int) -> SensedLaw:
 
 
 def tracking_errors(joint: BenchmarkJoint, truth: BenchmarkTruth, law: Controller, task: ControlTask) -> Array | None:
-    """The difference (N,) [rad] of set point and reading of the encoder in a run on a truth; None if it fails."""
+    """The difference [rad] of set point and reading of the encoder in a run on a truth, and one more row (N + 1,): the
+    strokes of proportional valves with their weight in the tuning, as an error of all rows. None if the run fails."""
     try:
         record = run_loop(joint, truth, law, task)
     except (PhysicsError, SimulationError):
@@ -235,4 +237,7 @@ def tracking_errors(joint: BenchmarkJoint, truth: BenchmarkTruth, law: Controlle
     time = signals.time[signals.time <= task.duration + 1e-9]
     angle = np.interp(time, record["time"], record["angle"])
     reading = ENCODER_STEP * np.round(angle / ENCODER_STEP)
-    return np.asarray((signals.angle[: time.size] - reading)[time >= TUNING_BEGIN])
+    errors = (signals.angle[: time.size] - reading)[time >= TUNING_BEGIN]
+    travel = valve_travel(truth.plant, record, np.asarray(record["time"]) >= TUNING_BEGIN).sum()
+    weight = 0.0 if joint.switching else joint.objective.travel_weight  # counts of switchings have no derivative
+    return np.append(errors, math.sqrt(errors.size) * weight * DEGREE * travel)

@@ -210,7 +210,7 @@ def track(
     judged, error = time >= task.begin - 1e-9, wanted - angle
     late = time >= task.duration - STEADY_TIME - 1e-9
     magnitude, t = np.abs(error[judged]), time[judged]
-    strokes = _strokes(plant, record, judged)
+    strokes = valve_travel(plant, record, judged)
     return TrackingMetrics(
         rmse=math.sqrt(time_mean(t, error[judged] ** 2)),
         max_error=float(magnitude.max()),
@@ -229,10 +229,7 @@ def _settling(task: ControlTask, time: Array, error: Array) -> float:
     if task.event is None:
         return math.nan
     outside = np.flatnonzero((np.abs(error) > SETTLING_BAND) & (time > task.event))
-    if not outside.size:
-        return 0.0
-    last = outside[-1]
-    return math.inf if last == time.size - 1 else float(time[last + 1] - task.event)
+    return float(np.append(time, math.inf)[outside[-1] + 1] - task.event) if outside.size else 0.0
 
 
 def _overshoot(task: ControlTask, wanted: Array, angle: Array, judged: Mask) -> float:
@@ -262,12 +259,10 @@ def _drawn_flow(plant: Plant, record: Recording) -> Array:
     return flow
 
 
-def _strokes(plant: Plant, record: Recording, judged: Mask) -> Array:
+def valve_travel(plant: Plant, record: Recording, judged: Mask) -> Array:
     """Travel of each valve [full strokes/s] between the samples."""
-    names = [name for name in plant.inputs if name != "external_torque"]
-    span = np.ptp(np.asarray(record["time"])[judged])
-    commands = [np.asarray(record[f"command.{name}"])[judged] for name in names]
-    return np.array([float(np.abs(np.diff(each)).sum()) for each in commands]) / float(span)
+    commands = [record[f"command.{name}"][judged] for name in plant.inputs if name != TORQUE_INPUT]
+    return np.asarray(np.abs(np.diff(commands)).sum(axis=1) / np.ptp(record["time"][judged]))
 
 
 def _stiffness_error(joint: BenchmarkJoint, plant: Plant, signals: TaskSignals, record: Recording, late: Mask) -> float:
