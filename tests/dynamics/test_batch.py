@@ -618,8 +618,11 @@ def test_rows_that_go_together_are_checked_at_once(monkeypatch):
     plant = paper()
     paths = [leaf.path for leaf in tree.leaves(plant) if leaf.value != 0.0]
     columns = {leaf.path: leaf.value * np.linspace(0.98, 0.99, 4) for leaf in tree.leaves(plant) if leaf.path in paths}
-    monkeypatch.setattr(variations, "_check_row", lambda row, part: pytest.fail(f"row {row} is checked by itself"))
+    check, checked = variations.check_together, []
+    monkeypatch.setattr(variations, "check_together", lambda part: (checked.append(part), check(part)))
     assert variations.variations_of(plant, columns, None).values.shape == (4, len(paths))
+    assert checked
+    assert all(any(isinstance(leaf.value, np.ndarray) for leaf in tree.leaves(part)) for part in checked)
 
 
 def test_a_limit_of_the_validity_range_beyond_its_bounds_names_the_row():
