@@ -83,6 +83,20 @@ class Recording(NotebookDisplay):
         length is known. Raises ColumnError for an unknown column."""
         if not isinstance(name, str):
             raise ColumnError(f"{self.origin}: no column '{one_line(name)}'; the columns are {listed(self.columns)}.")
+        values = self._column(name)
+        if values is not None:
+            return values
+        known = list(self.columns)
+        remedy: str = ""
+        moved = next((each for each in ("length", "shortening") if each in known), "")
+        if name == "contraction" and moved:
+            remedy = f" Specify the resting length to convert the {moved} to a contraction."
+        elif name == "contraction" and "position" in known:
+            remedy = HintedText(" ", ZERO_NOT_STATED)
+        text = f"{self.origin}: no column '{name}'{alternatives(name, known, 'the columns are')}"
+        raise ColumnError(HintedText(text, remedy))
+
+    def _column(self, name: str) -> Array | None:
         if name in self.columns:
             return self.columns[name]
         resting_length = self.constants.get("resting_length")
@@ -94,22 +108,10 @@ class Recording(NotebookDisplay):
             if "shortening" in self.columns and name in ("contraction", "length"):
                 contraction = self.columns["shortening"] / resting_length
                 return contraction if name == "contraction" else resting_length * (1.0 - contraction)
-        known = list(self.columns)
-        remedy: str = ""
-        moved = next((each for each in ("length", "shortening") if each in known), "")
-        if name == "contraction" and moved:
-            remedy = f" Specify the resting length to convert the {moved} to a contraction."
-        elif name == "contraction" and "position" in known:
-            remedy = HintedText(" ", ZERO_NOT_STATED)
-        text = f"{self.origin}: no column '{name}'{alternatives(name, known, 'the columns are')}"
-        raise ColumnError(HintedText(text, remedy))
+        return None
 
     def __contains__(self, name: str) -> bool:
-        try:
-            self[name]
-        except ColumnError:
-            return False
-        return True
+        return isinstance(name, str) and self._column(name) is not None
 
     def __len__(self) -> int:
         return next(iter(self.columns.values())).size if self.columns else 0

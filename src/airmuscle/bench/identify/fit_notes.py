@@ -171,10 +171,11 @@ def collect_notes(problem: FitProblem, statistics: FitStatistics, loss: Loss, dr
 
 def loss_scale_notes(problem: FitProblem, solution: LeastSquaresSolution, loss: Loss) -> tuple[str, ...]:
     """A remark where the scale of a robust loss is so small that most rows count as outliers."""
-    measured = problem.censoring == 0
-    residuals = np.abs(problem.residuals(solution.modelled))[measured]
+    if isinstance(loss, LeastSquares):
+        return ()
+    residuals = np.abs(problem.residuals(solution.modelled))[problem.censoring == 0]
     inside = int(np.count_nonzero(residuals <= loss.scale))
-    if isinstance(loss, LeastSquares) or inside >= residuals.size / 2:
+    if inside >= residuals.size / 2:
         return ()
     return (
         f"Only {inside} of {residuals.size} residuals are within the scale of {loss}, so the standard errors are too "

@@ -95,6 +95,8 @@ class FitPoints:
         depends on it.
         """
         columns = [_columns_at_levels(run) for run in self.recordings]
+        if not any(held.any() for _, each in columns for held in each.values()):
+            return self.data
         levels: dict[str, Array] = {}
         for name in ("pressure", "contraction"):
             values, held = (np.concatenate([each[name] for each in part]) for part in zip(*columns, strict=True))
@@ -191,8 +193,12 @@ def _may_be_constant(values: Array, band: float) -> bool:
     """
     if not MIN_ROWS_OF_RUN <= len(values) <= _MAX_ROWS_OF_POINTS:
         return len(values) > _MAX_ROWS_OF_POINTS
-    windows = np.lib.stride_tricks.sliding_window_view(values, MIN_ROWS_OF_RUN)
-    ordered = np.sort(windows, axis=1)
+    # Ten rows of twelve are in the band, and so at least four in succession.
+    parts = [values[i : len(values) - 3 + i] for i in range(4)]
+    near = np.maximum.reduce(parts) - np.minimum.reduce(parts) <= band * (1 + 1e-9)
+    if not near.any():
+        return False
+    ordered = np.sort(np.lib.stride_tricks.sliding_window_view(values, MIN_ROWS_OF_RUN), axis=1)
     return bool((ordered[:, -2] - ordered[:, 1] <= band * (1 + 1e-9)).any())
 
 

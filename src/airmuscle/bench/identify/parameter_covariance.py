@@ -200,22 +200,21 @@ def estimate_covariance(
     the rows are independent.
     """
     spare, parameters = len(residuals) - len(basis), len(basis)
-    specimens, count = (np.unique(each).size for each in (runs.specimen, runs.run))
+    specimens, count = (int(np.count_nonzero(np.bincount(each))) for each in (runs.specimen, runs.run))
     independent = ParameterCovariance(which, basis, sigma, spare, count, specimens)
     if spare <= 0 or not parameters or not sigma > 0:
         return independent
-    rows = weighted @ basis
-    levels = [(SPECIMENS, runs.specimen)] if specimens < count else []
-    for unit, group in (*levels, (RUNS, runs.run)):
-        found = (
-            _group(independent, rows, residuals, group, unit) if np.unique(group).size >= MIN_GROUPS else independent
-        )
-        if found.groups is not None and found.degrees_of_freedom >= MIN_DEGREES_OF_FREEDOM:
-            return found
-    if not (runs.in_time or is_correlated(residuals, runs.run)):
+    in_parts = runs.in_time or is_correlated(residuals, runs.run)
+    if not in_parts and count < MIN_GROUPS:
         return independent
+    rows = weighted @ basis
+    for unit, group, number in ((SPECIMENS, runs.specimen, specimens), (RUNS, runs.run, count)):
+        if number >= MIN_GROUPS and (unit == RUNS or specimens < count):
+            found = _group(independent, rows, residuals, group, unit)
+            if found.degrees_of_freedom >= MIN_DEGREES_OF_FREEDOM:
+                return found
     parts = max(-(-(parameters + SPARE_GROUPS) // count), 2)
-    while count * parts * MIN_GROUP_ROWS <= len(residuals):
+    while in_parts and count * parts * MIN_GROUP_ROWS <= len(residuals):
         found = _group(independent, rows, residuals, successive_parts(runs.run, parts), PARTS)
         if found.degrees_of_freedom >= MIN_DEGREES_OF_FREEDOM:
             return found

@@ -232,10 +232,9 @@ def make_problem(
 
 
 def _check_known(law: Characteristic, leaves: Sequence[tree.Leaf], fixed: Collection[str]) -> None:
-    known = list(dict.fromkeys(name for leaf in leaves for name in (leaf.path.partition("[")[0], leaf.path)))
     for name in fixed:
-        if name not in known:
-            fields = list(dict.fromkeys(leaf.path.partition("[")[0] for leaf in leaves))
+        fields = list(dict.fromkeys(leaf.path.partition("[")[0] for leaf in leaves))
+        if name not in fields and name not in (leaf.path for leaf in leaves):
             raise ParameterError(
                 f"{type(law).__name__} has no parameter '{name}' to be fixed"
                 f"{alternatives(name, fields, 'its parameters are')}"

@@ -97,7 +97,7 @@ def fit_to_points(
     if isinstance(law, PooledLengthLaw):
         check_poolable(law, points)
     population = population_of(law)
-    key = tree.structure(population), tuple(leaf.value for leaf in tree.leaves(population)), loss, tuple(fixed)
+    key = tree.structure(population), tree.flatten(population).tobytes(), loss, tuple(fixed)
     kept: dict[str, Any] = points.kept if censoring is None and sigma is None else {}
     if kept.get("key") != key:
         kept.clear()

@@ -16,7 +16,7 @@ from .parameter_covariance import ParameterCovariance, Runs, estimate_covariance
 from .problem import FitProblem
 from .solver import LeastSquaresSolution
 from .variable_projection import RANK_TOLERANCE, uncensored_rank
-from .weighting import Loss
+from .weighting import LeastSquares, Loss
 
 
 @dataclasses.dataclass(frozen=True)
@@ -127,10 +127,11 @@ def compute_statistics(problem: FitProblem, solution: LeastSquaresSolution, loss
     sigma, influences = _residual_std(residuals, design.norms.size, loss)
     complete = _Design.of(problem, solution, np.ones(on_bound.size, dtype=bool)) if on_bound.any() else design
     counted = design if complete.is_deficient else complete
-    weighted = problem.weights[active, None] * solution.jacobian[np.ix_(active, counted.columns)]
-    covariance = estimate_covariance(counted.basis, weighted, influences, sigma, runs.rows(active), counted.columns)
+    covariance = estimate_covariance(
+        counted.basis, counted.matrix, influences, sigma, runs.rows(active), counted.columns
+    )
     if counted is not design:
-        covariance = covariance.within_bounds(low, high, -weighted.T @ influences)
+        covariance = covariance.within_bounds(low, high, -counted.matrix.T @ influences)
     standard_errors, correlations = covariance.of_parameters()
     standard_errors[on_bound], correlations[on_bound], correlations[:, on_bound] = np.nan, np.nan, np.nan
     singular = design.singular_values
@@ -150,17 +151,19 @@ def check_determined_by_levels(problem: FitProblem, solution: LeastSquaresSoluti
 
     `at_levels` are the data of the problem with the constant quantity of each run at its level.
     """
-    if all(np.array_equal(at_levels[name], problem.data[name]) for name in problem.fitted_quantity.arguments):
+    data, arguments = problem.data, problem.fitted_quantity.arguments
+    if at_levels is data or all(np.array_equal(at_levels[name], data[name]) for name in arguments):
         return
     levelled = dataclasses.replace(problem, data=at_levels)
     check_determined(levelled, solution._replace(jacobian=levelled.jacobian(solution.values)))
 
 
 class _Design(NamedTuple):
-    """Columns of the design matrix of the active rows, a mask (P,): their norms, and the singular values and right
-    singular vectors of the columns scaled to unit norm."""
+    """Columns of the weighted design matrix of the active rows, a mask (P,): their norms, and the singular values and
+    right singular vectors of the columns scaled to unit norm."""
 
     columns: Mask
+    matrix: Array
     norms: Array
     singular_values: Array
     right_singular_vectors: Array
@@ -169,9 +172,11 @@ class _Design(NamedTuple):
     def of(cls, problem: FitProblem, solution: LeastSquaresSolution, columns: Mask) -> "_Design":
         """The singular values at a solution."""
         active = problem.active_rows(solution.modelled)
-        matrix = problem.weights[active, None] * solution.jacobian[np.ix_(active, columns)]
+        whole = bool(active.all() and columns.all())
+        selected = solution.jacobian if whole else solution.jacobian[np.ix_(active, columns)]
+        matrix = problem.weights[active, None] * np.ascontiguousarray(selected)
         norms = np.linalg.norm(matrix, axis=0)
-        return cls(columns, norms, *singular_vectors(matrix / np.where(norms > 0, norms, 1.0)))
+        return cls(columns, matrix, norms, *singular_vectors(matrix / np.where(norms > 0, norms, 1.0)))
 
     @property
     def null(self) -> Mask:
@@ -212,9 +217,11 @@ def _residual_std(residuals: Array, parameters: int, loss: Loss) -> tuple[float,
     For least squares these are sqrt(SSE/(N - P)) and the residuals; for a loss with influence function psi(e) = e rho'
     sigma is sqrt(Sum psi^2/(N - P))/mean(psi'). Reference: Huber, Robust Statistics (1981), section 7.6.
     """
-    z = (residuals / loss.scale) ** 2
-    _, first, second = loss.rho(z)
-    influences = residuals * first / (np.mean(first + 2 * z * second) if residuals.size else 1.0)
+    influences = residuals
+    if residuals.size and not isinstance(loss, LeastSquares):
+        z = (residuals / loss.scale) ** 2
+        _, first, second = loss.rho(z)
+        influences = residuals * first / np.mean(first + 2 * z * second)
     degrees_of_freedom = residuals.size - parameters
     if degrees_of_freedom <= 0:
         return float("nan"), influences

@@ -1,6 +1,7 @@
 """Contractile surface of Hill's muscle model: polynomial of total degree n in contraction and pressure."""
 
 import dataclasses
+import functools
 from collections.abc import Callable
 from typing import ClassVar
 
@@ -12,6 +13,7 @@ from .validity_range import DataScales, MeasuredPoints, ValidityRange
 HOSOVSKY_HILL = published("hosovsky-hill")
 
 
+@functools.cache
 def exponents(degree: int) -> tuple[tuple[int, int], ...]:
     """Return the powers (i, j) of contraction and pressure with i + j <= degree, in the order of the coefficients."""
     return tuple((i, j) for j in range(degree + 1) for i in range(degree + 1 - j))
@@ -119,7 +121,7 @@ class ContractileSurface(ForceLaw):
     @property
     def term_labels(self) -> tuple[str, ...]:
         """Labels of the basis functions for tables and messages, such as `x^2 q`."""
-        return tuple(f"{_power_label('x', i)} {_power_label('q', j)}".strip() or "1" for i, j in exponents(self.degree))
+        return _term_labels(self.degree)
 
     def polynomial(self, pressure: Value, contraction: Value) -> Value:
         """Force [N] before the limits are applied, extrapolated linearly outside the validity range."""
@@ -171,6 +173,11 @@ class ContractileSurface(ForceLaw):
                 for n, by_q in enumerate(powers_q[j]):
                     monomial[m, n] += a * by_x * by_q
         return monomial
+
+
+@functools.cache
+def _term_labels(degree: int) -> tuple[str, ...]:
+    return tuple(f"{_power_label('x', i)} {_power_label('q', j)}".strip() or "1" for i, j in exponents(degree))
 
 
 def _power_label(symbol: str, exponent: int) -> str:
