@@ -65,9 +65,10 @@ class FitPoints:
     @functools.cached_property
     def runs(self) -> Runs:
         """The run and the specimen of each complete row."""
-        lengths = [len(run) for run in self.recordings]
-        specimens = np.unique([specimen_name(run) for run in self.recordings], return_inverse=True)[1]
-        index, specimen = (np.repeat(each, lengths)[~self.missing] for each in (np.arange(len(lengths)), specimens))
+        lengths, names = [len(run) for run in self.recordings], [specimen_name(run) for run in self.recordings]
+        position = {name: i for i, name in enumerate(sorted(set(names)))}
+        numbers = np.arange(len(lengths)), np.array([position[name] for name in names], dtype=np.intp)
+        index, specimen = (np.repeat(each, lengths)[~self.missing] for each in numbers)
         return Runs(index, specimen, all("time" in run for run in self.recordings))
 
     def prepare(self) -> None:

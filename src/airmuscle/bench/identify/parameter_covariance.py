@@ -263,10 +263,11 @@ def _group(
 
 def _split(rows: Array, group: Indices) -> list[Array]:
     """The rows of each group, in their order."""
-    if (np.diff(group) < 0).any():
+    steps = np.diff(group)
+    if (steps < 0).any():
         order = np.argsort(group, kind="stable")
-        rows, group = rows[order], group[order]
-    return np.split(rows, np.flatnonzero(np.diff(group)) + 1)
+        rows, steps = rows[order], np.diff(group[order])
+    return np.split(rows, np.flatnonzero(steps) + 1)
 
 
 def _degrees_of_freedom(groups: Groups, rows: Array) -> Array:

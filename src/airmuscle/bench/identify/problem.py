@@ -63,12 +63,12 @@ def evaluate(law: Any, method: str, arguments: tuple[str, str], data: Recording)
     return values
 
 
-def _laws_by_rows(law: Any, data: Recording) -> list[tuple[Any, npt.NDArray[np.intp]]]:
+def _laws_by_rows(law: Any, data: Recording) -> list[tuple[Any, slice | npt.NDArray[np.intp]]]:
     """The law of each specimen, or of each resting length, with the indices of its rows."""
     if isinstance(law, PooledLengthLaw) and SPECIMEN in data.columns:
         member = data[SPECIMEN].astype(int)
         return [(law.for_specimen(law.specimens[i]), np.flatnonzero(member == i)) for i in np.unique(member).tolist()]
-    return [(of_length(law, length), rows) for length, rows in rows_by_length(law, data)]
+    return [(of_length(law, length), as_slice(rows)) for length, rows in rows_by_length(law, data)]
 
 
 def fitted_quantity_of(law: Characteristic) -> FittedQuantity:
@@ -224,8 +224,8 @@ def make_problem(
         signs = -signs  # a smaller force at the same pressure means that the stated force needs a higher pressure
     leaves = tuple(tree.leaves(law))
     _check_known(law, leaves, fixed)
-    known = [{leaf.path, leaf.path.partition("[")[0]} & set(fixed) for leaf in leaves]
-    free = tuple(i for i, leaf in enumerate(leaves) if leaf.declared.fitted and not known[i])
+    kept = {leaf.path for leaf in leaves if fixed and {leaf.path, leaf.path.partition("[")[0]} & set(fixed)}
+    free = tuple(i for i, leaf in enumerate(leaves) if leaf.declared.fitted and leaf.path not in kept)
     measured = int(np.count_nonzero(signs == 0))
     _check_row_count(law, data, len(free), measured)
     return FitProblem(law, quantity, data, target, signs, weights, leaves, free)

@@ -174,7 +174,7 @@ class _Design(NamedTuple):
         active = problem.active_rows(solution.modelled)
         whole = bool(active.all() and columns.all())
         selected = solution.jacobian if whole else solution.jacobian[np.ix_(active, columns)]
-        matrix = problem.weights[active, None] * np.ascontiguousarray(selected)
+        matrix = np.multiply(problem.weights[active, None], selected, order="C")
         norms = np.linalg.norm(matrix, axis=0)
         return cls(columns, matrix, norms, *singular_vectors(matrix / np.where(norms > 0, norms, 1.0)))
 

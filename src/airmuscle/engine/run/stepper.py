@@ -107,7 +107,7 @@ class Stepper:
         Raises ParameterError for a number of inputs, an input or a time step that is impossible, SimulationError where
         the step fails or leads to an impossible state. The state is then that before the step.
         """
-        if not isinstance(dt, numbers.Real) or not 0.0 < dt <= LARGEST:
+        if not isinstance(dt, (float, numbers.Real)) or not 0.0 < dt <= LARGEST:
             raise ParameterError(f"Stepper: dt is {one_line(dt)} s; it must be positive and finite.")
         if hasattr(inputs, "keys"):
             inputs = self._by_name(inputs)

@@ -81,14 +81,15 @@ class PlantEnv(gymnasium.Env):  # type: ignore[misc, unused-ignore]
         The terms are `closeness`, exp(-sum e^2), and `effort`, which is subtracted from it.
         """
         values = action.tolist() if isinstance(action, np.ndarray) else action
-        inputs, self._elapsed = self._inputs, self._elapsed + 1
+        inputs, squares, self._elapsed = self._inputs, 0.0, self._elapsed + 1
         try:
             if len(values) != self._actions:
                 raise TypeError
             for i, value in enumerate(values):
                 if not math.isfinite(value):
                     raise TypeError
-                inputs[i] = min(max(value, -1.0), 1.0)
+                inputs[i] = value = min(max(value, -1.0), 1.0)
+                squares += value * value
         except TypeError:
             raise ParameterError(f"the action is {action}; give {self._actions} finite numbers from -1 to 1.") from None
         inputs[-1] = self._elapsed * self.task.period
@@ -97,7 +98,7 @@ class PlantEnv(gymnasium.Env):  # type: ignore[misc, unused-ignore]
         except SimulationError:
             return np.zeros(self._count, np.float32), 0.0, True, False, {"closeness": 0.0, "effort": 0.0}
         reward, terminated = float(outputs[-2]), bool(outputs[-1] > 0.5)
-        effort = self.task.effort_weight * sum(u * u for u in inputs[:-1]) / self._actions
+        effort = self.task.effort_weight * squares / self._actions
         terms = {"closeness": reward + effort, "effort": effort}
         if self.render_mode == "human":
             self.render()
