@@ -175,12 +175,14 @@ def test_bristles_carry_the_name_of_their_muscle():
     run = simulate(plant, command, duration=1.0, initial_state=start)
     assert np.abs(run["left.friction"]).max() > 1.0
     assert np.sign(run["left.friction"][10]) == -np.sign(run["right.friction"][10])
-    assert any(note.startswith("friction: left MaxwellSlip(") and "right Dahl(" in note for note in run.notes)
+    assert any(
+        note.startswith("friction of the muscles: left MaxwellSlip(") and "right Dahl(" in note for note in run.notes
+    )
 
 
 def test_a_run_says_which_friction_was_on():
-    assert "friction: Dahl(stiffness=50000, coulomb_force=20)" in loops_of(Dahl(5e4, 20.0), 0.1).notes
-    assert "friction: off" in loops_of(NoFriction(), 0.1).notes
+    assert "friction of the muscles: Dahl(stiffness=50000, coulomb_force=20)" in loops_of(Dahl(5e4, 20.0), 0.1).notes
+    assert "friction of the muscles: off" in loops_of(NoFriction(), 0.1).notes
 
 
 def test_a_state_may_begin_with_bent_bristles_and_refuses_unknown_ones():

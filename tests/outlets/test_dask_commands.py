@@ -78,6 +78,14 @@ def test_a_command_on_a_cluster_gives_what_one_process_gives(folder: Path, clust
     ]
 
 
+@pytest.mark.parametrize("name", COMMANDS)
+def test_no_command_computes_without_the_cluster_that_it_was_given(folder: Path, name: str):
+    pytest.importorskip("distributed")
+    result = airmuscle(*COMMANDS[name], "--out", folder / "there", "--dask", "nowhere://host")
+    assert result.exit_code == 1, result.stdout
+    assert "no response from a Dask scheduler at 'nowhere://host'" in result.stderr
+
+
 def test_a_worker_of_dask_solves_a_problem_that_was_sent_to_it(folder: Path, cluster: str):
     problem = load_scenario(folder / "scenario.toml").problem
     with dask_cluster(cluster) as executor:

@@ -40,7 +40,7 @@ def friction(muscles: Sequence[Muscle]) -> Diagnostic:
             f"{m.name} {'none' if isinstance(m.friction, NoFriction) else describe_model(m.friction)}" for m in muscles
         ]
         text = ", ".join(parts)
-    return Diagnostic(DiagnosticCode.MODEL, "friction", f"friction: {text}")
+    return Diagnostic(DiagnosticCode.MODEL, "friction", f"friction of the muscles: {text}")
 
 
 def column_limits(muscles: Sequence[Muscle], prefixes: Sequence[str]) -> tuple[ColumnLimit, ...]:
