@@ -58,14 +58,12 @@ class Variations:
     def check_consistent(self) -> None:
         """Raise ParameterError, naming the row, where parameters of a model do not go together."""
         for _, part in parts_of(self.as_columns()) if self.paths else ():
-            values = [leaf.value for leaf in tree.leaves(part)]
-            if not any(isinstance(value, np.ndarray) for value in values):
-                continue
             try:
                 check_together(part)
             except (TypeError, ValueError, AirmuscleError):  # rows differ, or one of them is impossible: row by row
+                values = [leaf.value for leaf in tree.leaves(part)]
                 columns = [v.tolist() if isinstance(v, np.ndarray) else itertools.repeat(v) for v in values]
-                for row, numbers in enumerate(zip(*columns, strict=False)):
+                for row, *numbers in zip(range(len(self.values)), *columns, strict=False):
                     try:
                         check_together(tree.unflatten(part, numbers))
                     except ParameterError as error:
