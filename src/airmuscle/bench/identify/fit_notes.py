@@ -6,6 +6,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from ...core import Array, Hint, HintedText
+from ...recording.columns import displayed
 from ..segment.runs import RIPPLE_BAND
 from .branch_residuals import branch_distance, branch_notes
 from .data_checks import HELD, Remarks, Scatter
@@ -55,8 +56,8 @@ class Examination:
 
 
 def level_text(name: str, value: float) -> str:
-    """A pressure [Pa] or a contraction [1] as text with its usual unit."""
-    return f"{value / 1e3:.3g} kPa" if name == "pressure" else f"{100 * (0.0 if abs(value) < 5e-5 else value):.3g} %"
+    """The level [SI] of a quantity as text in its unit of display; a contraction near 0 is 0."""
+    return displayed(name, 0.0 if name == "contraction" and abs(value) < 5e-5 else value, 3)
 
 
 def _level_notes(ranges: Mapping[str, tuple[float, float]]) -> list[str]:

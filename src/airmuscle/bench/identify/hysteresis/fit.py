@@ -134,15 +134,20 @@ def fit_hysteresis(
     Raises IdentificationError where there are too few rows or the path is constant.
     """
     run = make_loop_series(recording, static_curve, friction_path, fitted_rows)
+    second_run = make_loop_series(repeat[0], static_curve, friction_path, repeat[1]) if repeat else None
+    return fit_series(friction, run, second_run)
+
+
+def fit_series(friction: Friction, run: LoopSeries, second_run: LoopSeries | None) -> HysteresisFit:
+    """The fit of `fit_hysteresis` to the series of a run, and of a second run of the same loop."""
     free = free_parameters(friction)
     if run.fitted_rows.sum() <= free + run.design_matrix.shape[1] + 2 or not np.ptp(run.path) > 0:
         raise IdentificationError(
-            f"{recording.origin}: {int(run.fitted_rows.sum())} fitted rows along a path of {np.ptp(run.path):.3g} m "
+            f"{run.origin}: {int(run.fitted_rows.sum())} fitted rows along a path of {np.ptp(run.path):.3g} m "
             f"cannot determine {free} parameters of {type(friction).__name__} and {run.design_matrix.shape[1]} of "
             "the static curve. Give a run with a rising and a falling branch, or include more rows."
         )
     fitted, undetermined = search_parameters(friction, (run,))
-    second_run = make_loop_series(repeat[0], static_curve, friction_path, repeat[1]) if repeat else None
     return assess_fit(fitted, undetermined, run, second_run)
 
 

@@ -12,7 +12,6 @@ from ....engine.processes import Workers, process_pool
 from ....physics.muscle.friction import Friction, IdentifiedFriction, PressureScaledFriction
 from ...segment.runs import RELATIVE_BAND
 from ..identifiability import UndeterminedCombination
-from .fit import make_loop_series
 from .joint_result import JointFit, agreement_of_run, force_amplitude, preferred_fit
 from .limits import combine_limits
 from .loops import LoopFit
@@ -125,11 +124,7 @@ def _assess(
     usable: Sequence[LoopFit],
 ) -> JointFit:  # fmt: skip
     runs = [fit.series for fit in own]
-    repeats = [
-        make_loop_series(each.loop.repeat[0], each.loop.static_curve, each.loop.friction_path, each.loop.repeat[1])
-        for each in usable
-        if each.loop.repeat is not None
-    ]
+    repeats = [each.loop.series(*each.loop.repeat) for each in usable if each.loop.repeat is not None]
     return JointFit(
         **evidence(friction, runs, repeats),
         weak_combinations=weak,

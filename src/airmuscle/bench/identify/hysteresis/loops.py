@@ -11,10 +11,12 @@ from ....physics.muscle.characteristic.base import Characteristic
 from ....recording import Recording
 from ... import segment
 from ...segment.runs import CONTRACTION_BAND, RELATIVE_BAND
+from ..fit_notes import level_text
 from . import fit as loop_fit
 from .joint_result import preferred_fit
 from .limits import speed_reservation
 from .result import HysteresisFit
+from .search import LoopSeries
 
 CURVE_DEGREE = 5
 """Degree of the polynomial static curve of a loop, in `hysteresis` as in `campaign` (chosen)."""
@@ -37,11 +39,18 @@ class HysteresisLoop(ShortRepr):
     @property
     def description(self) -> str:
         """Kind and level of the run, for example `isobaric at 300 kPa`."""
-        if self.run.constant_column is None or self.run.constant_value is None:
-            return self.run.kind.name
-        levels = {"pressure": f"{self.run.constant_value / 1e3:.4g} kPa", "force": f"{self.run.constant_value:.4g} N",
-                  "contraction": f"{100 * (round(self.run.constant_value, 4) + 0.0):.2f} %"}  # fmt: skip
-        return f"{self.run.kind.name} at {levels.get(self.run.constant_column, f'{self.run.constant_value:.4g} m')}"
+        return describe_run(self.run)
+
+    def series(self, recording: Recording, fitted_rows: loop_fit.RowMask) -> LoopSeries:
+        """The arrays of a run of this loop for a fit of friction."""
+        return loop_fit.make_loop_series(recording, self.static_curve, self.friction_path, fitted_rows)
+
+
+def describe_run(run: segment.Run) -> str:
+    """Kind and level of a run, for example `isobaric at 300 kPa`."""
+    if run.constant_column is None or run.constant_value is None:
+        return run.kind.name
+    return f"{run.kind.name} at {level_text(run.constant_column, run.constant_value)}"
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -103,11 +112,9 @@ def find_loops(
 
 def _is_repeat(first: HysteresisLoop, other: HysteresisLoop) -> bool:
     """Whether a loop is of the same muscle as the first, and of the same kind and level."""
-    constants = [
-        (loop.recording.constants.get("resting_length"), loop.recording.constants.get("specimen"))
-        for loop in (first, other)
-    ]
-    return constants[0] == constants[1] and _is_same_level(first.run, other.run)
+    one, two = first.recording.constants, other.recording.constants
+    same_muscle = all(one.get(name) == two.get(name) for name in ("resting_length", "specimen"))
+    return same_muscle and _is_same_level(first.run, other.run)
 
 
 def _separate_runs(recording: Recording, sensors: Mapping[str, segment.Sensor]) -> list[tuple[Recording, segment.Run]]:
@@ -153,19 +160,13 @@ def _make_loop(
             "static curve cannot be a polynomial in one of them.",
             hint=Hint("To take the muscle's characteristic as the static curve", "law"),
         )
-    rows = _select_rows(recording, sensors, all_rows)
-    direction = _directions(recording, friction_path)
-    _check_two_directions(recording, direction, rows)
-    transient = (
-        0 if run.kind == segment.ISOBARIC else int(np.count_nonzero(rows & ~_has_steady_pressure(recording, sensors)))
-    )
+    rows, transient = _select_rows(recording, sensors, all_rows), 0
+    _check_two_directions(recording, _directions(recording, friction_path), rows)
+    if run.kind != segment.ISOBARIC:  # rows in which the pressure changes quickly, whatever the length does
+        columns = {name: recording[name] for name in ("time", "pressure") if name in recording}
+        steady = segment.quasi_static_rows(dataclasses.replace(recording, columns=columns), sensors)
+        transient = int(np.count_nonzero(rows & ~steady))
     return HysteresisLoop(recording, run, friction_path, static_curve, rows, transient)
-
-
-def _has_steady_pressure(recording: Recording, sensors: Mapping[str, segment.Sensor]) -> loop_fit.RowMask:
-    """Mask of the rows in which the pressure changes slowly, whatever the length does."""
-    columns = {name: recording[name] for name in ("time", "pressure") if name in recording}
-    return segment.quasi_static_rows(dataclasses.replace(recording, columns=columns), sensors)
 
 
 def _select_rows(recording: Recording, sensors: Mapping[str, segment.Sensor], all_rows: bool) -> loop_fit.RowMask:
@@ -178,28 +179,20 @@ def _select_rows(recording: Recording, sensors: Mapping[str, segment.Sensor], al
 
 def _check_two_directions(recording: Recording, direction: np.ndarray, fitted_rows: loop_fit.RowMask) -> None:
     for sign, branch in ((1, "rising"), (-1, "falling")):
-        rows, fitted = np.count_nonzero(direction == sign), np.count_nonzero((direction == sign) & fitted_rows)
-        if not fitted:
-            detail = (
-                f" ({rows} rows of it are excluded, because they are not quasi-static, have no force, or are saturated)"
-                if rows
-                else ""
-            )
+        rows = np.count_nonzero(direction == sign)
+        if not np.any((direction == sign) & fitted_rows):
+            excluded = f" ({rows} are excluded: not quasi-static, without force, or saturated)" if rows else ""
             raise IdentificationError(
-                f"{recording.origin}: the {branch} branch has no rows to fit{detail}, but a loop needs a rising and a "
-                "falling branch. Give such a run, or run it more slowly where its rows are not quasi-static.",
+                f"{recording.origin}: the {branch} branch has no rows to fit{excluded}, but a loop needs a rising and "
+                "a falling branch. Give such a run, or run it more slowly where its rows are not quasi-static.",
                 hint=Hint("To fit all rows, if only the length changes quickly", "all_rows", True),
             )
 
 
 def _is_same_level(one: segment.Run, other: segment.Run) -> bool:
     """Whether two runs have the same constant quantity and level, within the tolerance of one run."""
-    if (
-        one.kind is not other.kind
-        or one.constant_column != other.constant_column
-        or one.constant_value is None
-        or other.constant_value is None
-    ):
+    same_kind = one.kind is other.kind and one.constant_column == other.constant_column
+    if not same_kind or one.constant_value is None or other.constant_value is None:
         return False
     size = max(abs(one.constant_value), abs(other.constant_value))
     bands = {"contraction": CONTRACTION_BAND, "length": CONTRACTION_BAND * size}
@@ -215,30 +208,19 @@ def fit_loop(loop: HysteresisLoop, *, elements: int = 8, progress: Callable[[str
     `elements` is the number of elements of MaxwellSlip and PrandtlIshlinskii; `progress` is called with the name of
     each law.
     """
-    series = loop_fit.make_loop_series(loop.recording, loop.static_curve, loop.friction_path, loop.fitted_rows)
+    run = dataclasses.replace(loop.series(loop.recording, loop.fitted_rows), transient_rows=loop.transient_rows)
+    second_run = None if loop.repeat is None else loop.series(*loop.repeat)
     fits, failed = list[HysteresisFit](), dict[str, HintedText]()
-    for initial in loop_fit.initial_friction_laws(
-        series.path[loop.fitted_rows], series.fitted_residuals(None), elements
-    ):
+    for initial in loop_fit.initial_friction_laws(run.path[loop.fitted_rows], run.fitted_residuals(None), elements):
         name = type(initial).__name__
-        too_uniform = "" if initial.rate_independent else speed_reservation(series.limits, series.axis)
+        too_uniform = "" if initial.rate_independent else speed_reservation(run.limits, run.axis)
         if too_uniform:
             failed[name] = HintedText(too_uniform)
             continue
         if progress is not None:
             progress(name)
         try:
-            fit = loop_fit.fit_hysteresis(
-                initial,
-                loop.recording,
-                static_curve=loop.static_curve,
-                friction_path=loop.friction_path,
-                fitted_rows=loop.fitted_rows,
-                repeat=loop.repeat,
-            )
+            fits.append(loop_fit.fit_series(initial, run, second_run))
         except IdentificationError as error:
             failed[name] = error.message
-        else:
-            marked = dataclasses.replace(fit.series, transient_rows=loop.transient_rows)
-            fits.append(dataclasses.replace(fit, series=marked))
     return LoopFit(loop, tuple(sorted(fits, key=lambda fit: -fit.aicc_reduction)), failed)

@@ -282,19 +282,19 @@ def assess_fit(
     friction: Friction, weak: tuple[UndeterminedCombination, ...], run: LoopSeries, repeat: LoopSeries | None
 ) -> HysteresisFit:
     """The statistics of a fitted friction with its poorly determined combinations, compared with the static curve."""
-    coefficients, static, rows = run.coefficients(friction), run.coefficients(None), run.fitted_rows
-    residuals, plain = run.residuals(friction, coefficients)[rows], run.residuals(None, static)[rows]
-    path, direction, repeatability = run.path[rows], run.direction[rows], float("nan")
+    (coefficients, residuals), (static, plain) = (run.fitted_curve(each) for each in (friction, None))
+    repeatability, first = float("nan"), [each[run.fitted_rows] for each in (run.path, plain, run.direction)]
     if repeat is not None:
-        values = repeat.residuals(None, static)[repeat.fitted_rows]
-        second_run = (repeat.path[repeat.fitted_rows], values, repeat.direction[repeat.fitted_rows])
-        repeatability = repeat_difference(path, plain, direction, *second_run).rms / np.sqrt(2)
+        values = repeat.target - repeat.design_matrix @ static
+        second = [each[repeat.fitted_rows] for each in (repeat.path, values, repeat.direction)]
+        repeatability = repeat_difference(*first, *second).rms / np.sqrt(2)
+    path, _, direction = first
     return HysteresisFit(
         **evidence(friction, (run,), () if repeat is None else (repeat,)),
         weak_combinations=weak,
         coefficients=coefficients,
-        gap=branch_gap(path, plain, direction).rms,
-        residual_gap=branch_gap(path, residuals, direction).rms,
+        gap=branch_gap(*first).rms,
+        residual_gap=branch_gap(path, residuals[run.fitted_rows], direction).rms,
         repeatability=repeatability,
         series=run,
     )

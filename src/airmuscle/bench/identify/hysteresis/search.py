@@ -103,40 +103,26 @@ class LoopSeries:
     transient_rows: int = 0
     """Number of fitted rows in which the pressure changes quickly."""
 
-    def coefficients(self, friction: Friction | None) -> Array:
-        """Least-squares coefficients of the static curve with this friction, or without friction; shape (C,)."""
-        return self._coefficients(self._friction_force(friction))
-
-    def residuals(self, friction: Friction | None, coefficients: Array) -> Array:
-        """Measured - modelled force [N] at every row, shape (N,)."""
-        return self._residuals(self._friction_force(friction), coefficients)
+    def fitted_curve(self, friction: Friction | None) -> tuple[Array, Array]:
+        """Least-squares coefficients (C,) of the static curve with this friction, or without friction; and the
+        residuals, measured - modelled force [N], at every row, shape (N,)."""
+        force = 0.0 if friction is None else self.friction_force(friction)
+        coefficients = self._pseudoinverse @ (self.target + force)[self.fitted_rows]
+        return coefficients, self.target - self.design_matrix @ coefficients + force
 
     def fitted_residuals(self, friction: Friction | None) -> Array:
         """Residuals [N] at the fitted rows, with the least-squares coefficients of the static curve."""
-        force = self._friction_force(friction)
-        return self._residuals(force, self._coefficients(force))[self.fitted_rows]
+        return self.fitted_curve(friction)[1][self.fitted_rows]
 
     def friction_force(self, friction: Friction) -> Array:
         """Friction force [N] at every row and its pressure, shape (N,)."""
         force = np.asarray(friction.force_along(self.path, self.time))
         return force if self.pressure is None else np.asarray(friction.pressure_factor(self.pressure) * force)
 
-    def _friction_force(self, friction: Friction | None) -> Array | None:
-        return None if friction is None else self.friction_force(friction)
-
-    def _coefficients(self, friction_force: Array | None) -> Array:
-        rows = self.fitted_rows
-        target = self.target if friction_force is None else self.target + friction_force
-        return np.asarray(self._pseudoinverse @ target[rows])
-
     @functools.cached_property
     def _pseudoinverse(self) -> Array:
         """Pseudoinverse of the design matrix at the fitted rows, shape (C, fitted rows)."""
         return np.asarray(np.linalg.pinv(self.design_matrix[self.fitted_rows]))
-
-    def _residuals(self, friction_force: Array | None, coefficients: Array) -> Array:
-        difference = self.target - self.design_matrix @ coefficients
-        return difference if friction_force is None else difference + friction_force
 
 
 JACOBIAN_TOLERANCE = 1e-4
@@ -173,21 +159,22 @@ def _fit_stiffnesses(
     from scipy.linalg import block_diag
     from scipy.optimize import lsq_linear
 
-    blocks = []
-    for run, factor in zip(runs, factors or [1.0] * len(runs), strict=True):
-        elements = friction.element_deflections(run.path) * np.reshape(factor, (-1, 1))
-        blocks.append(elements[run.fitted_rows])
-    terms = np.vstack(blocks)
+    terms = np.vstack(
+        [
+            (friction.element_deflections(run.path) * np.reshape(factor, (-1, 1)))[run.fitted_rows]
+            for run, factor in zip(runs, factors or [1.0] * len(runs), strict=True)
+        ]
+    )
     norms = np.linalg.norm(terms, axis=0)
     norms = np.where(norms > 0, norms, 1.0)
     curves = block_diag(*(run.design_matrix[run.fitted_rows] for run in runs))
     matrix = np.hstack([curves, -terms / norms])
     declared = next(leaf.declared for leaf in tree.leaves(friction) if leaf.path.startswith(friction.linear_in))
     greatest = np.clip(max(run.limits.force for run in runs) / np.asarray(friction.limits), 1e-9, declared.bounds[1])
-    lower = np.concatenate([np.full(curves.shape[1], -np.inf), np.zeros(terms.shape[1])])
-    upper = np.concatenate([np.full(curves.shape[1], np.inf), greatest * norms])
+    free = np.full(curves.shape[1], np.inf)
     target = np.concatenate([run.target[run.fitted_rows] for run in runs])
-    result = lsq_linear(matrix, target, (lower, upper), method="bvls")
+    bounds = np.append(-free, np.zeros(terms.shape[1])), np.append(free, greatest * norms)
+    result = lsq_linear(matrix, target, bounds, method="bvls")
     stiffnesses = np.clip(result.x[curves.shape[1] :] / norms, 0.0, greatest)
     fitted: Friction = dataclasses.replace(friction, **{friction.linear_in: tuple(stiffnesses)})
     return fitted
@@ -243,15 +230,10 @@ def _fit_iteratively(
     names = [all_leaves[i].path for i in free]
     if any("[" in name for name in names):
         return fitted, ()
-    return fitted, _undetermined(result.jac, result.fun, names)
-
-
-def _undetermined(jacobian: Array, residuals: Array, names: Sequence[str]) -> tuple[UndeterminedCombination, ...]:
-    """Combinations of parameters with a large relative standard error; correlated residuals count as fewer rows."""
-    freedom = max(effective_sample_size(residuals) - len(names), 1.0)
-    spread = float(np.sqrt(np.sum(residuals**2) / freedom)) or 1e-12
-    scales = np.ones(len(names))
-    return analyse_identifiability(jacobian, names, scales, spread, JACOBIAN_TOLERANCE).undetermined
+    freedom = max(effective_sample_size(result.fun) - len(names), 1.0)  # correlated residuals count as fewer rows
+    spread = float(np.sqrt(np.sum(result.fun**2) / freedom)) or 1e-12
+    analysis = analyse_identifiability(result.jac, names, np.ones(len(names)), spread, JACOBIAN_TOLERANCE)
+    return fitted, analysis.undetermined
 
 
 @dataclasses.dataclass(frozen=True)
