@@ -41,6 +41,10 @@ def a_fill(ratio: float = 0.35, noise: float = 200.0) -> tuple[Plant, Experiment
     return plant, Experiment(record, FILL, InitialConditions.at_coordinates(plant, 0.0))
 
 
+PARAMETERS = np.full(2, np.nan)
+"""Margins of two parameters, which have none."""
+
+
 def an_estimate(name: str, value: float, stderr: float, on_bound: bool = False) -> Estimate:
     return Estimate(name, name, value, stderr, "1", "", on_bound)
 
@@ -48,9 +52,9 @@ def an_estimate(name: str, value: float, stderr: float, on_bound: bool = False) 
 def test_another_optimum_of_nearly_the_same_residual_is_named_with_its_values() -> None:
     estimates = [an_estimate("valve.critical_ratio", 0.5, 0.005), an_estimate("valve.conductance", 2.0, 0.01)]
     values, costs = np.array([[0.5, 2.0], [0.69, 2.01], [0.2, 9.0]]), np.array([1000.0, 1020.1, 5000.0])
-    optima = distinct_optima(values, costs, np.ones(2))
+    optima = distinct_optima(values, costs, np.ones(2), PARAMETERS)
     assert [each.searches for each in optima] == [1, 1, 1]
-    first, second = describe_optima(optima, estimates, costs)
+    first, second = describe_optima(optima, estimates, costs, PARAMETERS)
     assert "1 search of 3 ended where the rms residual is only 1.0 % greater" in first
     assert "valve.critical_ratio 0.69 instead of 0.5;" in first
     assert "conductance" not in first
@@ -59,18 +63,18 @@ def test_another_optimum_of_nearly_the_same_residual_is_named_with_its_values() 
 
 def test_searches_that_agree_are_one_optimum_and_need_no_remark() -> None:
     values, costs = np.array([[0.5, 2.0], [0.5005, 2.001], [0.5, 2.0]]), np.array([1000.0, 1000.2, 1000.3])
-    optima = distinct_optima(values, costs, np.ones(2))
+    optima = distinct_optima(values, costs, np.ones(2), PARAMETERS)
     assert [each.searches for each in optima] == [3]
     assert searches_at_lowest(costs) == 3
-    assert describe_optima(optima, [an_estimate("a", 0.5, 0.01), an_estimate("b", 2.0, 0.01)], costs) == []
+    assert describe_optima(optima, [an_estimate("a", 0.5, 0.01), an_estimate("b", 2.0, 0.01)], costs, PARAMETERS) == []
 
 
 def test_a_worse_optimum_and_one_within_the_standard_errors_are_no_alternative() -> None:
     costs = np.array([1000.0, 1000.1, 1003.0, 1300.0])
     values = np.array([[0.5], [0.5], [0.55], [0.9]])
-    optima = distinct_optima(values, costs, np.ones(1))
+    optima = distinct_optima(values, costs, np.ones(1), PARAMETERS[:1])
     assert len(optima) == 3
-    assert describe_optima(optima, [an_estimate("a", 0.5, 0.03)], costs) == []
+    assert describe_optima(optima, [an_estimate("a", 0.5, 0.03)], costs, PARAMETERS[:1]) == []
 
 
 def test_a_bound_moves_the_other_unknowns_by_the_gradient_of_the_constrained_optimum() -> None:
@@ -90,7 +94,7 @@ def test_a_bound_moves_the_other_unknowns_by_the_gradient_of_the_constrained_opt
         an_estimate("tube.volume", value, np.nan, True),
     ]
     inverse = np.linalg.inv(jacobian[:, :2].T @ jacobian[:, :2])
-    (note,) = describe_bounds(estimates, jacobian, inverse, np.array([False, False, True]), scales)
+    (note,) = describe_bounds(estimates, jacobian, inverse, np.array([False, False, True]), scales, np.zeros(3))
     for i in range(2):
         assert f"x{i} by {expected[i]:+.2g}" in note
     assert "tube.volume is on its bound, 1.2, and has no standard error" in note
@@ -125,11 +129,11 @@ def plant_with_ratio(plant: Plant, ratio: float) -> Plant:
 
 def test_a_fit_with_model_error_states_the_range_at_one_per_cent_of_rms() -> None:
     estimates = [an_estimate("valve.critical_ratio", 0.5, 0.01), an_estimate("valve.conductance", 2.0, 1e-4)]
-    (note,) = describe_flatness(estimates, 10_000)
+    (note,) = describe_flatness(estimates, 10_000, PARAMETERS)
     half = 0.01 * np.sqrt(0.0201 * 10_000)
     assert f"valve.critical_ratio {0.5 - half:.3g} to {0.5 + half:.3g}" in note
     assert "conductance" not in note
-    assert describe_flatness(estimates, 300) == []
+    assert describe_flatness(estimates, 300, PARAMETERS) == []
 
 
 @pytest.mark.parametrize("zero", [0.0, 1.7e9])

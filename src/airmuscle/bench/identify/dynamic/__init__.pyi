@@ -11,8 +11,8 @@ from .fit import describe_cross_predictions as describe_cross_predictions
 from .fit import fit_dynamic as fit_dynamic
 from .fit import fit_tube as fit_tube
 from .initial_conditions import InitialConditions as InitialConditions
+from .levenberg_marquardt import LevenbergMarquardt as LevenbergMarquardt
 from .levenberg_marquardt import bounded_step as bounded_step
-from .levenberg_marquardt import minimise as minimise
 from .problem import DynamicProfile as DynamicProfile
 from .record_model import commands_at as commands_at
 from .record_ranking import RecordRanking as RecordRanking

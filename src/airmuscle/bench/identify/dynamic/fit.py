@@ -84,7 +84,7 @@ def fit_dynamic(
         raise IdentificationError(
             "the plant cannot be simulated from any initial guess. Check the bounds and the initial conditions."
         )
-    return _build_result(problem, np.array([x for x, _ in outcomes]), np.array([c for _, c in outcomes]))
+    return _build_result(problem, *map(np.array, zip(*outcomes, strict=True)))
 
 
 def fit_tube(
@@ -130,7 +130,8 @@ def _solve_all(problem: DynamicFitProblem, guesses: Sequence[Array]) -> list[tup
         return [problem.solve(guesses[0])]
     pool = ThreadPoolExecutor(min(len(guesses), os.cpu_count() or 1))
     try:
-        searches = list(pool.map(lambda guess: problem.search(guess).run(SCREENING_RUNS), guesses))
+        every = list(range(len(problem.unknowns)))
+        searches = list(pool.map(lambda guess: problem.search(guess, every).run(SCREENING_RUNS), guesses))
         lowest = min(search.cost for search in searches)
         continued = [s for s in searches if not s.finished and s.cost <= SCREENING_RATIO * lowest]
         list(pool.map(lambda search: search.run(MAX_RUNS), continued))

@@ -33,14 +33,6 @@ still gives the direction, the sum no longer does. Such a step ends the search u
 than half of the last one."""
 
 
-class SearchState(NamedTuple):
-    """State of a search: unknowns (P,), sum of squares there, and whether the search has ended."""
-
-    x: Array
-    cost: float
-    finished: bool
-
-
 class _NormalEquations(NamedTuple):
     """Sum of squares, normal matrix (P, P) and half the gradient (P,)."""
 
@@ -60,7 +52,8 @@ def _normal_equations(evaluated: tuple[Array, Array] | None) -> _NormalEquations
 
 
 class LevenbergMarquardt:
-    """A search from one initial guess, which can be interrupted and continued.
+    """A search from one initial guess, which can be interrupted and continued: unknowns `x` (P,), sum of squares there,
+    `cost`, and whether it is `finished`.
 
     The sum of squares is infinite where the residuals cannot be computed at the initial guess.
     """
@@ -133,18 +126,6 @@ class LevenbergMarquardt:
             return True
         scaled_step, scaled_x = self._scale * step, self._scale * self.x
         return bool(scaled_step @ scaled_step <= TOLERANCE**2 * (scaled_x @ scaled_x))
-
-    @property
-    def state(self) -> SearchState:
-        """The present state of the search."""
-        return SearchState(self.x, self.cost, self.finished)
-
-
-def minimise(residuals: Residuals, start: Array, low: Array, high: Array, max_evaluations: int) -> SearchState:
-    """Minimise the sum of squares from `start` (P,) with at most `max_evaluations` evaluations of the residuals."""
-    search = LevenbergMarquardt(residuals, start, low, high)
-    search.run(max_evaluations)
-    return search.state
 
 
 def bounded_step(normal: Array, gradient: Array, damping: Array, x: Array, low: Array, high: Array) -> Array:

@@ -9,7 +9,7 @@ import numpy as np
 from ....core import AirmuscleError, Array
 from ..result import Estimate
 from .experiment import Unknown
-from .levenberg_marquardt import LevenbergMarquardt, minimise
+from .levenberg_marquardt import LevenbergMarquardt
 from .record_model import MAX_STEPS, RecordModel, stack_residuals
 
 MAX_RUNS = 200
@@ -70,25 +70,21 @@ class DynamicFitProblem:
         """
         return stack_residuals(self.record_models, self.values(scaled), self.sensor_deviations, self.scales, max_steps)
 
-    def solve(self, scaled: Array, fixed: Sequence[int] = (), max_runs: int = MAX_RUNS) -> tuple[Array, float]:
+    def solve(self, scaled: Array, fixed: Sequence[int] = ()) -> tuple[Array, float]:
         """Least squares from an initial guess (P,) with some unknowns fixed, given by index.
 
         Returns the scaled unknowns and the sum of squares, which is infinite where the initial guess cannot be
         simulated.
         """
         free, solution = [k for k in range(scaled.size) if k not in fixed], scaled.copy()
-        state = minimise(*self._restrict(scaled, free), max_runs)
-        solution[free] = state.x
-        return solution, state.cost
+        search = self.search(scaled, free).run(MAX_RUNS)
+        solution[free] = search.x
+        return solution, search.cost
 
-    def search(self, scaled: Array) -> LevenbergMarquardt:
-        """The search from an initial guess (P,), which can be interrupted and continued."""
-        return LevenbergMarquardt(*self._restrict(scaled, range(scaled.size)))
-
-    def _restrict(self, scaled: Array, free: Sequence[int]) -> "tuple[_GuardedResiduals, Array, Array, Array]":
-        """Residuals as a function of the free unknowns, their initial guess and their bounds."""
-        (low, high), indices = self.bounds, list(free)
-        return _GuardedResiduals(self, scaled, indices), scaled[indices], low[indices], high[indices]
+    def search(self, scaled: Array, free: Sequence[int]) -> LevenbergMarquardt:
+        """The search over the free unknowns from an initial guess (P,), which can be interrupted and continued."""
+        (low, high), residuals = self.bounds, _GuardedResiduals(self, scaled, free)
+        return LevenbergMarquardt(residuals, scaled[free], low[free], high[free])
 
 
 class _GuardedResiduals:

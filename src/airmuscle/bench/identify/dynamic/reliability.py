@@ -60,14 +60,13 @@ class Optimum:
     searches: int
 
 
-def distinct_optima(values: Array, costs: Array, scales: Array, margins: Array | None = None) -> tuple[Optimum, ...]:
+def distinct_optima(values: Array, costs: Array, scales: Array, margins: Array) -> tuple[Optimum, ...]:
     """The optima of searches that ended at `values` (S, P) with `costs` (S,), lowest first.
 
     Two searches ended at one optimum if their sums of squares and all unknowns, relative to their values or at least a
     thousandth of `scales` (P,), agree; start times and initial values relative to their `margins` (P,), which are NaN
     for parameters. Searches without a result are left out.
     """
-    margins = np.full(scales.size, np.nan) if margins is None else margins
     optima: list[Optimum] = []
     for point, cost in zip(values, costs, strict=True):
         if not np.isfinite(cost):
@@ -89,7 +88,7 @@ def searches_at_lowest(costs: Array) -> int:
 
 
 def describe_optima(
-    optima: Sequence[Optimum], estimates: Sequence[Estimate], costs: Array, margins: Array | None = None
+    optima: Sequence[Optimum], estimates: Sequence[Estimate], costs: Array, margins: Array
 ) -> list[str]:
     """Sentences on other optima that fit almost as well, or on an optimum that a single search reached.
 
@@ -115,10 +114,10 @@ def describe_optima(
     return notes
 
 
-def _magnitudes(estimates: Sequence[Estimate], margins: Array | None) -> Array:
+def _magnitudes(estimates: Sequence[Estimate], margins: Array) -> Array:
     """The magnitudes to which changes of the estimates are relative [SI], shape (P,): their values or margins."""
     values = np.array([max(abs(estimate.value), 1e-300) for estimate in estimates])
-    return values if margins is None else np.where(np.isnan(margins), values, margins)
+    return np.where(np.isnan(margins), values, margins)
 
 
 def _differences(other: Optimum, estimates: Sequence[Estimate], magnitudes: Array) -> list[str]:
@@ -127,49 +126,48 @@ def _differences(other: Optimum, estimates: Sequence[Estimate], magnitudes: Arra
     for estimate, value, magnitude in zip(estimates, other.values, magnitudes, strict=True):
         change = abs(value - estimate.value)
         contained = MIN_STANDARD_ERRORS * estimate.stderr if np.isfinite(estimate.stderr) else 0.0
-        relative = change / magnitude
-        if change > contained and relative > SAME_VALUE:
-            unit = f" {estimate.display_unit}" if estimate.display_unit else ""
-            differences.append((relative, f"{estimate.name} {value:.3g} instead of {estimate.value:.3g}{unit}"))
-    return [text for _, text in sorted(differences, reverse=True)[:MAX_NAMES]]
+        if change > contained and change / magnitude > SAME_VALUE:
+            text = f"{estimate.name} {value:.3g} instead of {estimate.value:.3g} {estimate.display_unit}".rstrip()
+            differences.append((change / magnitude, text))
+    return _greatest(differences)
 
 
-def describe_flatness(
-    estimates: Sequence[Estimate], degrees_of_freedom: int, margins: Array | None = None
-) -> list[str]:
+def _greatest(changes: list[tuple[float, str]]) -> list[str]:
+    """The texts of the greatest changes, the greatest first."""
+    return [text for _, text in sorted(changes, reverse=True)[:MAX_NAMES]]
+
+
+def describe_flatness(estimates: Sequence[Estimate], degrees_of_freedom: int, margins: Array) -> list[str]:
     """A sentence on the unknowns that change widely at an rms residual that is hardly greater, by the linearised fit.
 
     The sum of squares grows by one residual variance at a standard error, so the rms residual grows by the fraction r
     at sqrt((2 r + r^2) (N - P)) standard errors. `margins` are those of `distinct_optima`.
     """
     ratio = float(np.sqrt((2 * SMALL_RMS + SMALL_RMS**2) * degrees_of_freedom))
-    sizes = zip(estimates, _magnitudes(estimates, margins), strict=True)
-    wide = [(ratio * e.stderr / size, e) for e, size in sizes if np.isfinite(e.stderr)]
-    wide = [each for each in wide if each[0] > WIDE_RANGE and ratio > MIN_STANDARD_ERRORS]
-    if not wide:
-        return []
-    texts = [
-        f"{e.name} {e.value - ratio * e.stderr:.3g} to {e.value + ratio * e.stderr:.3g} {e.display_unit}".rstrip()
-        for _, e in sorted(wide, key=lambda item: -item[0])[:MAX_NAMES]
-    ]
-    return [
-        f"an rms residual that is {100 * SMALL_RMS:.0f} % greater allows {', '.join(texts)}; with model error, other "
-        "bounds or another start can give any value in such a range, whatever the standard error"
-    ]
+    wide = []
+    for e, size in zip(estimates, _magnitudes(estimates, margins), strict=True):
+        change = ratio * e.stderr
+        if change > WIDE_RANGE * size and ratio > MIN_STANDARD_ERRORS:
+            ends = f"{e.value - change:.3g} to {e.value + change:.3g} {e.display_unit}".rstrip()
+            wide.append((change / size, f"{e.name} {ends}"))
+    text = (
+        f"an rms residual that is {100 * SMALL_RMS:.0f} % greater allows {', '.join(_greatest(wide))}; with model "
+        "error, other bounds or another start can give any value in such a range, whatever the standard error"
+    )
+    return [text] if wide else []
 
 
 def describe_bounds(
     estimates: Sequence[Estimate], jacobian: Array, inverse: Array, on_bound: npt.NDArray[np.bool_], scales: Array,
-    origins: Array | None = None,
+    origins: Array,
 ) -> list[str]:  # fmt: skip
     """Sentences on every unknown on its bound: no standard error, the consequence, and the effect on the others.
 
     jacobian  of the residuals by the scaled unknowns, shape (R, P)
     inverse   (J^T J)^-1 of the unknowns that are not on a bound, in their order; NaN where undetermined
     scales    magnitudes of the unknowns [SI], shape (P,)
-    origins   values from which the unknowns are counted [SI], shape (P,); 0 by default
+    origins   values from which the unknowns are counted [SI], shape (P,)
     """
-    origins = np.zeros(on_bound.size) if origins is None else origins
     inner = np.flatnonzero(~on_bound)
     notes = []
     for k in map(int, np.flatnonzero(on_bound)):
@@ -192,11 +190,11 @@ def _moved(estimates: Sequence[Estimate], shifts: Array) -> list[str]:
     """The unknowns that a shift of a bound moves by more than a standard error, the largest relative change first."""
     described_shifts = []
     for estimate, shift in zip(estimates, shifts, strict=True):
-        if np.isfinite(shift) and np.isfinite(estimate.stderr) and abs(shift) > estimate.stderr:
-            unit = f" {estimate.display_unit}" if estimate.display_unit else ""
-            text = f"{estimate.name} by {shift:+.2g}{unit} ({abs(shift) / estimate.stderr:.2g} standard errors)"
+        if np.isfinite(shift) and abs(shift) > estimate.stderr:  # false for one without a standard error
+            by = f"{estimate.name} by {shift:+.2g} {estimate.display_unit}".rstrip()
+            text = f"{by} ({abs(shift) / estimate.stderr:.2g} standard errors)"
             described_shifts.append((abs(shift) / max(abs(estimate.value), 1e-300), text))
-    return [text for _, text in sorted(described_shifts, reverse=True)[:MAX_NAMES]]
+    return _greatest(described_shifts)
 
 
 def _consequence(name: str) -> str:

@@ -39,7 +39,7 @@ def _overview(loop_fits: Sequence[LoopFit]) -> Chapter:
         "run": [each.loop.recording.origin for each in loop_fits],
         "kind": [each.loop.description for each in loop_fits],
         "rows": [int(each.loop.fitted_rows.sum()) for each in loop_fits],
-        "law": [None if each is None else type(each.friction).__name__ for each in best],
+        "law": [each and each.name for each in best],
         "rms error without friction": TableColumn([each and each.rmse_without_friction for each in best], "N", digits=3,
                                              short="without friction"),
         "rms error": TableColumn([each and each.rmse for each in best], "N", digits=3),
@@ -70,8 +70,7 @@ def loop_chapter(loop_fit: LoopFit) -> Chapter:
     plots = [Plot("loop", "Measured loop; light: rows that are not used.", functools.partial(_figure, loop))]
     tables = [_law_table(loop_fit)]
     if shown is not None and of_shown is not None:
-        law = type(shown.friction).__name__
-        caption = f"{law} with the fitted parameters: initial loading, outer loop and two minor loops."
+        caption = f"{shown.name} with the fitted parameters: initial loading, outer loop and two minor loops."
         minor = functools.partial(plot_loops, shown.friction, loop.friction_path.axis)
         plots += [*of_shown.plots, Plot("minor-loops", caption, minor)]
         tables += [dataclasses.replace(table, name=f"friction-{table.name}", brief=0) for table in of_shown.tables]
@@ -81,7 +80,7 @@ def loop_chapter(loop_fit: LoopFit) -> Chapter:
         title=f"{loop.recording.origin}: {loop.description}",
         summary=tuple(_summary(loop_fit, shown)),
         values=(
-            NamedValue("recommended", best and type(best.friction).__name__, brief=False),
+            NamedValue("recommended", best and best.name, brief=False),
             NamedValue("usable in a plant", loop_fit.usable_in_plant, brief=False),
         ),
         tables=tuple(tables),
@@ -99,8 +98,7 @@ def _summary(loop_fit: LoopFit, shown: HysteresisFit | None) -> list[str]:
     if shown is None:
         return [rows]
     if loop_fit.recommended is None:
-        name = type(shown.friction).__name__
-        return [f"The data justify none of the laws; {name} is shown as the best one. {shown.verdict}", rows]
+        return [f"The data justify none of the laws; {shown.name} is shown as the best one. {shown.verdict}", rows]
     return [shown.verdict, rows]
 
 
@@ -119,11 +117,7 @@ def _notes(loop_fit: LoopFit) -> list[str]:
 
 def _law_table(loop_fit: LoopFit) -> Table:
     fits = loop_fit.fits
-    columns: dict[str, Any] = {
-        "law": [type(f.friction).__name__ for f in fits],
-        "rms error without friction": TableColumn([f.rmse_without_friction for f in fits], "N", digits=3, brief=False),
-        "rms error": TableColumn([f.rmse for f in fits], "N", digits=3),
-    }
+    columns: dict[str, Any] = {}
     if loop_fit.loop.repeat is not None:
         columns |= {
             "rms error on second run": TableColumn([f.repeat_rmse for f in fits], "N", digits=3, short="on second run"),
@@ -135,22 +129,28 @@ def _law_table(loop_fit: LoopFit) -> Table:
     columns |= {
         "branch gap without friction": TableColumn([f.gap for f in fits], "N", brief=False),
         "remaining branch gap": TableColumn([f.residual_gap for f in fits], "N", digits=3),
-        "reduction of AICc": _reductions(fits),
-        P_VALUE: TableColumn([f.p_value for f in fits], brief=False),
-        "justified": [f.justified for f in fits],
         "not determined": TableColumn([", ".join(f.undetermined) for f in fits], brief=False),
     }
-    return Table("laws", "Friction laws, best first", columns, brief=len(fits))
+    return _compared_laws("laws", "Friction laws, best first", fits, columns)
 
 
-def _reductions(fits: Sequence[FrictionFit]) -> list[float | None]:
-    """The reductions of AICc; None where it is not defined."""
-    return [fit.aicc_reduction if np.isfinite(fit.aicc_reduction) else None for fit in fits]
+def _compared_laws(name: str, title: str, fits: Sequence[FrictionFit], own: dict[str, Any]) -> Table:
+    """Return the errors and the tests of friction laws, with columns of their own."""
+    columns: dict[str, Any] = {
+        "law": [f.name for f in fits],
+        "rms error without friction": TableColumn([f.rmse_without_friction for f in fits], "N", digits=3, brief=False),
+        "rms error": TableColumn([f.rmse for f in fits], "N", digits=3),
+        **own,
+        "reduction of AICc": [f.aicc_reduction if np.isfinite(f.aicc_reduction) else None for f in fits],
+        P_VALUE: TableColumn([f.p_value for f in fits], brief=False),
+        "justified": [f.justified for f in fits],
+    }
+    return Table(name, title, columns, brief=len(fits))
 
 
 def _all_parameters(loop_fit: LoopFit) -> Table:
     """Return the parameters of all laws of a loop."""
-    rows = [(type(f.friction).__name__, leaf) for f in loop_fit.fits for leaf in leaves(f.friction)]
+    rows = [(f.name, leaf) for f in loop_fit.fits for leaf in leaves(f.friction)]
     columns: dict[str, Any] = {
         "law": [law for law, _ in rows],
         "parameter": [leaf.path for _, leaf in rows],
@@ -173,30 +173,19 @@ def joint_friction_chapter(fits: Sequence[JointFit], not_joined: Sequence[str] =
             "The runs justify no friction law that holds for all of them, so none is written. "
             f"{shown.name} is shown as the best one. {first}"
         )
+    columns = {
+        "depends on pressure": [fit.law is not fit.friction for fit in fits],
+        "runs that disagree": [sum(run.disagrees for run in fit.agreement) for fit in fits],
+    }
+    laws = _compared_laws("joint-laws", "Friction laws fitted to all runs together, best first", fits, columns)
     tables = [dataclasses.replace(table, name=f"friction-{table.name}", brief=0) for table in of_shown.tables]
     return dataclasses.replace(
         of_shown,
         title="Friction of all runs",
         summary=(first,),
-        tables=(_joint_laws(fits), _run_table(shown), *tables),
+        tables=(laws, _run_table(shown), *tables),
         notes=tuple(not_joined),
     )
-
-
-def _joint_laws(fits: Sequence[JointFit]) -> Table:
-    columns: dict[str, Any] = {
-        "law": [fit.name for fit in fits],
-        "depends on pressure": [fit.law is not fit.friction for fit in fits],
-        "rms error without friction": TableColumn(
-            [fit.rmse_without_friction for fit in fits], "N", digits=3, brief=False
-        ),
-        "rms error": TableColumn([fit.rmse for fit in fits], "N", digits=3),
-        "reduction of AICc": _reductions(fits),
-        P_VALUE: TableColumn([fit.p_value for fit in fits], brief=False),
-        "runs that disagree": [sum(run.disagrees for run in fit.agreement) for fit in fits],
-        "justified": [fit.justified for fit in fits],
-    }
-    return Table("joint-laws", "Friction laws fitted to all runs together, best first", columns, brief=len(fits))
 
 
 def _run_table(fit: JointFit) -> Table:

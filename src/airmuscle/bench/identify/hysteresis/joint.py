@@ -11,7 +11,6 @@ from ....engine.distribution import DistributedCalls
 from ....engine.processes import Workers, process_pool
 from ....physics.muscle.friction import Friction, IdentifiedFriction, PressureScaledFriction
 from ...segment.runs import RELATIVE_BAND
-from ..identifiability import UndeterminedCombination
 from .joint_result import JointFit, agreement_of_run, force_amplitude, preferred_fit
 from .limits import combine_limits
 from .loops import LoopFit
@@ -60,18 +59,16 @@ def fit_jointly(
     usable = joinable_fits(loop_fits)
     if len(usable) < 2:
         return ()
-    tasks = []
-    for law in {type(fit.friction): None for each in usable for fit in each.fits}:
-        own = [next((fit for fit in each.fits if type(fit.friction) is law), None) for each in usable]
-        complete = [fit for fit in own if fit is not None]
-        if len(complete) == len(usable):
-            tasks.append(complete)
+    by_law: dict[type[Friction], list[HysteresisFit]] = {}
+    for fit in (fit for each in usable for fit in each.fits):
+        by_law.setdefault(type(fit.friction), []).append(fit)
+    tasks = [own for own in by_law.values() if len(own) == len(usable)]
     fits: dict[int, JointFit] = {}
     with process_pool(workers) as executor:
-        for i, fit in DistributedCalls(executor, _fit_law, usable).completed(tasks):
-            fits[i] = fit
+        for i, joint in DistributedCalls(executor, _fit_law, usable).completed(tasks):
+            fits[i] = joint
             if progress is not None:
-                progress(f"{fit.name}, all runs")
+                progress(f"{joint.name}, all runs")
     return tuple(sorted((fits[i] for i in sorted(fits)), key=lambda fit: -fit.aicc_reduction))
 
 
@@ -89,20 +86,28 @@ def identified_friction(friction: Friction, runs: Sequence[LoopSeries]) -> Frict
 
 def _fit_law(usable: Sequence[LoopFit], own: Sequence[HysteresisFit]) -> JointFit:
     """One law fitted to all runs, with a constant and with a pressure-dependent scale; the better of the two."""
-    runs = [fit.series for fit in own]
+    runs, scale_p_value = [fit.series for fit in own], float("nan")
     pressures = np.array([_mean_pressure(run) for run in runs])
-    reference = int(np.argmax(pressures))
-    constant = search_parameters(own[len(own) // 2].friction, runs)
-    candidates = [(constant, float("nan"))]
-    lowest = float(pressures.min())  # -inf where a run has no pressure
+    reference, lowest = int(np.argmax(pressures)), float(pressures.min())  # -inf where a run has no pressure
+    friction, weak = search_parameters(own[len(own) // 2].friction, runs)
     if np.isfinite(lowest) and pressures[reference] > max(1e3, MIN_PRESSURE_RATIO * lowest):
         scaled = search_parameters(_initial_scale(own, pressures, reference), runs)
-        small, large = (Misfit.of(friction, runs) for friction, _ in (constant, scaled))
-        p_value = large.p_value(small)
-        better = p_value < SIGNIFICANCE_LEVEL and large.reduction_of_aicc(small) > 0
-        candidates = [(scaled if better else constant, p_value)]
-    (friction, weak), scale_p_value = candidates[0]
-    return _assess(friction, weak, scale_p_value, own, usable)
+        small, large = (Misfit.of(each, runs) for each in (friction, scaled[0]))
+        scale_p_value = large.p_value(small)
+        if scale_p_value < SIGNIFICANCE_LEVEL and large.reduction_of_aicc(small) > 0:
+            friction, weak = scaled
+    repeats = [each.loop.series(*each.loop.repeat) for each in usable if each.loop.repeat is not None]
+    agreement = [
+        agreement_of_run(friction, fit, each.loop.description, pressure)
+        for fit, each, pressure in zip(own, usable, pressures.tolist(), strict=True)
+    ]
+    return JointFit(
+        **evidence(friction, runs, repeats),
+        weak_combinations=weak,
+        series=tuple(runs),
+        agreement=tuple(agreement),
+        scale_p_value=scale_p_value,
+    )
 
 
 def _initial_scale(own: Sequence[HysteresisFit], pressures: Array, reference: int) -> PressureScaledFriction:
@@ -117,24 +122,6 @@ def _initial_scale(own: Sequence[HysteresisFit], pressures: Array, reference: in
 
 def _mean_pressure(run: LoopSeries) -> float:
     return float("-inf") if run.pressure is None else float(np.mean(run.pressure[run.fitted_rows]))
-
-
-def _assess(
-    friction: Friction, weak: tuple[UndeterminedCombination, ...], scale_p_value: float, own: Sequence[HysteresisFit],
-    usable: Sequence[LoopFit],
-) -> JointFit:  # fmt: skip
-    runs = [fit.series for fit in own]
-    repeats = [each.loop.series(*each.loop.repeat) for each in usable if each.loop.repeat is not None]
-    return JointFit(
-        **evidence(friction, runs, repeats),
-        weak_combinations=weak,
-        series=tuple(runs),
-        agreement=tuple(
-            agreement_of_run(friction, fit, each.loop.description, _mean_pressure(fit.series))
-            for fit, each in zip(own, usable, strict=True)
-        ),
-        scale_p_value=scale_p_value,
-    )
 
 
 class SelectedFriction(NamedTuple):

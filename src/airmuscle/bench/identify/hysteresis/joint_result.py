@@ -138,11 +138,6 @@ class JointFit(FrictionFit):
         return self.friction.inner if isinstance(self.friction, PressureScaledFriction) else self.friction
 
     @property
-    def name(self) -> str:
-        """Name of the law."""
-        return type(self.law).__name__
-
-    @property
     def limits(self) -> DataLimits:
         return combine_limits(tuple(run.limits for run in self.series))
 

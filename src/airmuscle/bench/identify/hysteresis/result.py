@@ -120,6 +120,16 @@ class FrictionFit(Reported):
     """Combinations of parameters that the data determine poorly or not at all."""
 
     @property
+    def law(self) -> Friction:
+        """The friction law, without its force scale."""
+        return self.friction
+
+    @property
+    def name(self) -> str:
+        """Name of the law."""
+        return type(self.law).__name__
+
+    @property
     @abc.abstractmethod
     def limits(self) -> DataLimits:
         """Maximum force and range of the speed of the data."""
@@ -229,18 +239,11 @@ class HysteresisFit(FrictionFit):
     @property
     def verdict(self) -> str:
         """Whether the data justify this friction, as sentences with the numbers."""
-        text = (
-            f"{type(self.friction).__name__} reduces the rms error from {self.rmse_without_friction:.3g} to "
-            f"{self.rmse:.3g} N{self._gap_text}."
-        )
+        text = f"{self.name} reduces the rms error from {self.rmse_without_friction:.3g} to {self.rmse:.3g} N"
+        if np.isfinite(self.gap):
+            text += f" and the gap between the branches from {self.gap:.3g} to {self.residual_gap:.3g} N"
         further = f"; the repeatability of the runs is {self.repeatability:.3g} N"
-        return self._judged(text, "this friction", "second run", further)
-
-    @property
-    def _gap_text(self) -> str:
-        if not np.isfinite(self.gap):
-            return ""
-        return f" and the gap between the branches from {self.gap:.3g} to {self.residual_gap:.3g} N"
+        return self._judged(f"{text}.", "this friction", "second run", further)
 
     @property
     def parameter_table(self) -> Table:
@@ -253,7 +256,7 @@ class HysteresisFit(FrictionFit):
             "unit": [unit for _, _, unit in rows],
             "meaning": TableColumn([leaf.declared.meaning for leaf, _, _ in rows], brief=False),
         }
-        return Table("parameters", f"Parameters of {type(self.friction).__name__}", columns, brief=len(rows))
+        return Table("parameters", f"Parameters of {self.name}", columns, brief=len(rows))
 
     def plot(self, *, ax: Any = None) -> Any:
         """Plot the loop with the friction force, and the residuals.
@@ -267,13 +270,12 @@ class HysteresisFit(FrictionFit):
 
     def chapter(self) -> Chapter:
         """The description of the fit: verdict, parameters, and the loop with the friction force."""
-        law = type(self.friction).__name__
         return Chapter(
             name="friction",
-            title=f"{law} fitted to {self.series.origin}",
+            title=f"{self.name} fitted to {self.series.origin}",
             summary=self.verdict,
             tables=(self.parameter_table,),
-            plots=(Plot("friction", f"Loop and hysteresis described by {law}.", self.plot),),
+            plots=(Plot("friction", f"Loop and hysteresis described by {self.name}.", self.plot),),
             references=self.friction.references,
         )
 

@@ -101,28 +101,26 @@ def predict_dynamic(
     """
     notes = describe_other_ambient(plant, experiment)
     other_air = ["other ambient air"] if notes else []
-    plant = experiment.plant or plant
-    deviations = {name: sensor or _deviation(name, experiment, uncertainty) for name, sensor in observed.items()}
+    plant, known = experiment.plant or plant, uncertainty or PlantUncertainty({})
+    deviations = {name: sensor or _deviation(name, experiment, known) for name, sensor in observed.items()}
     if own:
         fit = fit_dynamic(plant, [experiment], free=(), per_record=own, observed=deviations, method=method)
         plant, experiment = fit.plant(), _with_estimates(fit, experiment)
         notes += _describe_estimates(fit)
-    modelled, unknowns = _simulate(plant, experiment, deviations, uncertainty, method or Rodas4())
-    spread = _parameter_variance(modelled, unknowns, uncertainty)
+    unknowns = make_unknowns(plant, [experiment], known.parameters, (), {}) if known.parameters else ()
+    model = RecordModel(plant, experiment, 0, unknowns, deviations, method or Rodas4())
+    modelled = model.evaluate(np.array([unknown.value for unknown in unknowns]))
+    spread = _parameter_variance(modelled, unknowns, known)
     recording, quantities = experiment.recording, []
     for i, name in enumerate(observed):
-        half, factor = None, None if uncertainty is None else uncertainty.factor(name)
-        if uncertainty is not None and factor is not None:
-            half = factor * np.sqrt(spread[:, i] + uncertainty.deviations[name] ** 2)
-        measured, predicted = recording[name], modelled.values[:, i]
+        factor, measured, predicted = known.factor(name), recording[name], modelled.values[:, i]
+        half = None if factor is None else factor * np.sqrt(spread[:, i] + known.deviations[name] ** 2)
         compared = np.isfinite(measured) & np.isfinite(predicted)
-        band = "" if uncertainty is None else uncertainty.source(name)
-        quantities.append(result.QuantityPrediction(name, measured, predicted, half, compared, band))
-    ranges, rates = ({}, {}) if uncertainty is None else (uncertainty.ranges, uncertainty.rates)
-    faster = result.rate_notes(recording, rates)
-    notes += [*result.range_notes(recording, ranges, result.NOISY_MARGIN), *faster]
+        quantities.append(result.QuantityPrediction(name, measured, predicted, half, compared, known.source(name)))
+    faster = result.rate_notes(recording, known.rates)
+    notes += [*result.range_notes(recording, known.ranges, result.NOISY_MARGIN), *faster]
     notes += [f"the band of {q.name} is {q.band}" for q in quantities if q.half_width is None and q.band]
-    outside = result.rows_outside(recording, ranges, result.NOISY_MARGIN)
+    outside = result.rows_outside(recording, known.ranges, result.NOISY_MARGIN)
     driving = commands_at(plant, experiment.command, recording["time"] - experiment.start_time)
     prediction = result.RecordPrediction(recording, tuple(quantities), tuple(notes), outside, driving)
     return result.with_band_notes(prediction, [*other_air, *(["faster changes"] if faster else [])], USUAL)
@@ -138,8 +136,8 @@ def _describe_estimates(fit: DynamicFit) -> list[str]:
     ]
 
 
-def _deviation(name: str, experiment: Experiment, uncertainty: PlantUncertainty | None) -> float:
-    if uncertainty is not None and name in uncertainty.deviations:
+def _deviation(name: str, experiment: Experiment, uncertainty: PlantUncertainty) -> float:
+    if name in uncertainty.deviations:
         return float(uncertainty.deviations[name])
     values = experiment.recording[name]
     return ASSUMED_DEVIATION * float(np.nanmax(values) - np.nanmin(values)) or 1.0
@@ -147,39 +145,20 @@ def _deviation(name: str, experiment: Experiment, uncertainty: PlantUncertainty 
 
 def _with_estimates(fit: DynamicFit, experiment: Experiment) -> Experiment:
     """The experiment with its estimated start time and initial values, and the plant with its own parameters."""
-    model = fit.problem.record_models[0]
-    known = dict(experiment.initial_conditions.known)
-    for estimate, unknown in zip(fit.estimates, fit.unknowns, strict=True):
-        target = unknown.target
-        if isinstance(target, InitialValue):
-            known[target.name] = estimate.value
-    conditions = dataclasses.replace(experiment.initial_conditions, known=known)
-    return dataclasses.replace(
-        experiment,
-        plant=fit.plant(),
-        start_time=model.start_time(fit.values),
-        initial_conditions=conditions,
-        command=model.command(fit.values),
-    )
+    model, conditions = fit.problem.record_models[0], experiment.initial_conditions
+    initial = {
+        unknown.target.name: estimate.value
+        for estimate, unknown in zip(fit.estimates, fit.unknowns, strict=True)
+        if isinstance(unknown.target, InitialValue)
+    }
+    conditions = dataclasses.replace(conditions, known={**conditions.known, **initial})
+    start, command = model.start_time(fit.values), model.command(fit.values)
+    return Experiment(experiment.recording, command, conditions, start, fit.plant())
 
 
-def _simulate(
-    plant: System, experiment: Experiment, deviations: Mapping[str, float], uncertainty: PlantUncertainty | None,
-    method: Integrator,
-) -> tuple[ModelOutputs, tuple[Unknown, ...]]:  # fmt: skip
-    """The outputs at the rows of the record, with their derivatives by the fitted parameters."""
-    groups = () if uncertainty is None else uncertainty.parameters
-    unknowns = make_unknowns(plant, [experiment], groups, (), {}) if groups else ()
-    model = RecordModel(plant, experiment, 0, unknowns, deviations, method)
-    values = np.array([unknown.value for unknown in unknowns])
-    return model.evaluate(values), unknowns
-
-
-def _parameter_variance(
-    modelled: ModelOutputs, unknowns: Sequence[Unknown], uncertainty: PlantUncertainty | None
-) -> Array:
+def _parameter_variance(modelled: ModelOutputs, unknowns: Sequence[Unknown], uncertainty: PlantUncertainty) -> Array:
     """Variance of the outputs by the covariance of the parameters [SI], shape (N, Q)."""
-    if not unknowns or uncertainty is None:
+    if not unknowns:
         return np.zeros(modelled.values.shape)
     if uncertainty.covariance.shape != (len(unknowns),) * 2:
         raise ParameterError(
