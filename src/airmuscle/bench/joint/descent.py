@@ -2,6 +2,7 @@
 
 import dataclasses
 import functools
+import itertools
 from collections.abc import Callable, Mapping, Sequence
 from typing import TypeVar, cast
 
@@ -39,10 +40,10 @@ SIZES = {
 def joint_errors(arm: PressureDriven, joint: int, windows: Windows) -> Array:
     """Errors (N, rows) [rad] of the free run of one joint; the other joints move as measured."""
     system, known = OneJoint(arm, joint), start_of(arm, windows)
-    angle = system.states[0].name
     state = {s.name: known[s.name] for s in system.states}
-    run = over(system, inputs_of(system, windows), windows.sample_time, state, [angle])
-    return np.asarray(run[angle][:, 1:] - windows.angle[:, HISTORY + 1 :, joint])
+    names, inputs = [system.states[0].name], inputs_of(system, windows)
+    found, _ = with_slopes(system, (), inputs, windows.sample_time, state, names)
+    return np.asarray(found[:, 1:, 0] - windows.angle[:, HISTORY + 1 :, joint])
 
 
 @dataclasses.dataclass(frozen=True)
@@ -151,25 +152,38 @@ def over(system: System, inputs: Array, step: float, state: Mapping[str, Array],
     )  # fmt: skip
 
 
+def with_slopes(
+    system: System, paths: Sequence[str], inputs: Array, step: float, state: Mapping[str, Array], names: Sequence[str]
+) -> tuple[Array, Array]:
+    """Columns (N, R, J) as of `over`, and their derivatives (N, R, J, P) by the parameters of these paths; `state` may
+    have derivatives of the initial state, which are 0 otherwise."""
+    observed, keep, own = system, list(names), [[sensitivity(n, k) for k in range(len(paths))] for n in names]
+    if paths:
+        zeros = np.zeros(len(inputs))
+        state = {sensitivity(s.name, k): zeros for s in system.states for k in range(len(paths))} | dict(state)
+        observed = WithSensitivities(system, tuple((p,) for p in paths), (1.0,) * len(paths), observed=tuple(names))
+        keep += itertools.chain(*own)
+    run = over(observed, inputs, step, state, keep)
+    columns = np.stack([run[name] for name in names], axis=-1)
+    slopes = [np.stack([run[name] for name in row], axis=-1) for row in own if row]
+    return columns, np.stack(slopes, axis=2) if slopes else np.zeros((*columns.shape, 0))
+
+
 def gradients(arm: PressureDriven, joint: int, paths: Sequence[str], windows: Windows) -> tuple[Array, Array]:
     """Errors of the free run of one joint (N, rows) [rad] and their derivatives (N, rows, P) by the parameters.
 
     The other joints move as measured; both are 0 in rows of outliers.
     """
-    system = OneJoint(arm, joint)
-    columns = tuple((f"arm.{path}",) for path in paths)
-    known = start_of(arm, windows)
-    state, zero = {s.name: known[s.name] for s in system.states}, np.zeros(len(windows))
-    nothing: dict[str, Array] = {}
+    system, known = OneJoint(arm, joint), start_of(arm, windows)
+    names = [s.name for s in system.states]
+    state = {name: known[name] for name in names}
     for k, path in enumerate(paths):
-        moved = _start_slope(arm, path, known, windows) if _field(path) in ("presliding_angle", "lags") else nothing
-        state |= {sensitivity(s.name, k): moved.get(s.name, zero) for s in system.states}
-    angle = system.states[0].name
-    observed = WithSensitivities(system, columns, (1.0,) * len(paths), observed=(angle,))
-    keep = [angle, *(sensitivity(angle, k) for k in range(len(paths)))]
-    run = over(observed, inputs_of(system, windows), windows.sample_time, state, keep)
-    error = run[angle][:, 1:] - windows.angle[:, HISTORY + 1 :, joint]
-    gradient = np.stack([run[name][:, 1:] for name in keep[1:]], axis=-1)
+        if _field(path) in ("presliding_angle", "lags"):
+            moved = _start_slope(arm, path, known, windows)
+            state |= {sensitivity(name, k): moved[name] for name in names}
+    of_arm, inputs = [f"arm.{path}" for path in paths], inputs_of(system, windows)
+    found, slopes = with_slopes(system, of_arm, inputs, windows.sample_time, state, names[:1])
+    error, gradient = found[:, 1:, 0] - windows.angle[:, HISTORY + 1 :, joint], slopes[:, 1:, 0]
     lost = ~np.isfinite(error) | (np.abs(error) > OUTLIER) | ~np.isfinite(gradient).all(axis=-1)
     lost |= np.logical_not(windows.counts[:, HISTORY + 1 :])
     return np.where(lost, 0.0, error), np.where(lost[..., None], 0.0, gradient)

@@ -121,12 +121,8 @@ def in_pairs(episodes: Episodes, pairs: Sequence[tuple[int, int]]) -> Episodes:
         raise ParameterError(
             f"fit_joint: pairs are {tuple(pairs)}; there are pressures 1 to {episodes.muscles}, each in one pair."
         )
-    runs = [
-        dataclasses.replace(
-            run, pressure=run.pressure[:, order], command=None if run.command is None else run.command[:, order]
-        )
-        for run in episodes.runs
-    ]
+    runs = [dataclasses.replace(run, pressure=run.pressure[:, order]) for run in episodes.runs]
+    runs = [run if run.command is None else dataclasses.replace(run, command=run.command[:, order]) for run in runs]
     return dataclasses.replace(episodes, runs=tuple(runs))
 
 
@@ -204,21 +200,18 @@ def cut(episodes: Episodes, delay: int = 0, rows: int = ROWS, stride: int = ROWS
     ]
     if not found:
         long_enough(episodes, rows)  # raises
-    rates = {number: speed_of(episodes.runs[number].angle, episodes.sample_time) for number, _ in found}
-    later = np.minimum(np.arange(-HISTORY, rows + 1) + delay, rows)
-
-    def piece(array: Array, k: int) -> Array:
-        return array[k - HISTORY : k + rows + 1]
-
-    stacked = {
-        "angle": np.array([piece(episodes.runs[n].angle, k) for n, k in found]),
-        "speed": np.array([piece(episodes.runs[n].speed, k) for n, k in found]),
-        "rate": np.array([piece(rates[n], k) for n, k in found]),
-        "pressure": np.array([episodes.runs[n].pressure[k + later] for n, k in found]),
-    }
-    numbers, counts = np.array(found), np.ones((len(found), HISTORY + 1 + rows), dtype=bool)
+    runs, at, step = episodes.runs, np.arange(-HISTORY, rows + 1), episodes.sample_time
+    rates = {number: speed_of(runs[number].angle, step) for number, _ in found}
+    numbers, counts = np.array(found), np.ones((len(found), at.size), dtype=bool)
     return Windows(
-        **stacked, episode=numbers[:, 0], first=numbers[:, 1], sample_time=episodes.sample_time, counts=counts
+        angle=np.array([runs[n].angle[k + at] for n, k in found]),
+        speed=np.array([runs[n].speed[k + at] for n, k in found]),
+        rate=np.array([rates[n][k + at] for n, k in found]),
+        pressure=np.array([runs[n].pressure[k + np.minimum(at + delay, rows)] for n, k in found]),
+        episode=numbers[:, 0],
+        first=numbers[:, 1],
+        sample_time=step,
+        counts=counts,
     )
 
 
@@ -230,13 +223,8 @@ class WindowSignal(InputSignal):
     sample_time: float
 
     def segments(self, inputs: Sequence[str], start: float, duration: float) -> PiecewiseLinear:
-        count = len(self.values) - 1
-        times = start + self.sample_time * np.arange(1, count + 1)
-        return PiecewiseLinear(
-            np.asarray(times, dtype=np.float64),
-            self.values[:-1].copy(),
-            np.diff(self.values, axis=0) / self.sample_time,
-        )
+        times = np.asarray(start + self.sample_time * np.arange(1, len(self.values)), dtype=np.float64)
+        return PiecewiseLinear(times, self.values[:-1].copy(), np.diff(self.values, axis=0) / self.sample_time)
 
 
 def start_of(arm: PressureDriven, windows: Windows) -> Mapping[str, Array]:

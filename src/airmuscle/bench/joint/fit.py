@@ -10,7 +10,7 @@ from scipy.linalg import block_diag
 from ...core import Array, ParameterError, tree
 from ...physics import Braid, Muscle, MuscleRoute, PressureDriven, SerialArm, SpatialLink, StickSlip, WithStickSlip
 from ...physics.muscle.characteristic.linear_in_pressure import LinearInPressure
-from .descent import CLIP, Descent, SearchStage, gradients, joint_errors, typical_size
+from .descent import CLIP, Descent, SearchStage, gradients, joint_errors, typical_size, with_values
 from .episode_inspection import EpisodeInspection, check_episodes, inspect_episodes
 from .episodes import HISTORY, ROWS, Episodes, Windows, band, count_fitted, cut, in_pairs, long_enough, rms
 from .free_run import baseline_errors, free_errors, free_run, judged_residual
@@ -265,10 +265,9 @@ def _link(number: int, axis: tuple[int, int, int], distance: float) -> SpatialLi
 def stronger(arm: PressureDriven, joint: int, factor: float) -> PressureDriven:
     """The arm with forces, dry friction and damping of one joint multiplied: another initial guess of its inertia."""
     fields = ("area", "passive_force", "slack_width", "coulomb_torque", "damping")
-    own = {path for path in own_parameters(arm, joint) if path.rsplit(".")[-1].startswith(fields)}
-    values = [float(leaf.value) * (factor if leaf.path in own else 1.0) for leaf in tree.leaves(arm)]
-    changed: PressureDriven = tree.unflatten(arm, values)
-    return changed
+    own = [path for path in own_parameters(arm, joint) if path.rsplit(".")[-1].startswith(fields)]
+    values = {leaf.path: float(leaf.value) for leaf in tree.leaves(arm)}
+    return with_values(arm, own, [factor * values[path] for path in own])
 
 
 def own_parameters(arm: PressureDriven, joint: int) -> list[str]:

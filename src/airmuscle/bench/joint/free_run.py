@@ -8,9 +8,8 @@ import numpy as np
 
 from ...core import Array, tree
 from ...physics import GaussianResidual, PressureDriven, WithStickSlip
-from .. import baselines
-from ..baselines import ARX, DEPTH, PERSISTENCE
-from .descent import Descent, SearchStage, over
+from ..baselines import ARX, DEPTH, PERSISTENCE, fit_arx
+from .descent import Descent, SearchStage, with_slopes
 from .episodes import HISTORY, ROWS, Episodes, Windows, cut, rms, start_of
 from .pressures import without_saturated
 
@@ -32,9 +31,7 @@ def free_errors(arm: PressureDriven, joint: int, windows: Windows) -> Array:
 
 def angles(arm: PressureDriven, pressure: Array, start: Mapping[str, Array], sample_time: float) -> Array:
     """Angles (N, R, J) [rad] under the pressures (N, R, M) from states (N,)."""
-    names = [c.name for c in arm.mechanism.coordinates]
-    run = over(arm, pressure, sample_time, start, names)
-    return np.stack([run[name] for name in names], axis=-1)
+    return with_slopes(arm, (), pressure, sample_time, start, [c.name for c in arm.mechanism.coordinates])[0]
 
 
 # Baselines: persistence, and a linear ARX model of all joints
@@ -42,26 +39,15 @@ def angles(arm: PressureDriven, pressure: Array, start: Mapping[str, Array], sam
 LIMIT = 9.0
 """Limit of an angle [rad], so that an unstable prediction ends in a large error and not in infinity."""
 
-Predict = Callable[[Windows], Array]
-
 
 def baseline_errors(train: Episodes, judge: Episodes, rows: int) -> Mapping[str, Array]:
-    """Errors (N, rows, J) [rad] of the free run of each baseline over the windows of `judge`, by its name."""
-    windows = cut(judge, 0, rows)
-    known = {PERSISTENCE: persistence, ARX: fit_arx(train)}
-    return {name: predict(windows) - windows.angle[:, HISTORY + 1 :] for name, predict in known.items()}
-
-
-def persistence(windows: Windows) -> Array:
-    """The angles at the start of every window, for all its rows."""
-    return np.repeat(windows.angle[:, HISTORY : HISTORY + 1], windows.rows, axis=1)
-
-
-def fit_arx(train: Episodes) -> Predict:
-    """Linear ARX model of the angles of all joints, driven by all pressures."""
-    runs = [(run.angle, run.pressure) for run in train.runs if len(run) > DEPTH + 1]
-    model, begin = baselines.fit_arx(runs, -LIMIT, LIMIT), HISTORY - DEPTH + 1
-    return lambda windows: model.free_run(windows.angle[:, begin : HISTORY + 1], windows.pressure[:, begin:])
+    """Errors (N, rows, J) [rad] of the free run of each baseline over the windows of `judge`, by its name: the angles
+    at the start, and an ARX model of the angles of all joints, driven by all pressures."""
+    windows, begin = cut(judge, 0, rows), HISTORY - DEPTH + 1
+    arx = fit_arx([(run.angle, run.pressure) for run in train.runs if len(run) > DEPTH + 1], -LIMIT, LIMIT)
+    predicted = arx.free_run(windows.angle[:, begin : HISTORY + 1], windows.pressure[:, begin:])
+    by_name = {PERSISTENCE: windows.angle[:, HISTORY : HISTORY + 1], ARX: predicted}
+    return {name: angle - windows.angle[:, HISTORY + 1 :] for name, angle in by_name.items()}
 
 
 # Hybrid law: what physics leaves in the free run, fitted as a residual and judged on episodes held back

@@ -6,9 +6,8 @@ from typing import ClassVar
 import numpy as np
 
 from ...core import Array, ParameterError, StateVariable, System, Value, Values, model, parameter, suggestion, tree
-from ...engine import WithSensitivities, sensitivity
 from ...physics import PressureDriven
-from .descent import CLIP, OUTLIER, over, with_values
+from .descent import CLIP, OUTLIER, with_slopes, with_values
 from .episode_inspection import check_episodes, inspect_episodes
 from .episodes import HISTORY, ROWS, Episodes, Windows, band, count_fitted, cut, lagged, long_enough
 from .fit import not_separated, separated
@@ -140,25 +139,16 @@ def _paths(system: ReadPressures, free: Sequence[str]) -> list[str]:
 
 def _run(system: ReadPressures, paths: Sequence[str], windows: Windows) -> tuple[Array, Array]:
     """Errors (N, rows, J) [rad] of the free run, and their derivatives (N, rows, J, P) by the parameters."""
-    arm, count = system.arm, len(windows)
-    state = {s.name: np.zeros(count) for s in arm.states}
+    arm, step = system.arm, windows.sample_time
+    state = {s.name: np.zeros(len(windows)) for s in arm.states}
     for j, c in enumerate(arm.mechanism.coordinates):
         state |= {c.name: windows.angle[:, HISTORY, j], c.speed: windows.speed[:, HISTORY, j]}
     for i, (prefix, lag) in enumerate(zip(arm.prefixes, arm.lags, strict=True)):
-        state[f"{prefix}pressure"] = lagged(windows.pressure[:, : HISTORY + 1, i], lag, windows.sample_time)
+        state[f"{prefix}pressure"] = lagged(windows.pressure[:, : HISTORY + 1, i], lag, step)
     names = [c.name for c in arm.mechanism.coordinates]
-    inputs, step = windows.pressure[:, HISTORY:], windows.sample_time
-    if not paths:
-        run, moved = over(system, inputs, step, state, names), np.zeros((count, windows.rows, len(names), 0))
-    else:
-        observed = WithSensitivities(system, tuple((p,) for p in paths), (1.0,) * len(paths), observed=tuple(names))
-        columns = [[sensitivity(name, k) for k in range(len(paths))] for name in names]
-        state |= {sensitivity(s, k): np.zeros(count) for s in list(state) for k in range(len(paths))}
-        run = over(observed, inputs, step, state, [*names, *(each for row in columns for each in row)])
-        moved = np.stack([np.stack([run[n][:, 1:] for n in row], axis=-1) for row in columns], axis=2)
-    error = np.stack([run[name][:, 1:] for name in names], axis=-1) - windows.angle[:, HISTORY + 1 :]
-    counts = windows.counts[:, HISTORY + 1 :, None]
-    return np.where(counts, error, 0.0), np.where(counts[..., None], moved, 0.0)
+    found, slopes = with_slopes(system, paths, windows.pressure[:, HISTORY:], step, state, names)
+    error, counts = found[:, 1:] - windows.angle[:, HISTORY + 1 :], windows.counts[:, HISTORY + 1 :, None]
+    return np.where(counts, error, 0.0), np.where(counts[..., None], slopes[:, 1:], 0.0)
 
 
 class KnownSearch:

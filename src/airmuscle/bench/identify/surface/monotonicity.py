@@ -9,7 +9,6 @@ inequalities. They are imposed on the Bernstein coefficients of the slopes of v 
 """
 
 import dataclasses
-import functools
 import itertools
 import math
 from collections.abc import Callable, Sequence
@@ -25,19 +24,29 @@ from ..variable_projection import shortened_step
 from .basis import LoadRange
 from .exponential import SurfaceFit, SurfaceProblem
 
+Columns = Callable[[Array, int], Any]
+"""Values (N, degree + 1) at N points of the polynomials of a basis up to a degree, or of their slopes."""
 
-def bernstein_coefficients(columns: Callable[[Array], Array], size: int, cells: int) -> Array:
-    """Bernstein coefficients, on equal cells of -1..1, of polynomials of degree below `size`, one column each.
 
-    `columns` gives the values of the polynomials at N points, shape (N, polynomials).
-    """
+def slope_rows(
+    values: Columns, slopes: Columns, degrees: tuple[int, int], cells: tuple[int, int]
+) -> tuple[Array, Array]:
+    """Bernstein coefficients of the slopes of a surface by its first and by its second argument, on equal cells of
+    -1..1, one column for each of its coefficients; the basis of each argument has these `values` and `slopes`."""
+    pairs = list(zip(degrees, cells, strict=True))
+    plain = [_bernstein_coefficients(values, degree, degree + 1, count) for degree, count in pairs]
+    steep = [_bernstein_coefficients(slopes, degree, degree, count) for degree, count in pairs]
+    return np.asarray(np.kron(steep[0], plain[1])), np.asarray(np.kron(plain[0], steep[1]))
+
+
+def _bernstein_coefficients(columns: Columns, degree: int, size: int, cells: int) -> Array:
+    """Bernstein coefficients, on equal cells of -1..1, of polynomials of degree below `size`, one column each."""
     t = np.linspace(0.0, 1.0, size) if size > 1 else np.array([0.5])
     order = np.arange(size)
     binomials = np.array([math.comb(size - 1, int(j)) for j in order])
     bernstein = binomials * t[:, None] ** order * (1.0 - t[:, None]) ** (size - 1 - order)
-    edges = np.linspace(-1.0, 1.0, cells + 1)
-    by_cell = [np.linalg.solve(bernstein, columns(a + (b - a) * t)) for a, b in itertools.pairwise(edges)]
-    return np.asarray(np.vstack(by_cell))
+    edges = itertools.pairwise(np.linspace(-1.0, 1.0, cells + 1))
+    return np.vstack([np.linalg.solve(bernstein, columns(a + (b - a) * t, degree)) for a, b in edges])
 
 
 def solve_constrained_least_squares(matrix: Array, right: Array, rows: Array, minimum: float) -> Array:
@@ -118,33 +127,21 @@ def find_violations(
 
     `pressure` [Pa] and `second_argument` (contraction [1] or force [N]) are grids, shape (N, M) each.
     """
-    violations: list[MonotonicityViolation] = []
-    for rule in rules:
-        slope = autodiff.derivative(law, rule.quantity, pressure, second_argument, wrt=rule.argument)
-        excess = rule.sign * np.asarray(slope)
-        significant = np.where(excess > _ROUNDING * np.abs(excess).max(), excess, 0.0)
-        violations += _connected_regions(rule, significant, pressure, second_argument)
-    return tuple(sorted(violations, key=lambda v: -v.area_fraction))
-
-
-def _connected_regions(
-    rule: MonotonicityRule, excess: Array, pressure: Array, second_argument: Array
-) -> list[MonotonicityViolation]:
-    """The connected regions where `excess` is positive."""
     from scipy import ndimage
 
-    labels, count = ndimage.label(excess > 0)
-    regions = []
-    for label in range(1, count + 1):
-        inside = labels == label
-        worst = np.unravel_index(int(np.argmax(np.where(inside, excess, -np.inf))), excess.shape)
-        limits, second_limits = ((float(v[inside].min()), float(v[inside].max())) for v in (pressure, second_argument))
-        worst_point = (float(pressure[worst]), float(second_argument[worst]))
-        worst_slope = rule.sign * float(excess[worst])
-        regions.append(
-            MonotonicityViolation(rule, limits, second_limits, float(inside.mean()), worst_point, worst_slope)
-        )
-    return regions
+    violations: list[MonotonicityViolation] = []
+    for rule in rules:
+        slope = np.asarray(autodiff.derivative(law, rule.quantity, pressure, second_argument, wrt=rule.argument))
+        excess = rule.sign * slope
+        labels, count = ndimage.label((excess > 0.0) & (excess > _ROUNDING * np.abs(excess).max()))
+        for inside in (labels == label for label in range(1, count + 1)):
+            worst = np.unravel_index(int(np.argmax(np.where(inside, excess, -np.inf))), excess.shape)
+            arguments = pressure, second_argument
+            first, second = ((float(values[inside].min()), float(values[inside].max())) for values in arguments)
+            point = (float(pressure[worst]), float(second_argument[worst]))
+            share, steepest = float(inside.mean()), float(slope[worst])
+            violations.append(MonotonicityViolation(rule, first, second, share, point, steepest))
+    return tuple(sorted(violations, key=lambda v: -v.area_fraction))
 
 
 MIN_SLOPE = 1e-9
@@ -183,10 +180,13 @@ def fit_monotone(
     coefficients = solve_constrained_least_squares(
         weights[:, None] * problem.design_matrix, weights * targets, constraints, MIN_SLOPE
     )
-    sum_of_squares = functools.partial(_sum_of_squares, problem)
+
+    def sum_of_squares(c: Array) -> float:
+        residuals = problem.predict(c) - problem.contraction
+        return float(residuals @ residuals)
+
     for _ in range(200):
-        residuals = problem.predict(coefficients) - problem.contraction
-        jacobian = problem.jacobian(coefficients)
+        residuals, jacobian = problem.predict(coefficients) - problem.contraction, problem.jacobian(coefficients)
         right = jacobian @ coefficients - residuals
         step = solve_constrained_least_squares(jacobian, right, constraints, MIN_SLOPE) - coefficients
         # where no fraction of the step reduces the sum of squares, only rounding errors are left
@@ -199,31 +199,16 @@ def fit_monotone(
     )
 
 
-def _sum_of_squares(problem: SurfaceProblem, coefficients: Array) -> float:
-    residuals = problem.predict(coefficients) - problem.contraction
-    return float(residuals @ residuals)
-
-
 def slope_constraints(pressure_degree: int, force_degree: int, cells: tuple[int, int]) -> Array:
     """Rows g: v with Chebyshev coefficients c falls with p and rises with F on the validity range if all g @ c >= 0.
 
     The rows are the Bernstein coefficients of -dv/dx and dv/dy on every cell. A polynomial lies between its minimum and
     maximum Bernstein coefficient, so the condition is sufficient; on small cells it is nearly necessary.
     """
-    falls_with_p = -np.kron(
-        _bernstein_matrix(pressure_degree, cells[0], slope=True), _bernstein_matrix(force_degree, cells[1], slope=False)
-    )
-    rises_with_f = np.kron(
-        _bernstein_matrix(pressure_degree, cells[0], slope=False), _bernstein_matrix(force_degree, cells[1], slope=True)
-    )
-    return np.vstack([falls_with_p, rises_with_f])
+    by_pressure, by_force = slope_rows(chebyshev.chebvander, _slopes, (pressure_degree, force_degree), cells)
+    return np.vstack([-by_pressure, by_force])
 
 
-def _bernstein_matrix(degree: int, cells: int, *, slope: bool) -> Array:
-    """Bernstein coefficients, on equal cells of -1..1, of T_0..T_degree or their slopes, one column each."""
-    if not slope:
-        return bernstein_coefficients(lambda x: np.asarray(chebyshev.chebvander(x, degree)), degree + 1, cells)
-    derivatives = [chebyshev.chebder(unit) for unit in np.eye(degree + 1)]
-    return bernstein_coefficients(
-        lambda x: np.column_stack([chebyshev.chebval(x, d) for d in derivatives]), degree, cells
-    )
+def _slopes(x: Array, degree: int) -> Array:
+    """Slopes of T_0..T_degree."""
+    return np.column_stack([chebyshev.chebval(x, chebyshev.chebder(unit)) for unit in np.eye(degree + 1)])

@@ -119,20 +119,10 @@ def shape_constraints(degree: int, cells: tuple[int, int]) -> Array:
     `cells` are the numbers of cells in pressure and in contraction.
     """
     columns = [j * (degree + 1) + i for i, j in exponents(degree)]
-    rises = np.kron(_bernstein_matrix(degree, cells[0], slope=True), _bernstein_matrix(degree, cells[1], slope=False))
-    falls = -np.kron(_bernstein_matrix(degree, cells[0], slope=False), _bernstein_matrix(degree, cells[1], slope=True))
-    return np.vstack([rises[:, columns], falls[:, columns]])
+    rises, falls = monotonicity.slope_rows(polynomial.polyvander, _slopes, (degree, degree), cells)
+    return np.vstack([rises[:, columns], -falls[:, columns]])
 
 
-def _bernstein_matrix(degree: int, cells: int, *, slope: bool) -> Array:
-    """Bernstein coefficients, on equal cells of -1..1, of 1, x, .. x^degree or their slopes, one column each."""
-    if not slope:
-        return monotonicity.bernstein_coefficients(
-            lambda x: np.asarray(polynomial.polyvander(x, degree)), degree + 1, cells
-        )
-    powers = np.arange(1, degree + 1)
-
-    def slopes(x: Array) -> Array:
-        return np.column_stack([np.zeros(x.size), polynomial.polyvander(x, degree - 1) * powers])
-
-    return monotonicity.bernstein_coefficients(slopes, degree, cells)
+def _slopes(x: Array, degree: int) -> Array:
+    """Slopes of 1, x, .. x^degree."""
+    return np.column_stack([np.zeros(x.size), polynomial.polyvander(x, degree - 1) * np.arange(1, degree + 1)])
