@@ -12,6 +12,7 @@ import pytest
 from made_campaign import THREE_LENGTHS, TrueMuscle, unseen_records, write_campaign, write_german
 
 from airmuscle.bench import (
+    Campaign,
     CreepStage,
     FillStage,
     FrictionStage,
@@ -37,7 +38,7 @@ from airmuscle.bench.identify.campaign import (
 )
 from airmuscle.bench.identify.campaign.next_experiment import _levels
 from airmuscle.errors import IdentificationError
-from airmuscle.physics import BoucWen, CreepElements, NoFriction
+from airmuscle.physics import BoucWen, Braid, CreepElements, NoFriction
 from airmuscle.recording import Recording
 
 RANDOM = np.random.default_rng(3)
@@ -414,3 +415,10 @@ def test_the_specimen_that_does_not_follow_the_others_is_noted(monkeypatch):
     assert isinstance(stage, StaticStage)
     odd = [note for note in stage.data_notes if "does not follow the others" in note]
     assert [note.split()[1] for note in odd] == ["c"]
+
+
+def test_a_given_geometry_of_one_length_gives_none_of_another_without_a_static_law():
+    missing, braid = [LeftOutStage("", "", "")] * 5, Braid(0.01, 0.43, 0.3)
+    campaign = Campaign((), *missing, (), given_geometry=braid)
+    assert campaign.geometry(0.3) is braid
+    assert campaign.muscle(0.2) is campaign.geometry(0.2) is None

@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -13,15 +14,15 @@ from ....physics.muscle.characteristic.base import ForceLaw
 from ....physics.muscle.friction import Friction, NoFriction
 from ....physics.muscle.geometry import Geometry
 from ....recording import Recording
-from ..compared_points import FORCE_MARGIN, law_of_length
+from ..compared_points import law_of_length
 from .creep_stage import CreepStage, fit_creep_stage
 from .fill_stage import FillStage, fit_fill_stage
 from .friction_and_release import FrictionStage, ReleaseStage, fit_friction_stage, fit_release_stage, predicted_force
 from .next_experiment import NextExperiment, check_one_rig, plan_next
 from .record import CampaignRecord, RecordKind, classify_records
-from .static_stage import StaticStage, fit_static_stage
+from .static_stage import StaticStage, fit_static_stage, force_limit
 from .transient import LeftOutStage, named
-from .volume import scaled_to_length, volume_change
+from .volume import VolumeChange, volume_change
 
 STAGES = ("records", "creep", "hysteresis", "static characteristic", "fills and volume", "release", "plan")
 """The stages in their order; each is fitted with the results of those before it."""
@@ -90,7 +91,9 @@ class Campaign(ShortRepr):
         length = resting_length or self.resting_length
         if length is None or abs(length - own.resting_length) < 1e-6:
             return own
-        return _geometry_of_length(self, length, own)
+        change = _volume_change(self.static, length)
+        at_rest = float(own.volume(0.0)) * length / own.resting_length
+        return None if change is None else change.geometry(at_rest)
 
     def muscle(self, resting_length: float | None = None) -> Muscle | None:
         """The muscle of a resting length [m] with all identified parts; None without a static law or a volume."""
@@ -114,23 +117,21 @@ class Campaign(ShortRepr):
             raise IdentificationError(f"the campaign has no static characteristic: {self.static.reason}.")
         length = recording.constants.get("resting_length")
         law = law_of_length(self.static.fit.model, None if length is None else float(length))
-        limit = FORCE_MARGIN * max(float(np.nanmax(run["force"])) for run in self.static.points)
-        force = predicted_force(law, recording, self.friction, self.creep_elements, limit)
+        force = predicted_force(law, recording, self.friction, self.creep_elements, force_limit(self.static.points))
         known = {r.resting_length for r in self.records if r.kind.is_static}
         measured = length is None or any(abs(float(length) - k) < 1e-6 for k in known if k)
         half = self.static.half_width(recording, measured)
         return Prediction(np.maximum(force, 0.0), force - half, force + half)
 
 
-def _geometry_of_length(campaign: Campaign, length: float, own: Geometry) -> Geometry | None:
-    """The volume change of the law of this length, with the volume at rest in proportion to the length."""
-    law = campaign.law(length)
-    assert isinstance(campaign.static, StaticStage)
-    ranges = campaign.static.fit.data_ranges
-    change = None if law is None else volume_change(law, length, ranges["pressure"], ranges["contraction"])
-    if change is None:
+def _volume_change(static: StaticStage | LeftOutStage, length: float) -> VolumeChange | None:
+    """The change of the volume of a muscle of a resting length [m] by its static law; None where that gives none."""
+    if isinstance(static, LeftOutStage):
         return None
-    return change.geometry(scaled_to_length(float(own.volume(0.0)), own.resting_length, length))
+    law, ranges = law_of_length(static.fit.model, length), static.fit.data_ranges
+    if not isinstance(law, ForceLaw):
+        return None
+    return volume_change(law, length, ranges["pressure"], ranges["contraction"])
 
 
 def _main_length(records: Sequence[CampaignRecord]) -> float | None:
@@ -191,16 +192,10 @@ def _fit_fills(
     progress: Callable[[float], None],
 ) -> FillStage | LeftOutStage:
     fills = _of_kind(records, RecordKind.FILL)
-    lengths = sorted({r.resting_length for r in fills if r.resting_length is not None})
-    if len(lengths) > 1:
-        main = _main_length(records)
+    main = _main_length(fills)
+    if len({r.resting_length for r in fills if r.resting_length is not None}) > 1:
         fills = [r for r in fills if r.resting_length == main]
-    change = None
-    if isinstance(static, StaticStage) and lengths:
-        law, ranges = law_of_length(static.fit.model, _main_length(records)), static.fit.data_ranges
-        if isinstance(law, ForceLaw):
-            change = volume_change(law, _main_length(records) or 0.0, ranges["pressure"], ranges["contraction"])
-    return fit_fill_stage(fills, geometry, change, progress)
+    return fit_fill_stage(fills, geometry, None if main is None else _volume_change(static, main), progress)
 
 
 def _of_kind(records: Sequence[CampaignRecord], kind: RecordKind) -> list[CampaignRecord]:
@@ -217,37 +212,27 @@ def _check_usable(records: Sequence[CampaignRecord]) -> None:
     )
 
 
+@dataclasses.dataclass(frozen=True)
 class _Steps:
-    """Progress over the stages."""
+    """Progress over the stages, and the known results of some."""
 
-    def __init__(
-        self,
-        progress: Callable[[str, float], None] | None,
-        finished: Callable[[str, object], None] | None,
-        known: Mapping[str, Any],
-    ) -> None:
-        self._progress, self._finished, self._known = progress, finished, known
-        self._total = sum(_WEIGHTS)
+    progress: Callable[[str, float], None] | None
+    finished: Callable[[str, object], None] | None
+    known: Mapping[str, Any]
 
-    def within(self, stage: str) -> Callable[[float], None]:
-        """The progress within a stage, called with its completed fraction."""
+    def show(self, stage: str, fraction: float) -> None:
+        """Report the completed fraction of a stage."""
         number = STAGES.index(stage)
-        before, own = sum(_WEIGHTS[:number]), _WEIGHTS[number]
-
-        def show(fraction: float) -> None:
-            if self._progress is not None:
-                self._progress(stage, (before + own * fraction) / self._total)
-
-        return show
+        if self.progress is not None:
+            self.progress(stage, (sum(_WEIGHTS[:number]) + _WEIGHTS[number] * fraction) / sum(_WEIGHTS))
 
     def fit(self, stage: str, task: Callable[[Callable[[float], None]], T]) -> T:
         """The result of a stage: the known one, or that of the task, which is called with the progress."""
-        result: T = self._known[stage] if stage in self._known else task(self.within(stage))
-        return self.end(stage, result)
+        return self.end(stage, self.known[stage] if stage in self.known else task(partial(self.show, stage)))
 
     def end(self, stage: str, result: T) -> T:
         """Report the end of a stage with its result."""
-        self.within(stage)(1.0)
-        if self._finished is not None:
-            self._finished(stage, result)
+        self.show(stage, 1.0)
+        if self.finished is not None:
+            self.finished(stage, result)
         return result

@@ -22,24 +22,12 @@ USES = {
     RecordKind.ISOMETRIC: "static characteristic",
     RecordKind.ISOTONIC: "static characteristic",
     RecordKind.STATIC: "static characteristic",
-    RecordKind.FILL: "valve, volume",
-    RecordKind.RELEASE: "damping",
+    RecordKind.FILL: "fills and volume",
+    RecordKind.RELEASE: "release",
     RecordKind.CREEP: "creep",
     RecordKind.UNUSED: "nothing",
 }
 """Stages for which the records of each kind are used."""
-_KINDS = {
-    "creep": (RecordKind.CREEP,),
-    "hysteresis": (RecordKind.ISOBARIC,),
-    "static characteristic": tuple(kind for kind in RecordKind if kind.is_static),
-    "fills and volume": (RecordKind.FILL,),
-    "release": (RecordKind.RELEASE,),
-}
-
-
-def count_records(campaign: Campaign, stage: str) -> int:
-    """Return the number of records of the kinds that a stage uses."""
-    return sum(record.kind in _KINDS[stage] for record in campaign.records)
 
 
 def stage_result(stage: CreepStage | FrictionStage | StaticStage | FillStage | ReleaseStage | LeftOutStage) -> str:
@@ -163,7 +151,7 @@ def _overview(
     notes += [f"{name}: {stage.reason}; {stage.remedy}" for name, stage in left_out]
     columns: dict[str, Any] = {
         "stage": [name for name, _ in campaign.stages],
-        "records": [count_records(campaign, name) for name, _ in campaign.stages],
+        "records": [sum(name in USES[record.kind] for record in campaign.records) for name, _ in campaign.stages],
         "identified": TableColumn([not isinstance(stage, LeftOutStage) for _, stage in campaign.stages], brief=False),
         "result": [stage_result(stage) for _, stage in campaign.stages],
     }

@@ -8,7 +8,10 @@ import numpy as np
 from ....core import BLACK, BLUE, DASHES, LINES, RED, AirmuscleError, legend_below, new_figure
 from ....report.chapter import Plot
 from ...segment import level_intervals
+from ..dynamic.dynamic_chapter import draw_residuals, residual_panels, running_extreme
+from ..fit_notes import level_text
 from . import Campaign, CampaignRecord, CreepStage, FillStage, RecordKind, StaticStage
+from .transient import thinned_rows
 
 MAX_LOOPS, MAX_PANELS = 6, 6
 """Maximum number of loops in a figure, and of panels of fills (chosen)."""
@@ -92,33 +95,14 @@ def _draw_loop(axes: Any, campaign: Campaign, record: CampaignRecord) -> None:
     x = factor * recording[swept]
     dots = {"linestyle": "none", "marker": ".", "markersize": 2, "color": BLUE, "alpha": 0.6}
     axes.plot(x, recording["force"], label="measured", **dots)
-    rising = np.argsort(x, kind="stable")
-    axes.fill_between(
-        x[rising], _envelope(prediction.low[rising], np.minimum), _envelope(prediction.high[rising], np.maximum),
-        color=RED, alpha=0.15, linewidth=0, label="95 % band",
-    )  # fmt: skip
+    order = np.argsort(x, kind="stable")
+    low, high = running_extreme(prediction.low[order], np.minimum), running_extreme(prediction.high[order], np.maximum)
+    axes.fill_between(x[order], low, high, color=RED, alpha=0.15, linewidth=0, label="95 % band")
     axes.plot(x, prediction.force, color=RED, linewidth=0.9, label="predicted")
     axes.set_xlabel("pressure [kPa]" if swept == "pressure" else "contraction [%]")
     length = "" if record.resting_length is None else f", {1e3 * record.resting_length:.4g} mm"
     level = record.level
-    axes.set_title("" if level is None else f"{_level_text(*level)}{length}", fontsize=8)
-
-
-def _envelope(values: np.ndarray, extreme: Any, width: int = 9) -> np.ndarray:
-    """Return the running extreme of a band, which has two branches."""
-    padded = np.pad(values, width // 2, mode="edge")
-    result = padded[: values.size]
-    for shift in range(1, width):
-        result = extreme(result, padded[shift : shift + values.size])
-    return np.asarray(result)
-
-
-def _level_text(column: str, value: float) -> str:
-    factor, unit = {"pressure": (1e-3, "kPa"), "force": (1.0, "N"), "contraction": (100.0, "%")}.get(
-        column, (1e3, "mm")
-    )
-    scaled = factor * value
-    return f"{0.0 if abs(scaled) < 5e-3 else scaled:.3g} {unit}"
+    axes.set_title("" if level is None else f"{level_text(*level)}{length}", fontsize=8)
 
 
 def residual_plot(campaign: Campaign) -> Plot | None:
@@ -153,22 +137,14 @@ def residual_plot(campaign: Campaign) -> Plot | None:
 
 def fill_plot(stage: FillStage) -> Plot:
     """Return the pressures of all fills with the joint fit, and the residuals below."""
-    shown = list(range(len(stage.records)))[:MAX_PANELS]
-    figure, panels = new_figure(
-        2, len(shown), width=min(7.6, 2.6 + 1.9 * len(shown)), height=3.9, squeeze=False, sharex="col", sharey="row",
-        height_ratios=(2, 1),
-    )  # fmt: skip
-    for column, i in enumerate(shown):
-        upper, lower = panels[:, column]
+    shown = min(len(stage.records), MAX_PANELS)
+    figure, panels = residual_panels(shown, width=min(7.6, 2.6 + 1.9 * shown), height=3.9, sharey="row")
+    for i, column in enumerate(panels.T):
         recording, sensor = stage.experiments[i].recording, stage.fit.problem.record_models[i].names[0]
-        time, modelled = recording["time"], stage.fit.modelled(i)[sensor]
-        dots = {"linestyle": "none", "marker": ".", "markersize": 2.5, "color": BLUE}
-        upper.plot(time, 1e-3 * recording["pressure"], label="measured", **dots)
-        upper.plot(time, 1e-3 * modelled, color=RED, linewidth=1.0, label="joint fit")
-        lower.plot(time, 1e-3 * (modelled - recording["pressure"]), **dots)
-        lower.axhline(0.0, color=BLACK, linewidth=0.8)
-        upper.set_title(f"contraction {_level_text('contraction', float(stage.contractions[i]))}", fontsize=8)
-        lower.set_xlabel("time [s]")
+        measured, modelled = 1e-3 * recording["pressure"], 1e-3 * stage.fit.modelled(i)[sensor]
+        draw_residuals(column, recording["time"], measured, modelled, "joint fit")
+        column[0].set_title(f"contraction {level_text('contraction', float(stage.contractions[i]))}", fontsize=8)
+        column[1].set_xlabel("time [s]")
     panels[0, 0].set_ylabel("pressure [kPa]")
     panels[1, 0].set_ylabel("residual [kPa]")
     legend_below(figure, panels[0, 0])
@@ -191,6 +167,4 @@ def creep_plot(stage: CreepStage) -> Plot:
 def _spread(records: Sequence[CampaignRecord], count: int) -> list[CampaignRecord]:
     """Return at most `count` records, at evenly spaced places in the order of resting length and level."""
     ordered = sorted(records, key=lambda r: (r.resting_length or 0.0, r.level[1] if r.level else 0.0))
-    if not ordered:
-        return []
-    return [ordered[i] for i in np.unique(np.linspace(0, len(ordered) - 1, min(count, len(ordered))).astype(int))]
+    return [ordered[i] for i in thinned_rows(len(ordered), count)]

@@ -11,7 +11,7 @@ from ....recording import Recording
 from ..hysteresis import fit_creep
 from ..hysteresis.creep import MIN_RATIO, CreepFit
 from .record import CampaignRecord
-from .transient import LeftOutStage, displacement, find_motion, thin
+from .transient import LeftOutStage, displacement, find_motion, thinned_rows
 
 NAME = "creep"
 FIT_ROWS = 400
@@ -39,17 +39,22 @@ class CreepStage(ShortRepr):
     @property
     def verdict(self) -> str:
         """The elements and their agreement with the holds, as sentences."""
-        pairs = zip(self.elements.stiffnesses, self.elements.relaxation_times, strict=True)
-        text = " and ".join(f"{k:.4g} N/m with {tau:.4g} s" for k, tau in pairs)
-        if not text:
+        if not self.elements.stiffnesses:
             return "The holds justify no creep."
-        verdict = f"Maxwell elements of {text}, from {len(self.holds)} holds; rms residual {self.rmse:.3g} N."
-        if max(self.elements.relaxation_times) > self.longest / 2:
+        holds = f"{len(self.holds)} holds; rms residual {self.rmse:.3g} N."
+        verdict, slowest = f"{describe_elements(self.elements)}, from {holds}", max(self.elements.relaxation_times)
+        if slowest > self.longest / 2:
             verdict += (
                 f" The holds of {self.longest:.4g} s are too short for the longest relaxation time; hold for "
-                f"{6 * max(self.elements.relaxation_times):.2g} s to determine it."
+                f"{6 * slowest:.2g} s to determine it."
             )
         return verdict
+
+
+def describe_elements(elements: CreepElements) -> str:
+    """Stiffness and relaxation time of each element, as a phrase."""
+    pairs = zip(elements.stiffnesses, elements.relaxation_times, strict=True)
+    return f"Maxwell elements of {' and '.join(f'{k:.4g} N/m with {tau:.4g} s' for k, tau in pairs)}"
 
 
 def fit_creep_stage(records: Sequence[CampaignRecord]) -> CreepStage | LeftOutStage:
@@ -108,11 +113,9 @@ class HeldRows:
                 f"{DEADTIME:g} s in which load cell and frame settle; hold longer."
             )
         start = int(np.argmax(later))
-        rows = np.arange(start, len(whole))
-        kept = rows[np.unique(np.linspace(0, rows.size - 1, min(FIT_ROWS, rows.size)).round().astype(int))]
-        path = displacement(whole)
+        kept, path = start + thinned_rows(len(whole) - start, FIT_ROWS), displacement(whole)
         path = np.where(np.arange(path.size) < start, path, np.median(path[start:]))  # no motion by the noise
-        return cls(thin(whole.rows(slice(start, None)), FIT_ROWS), whole["time"], path, kept)
+        return cls(whole.rows(kept), whole["time"], path, kept)
 
     def stretches(self, times: Array) -> Array:
         """Stretch [m] of the spring of each element at the held rows, shape (N, E)."""

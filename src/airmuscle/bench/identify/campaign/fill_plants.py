@@ -9,7 +9,7 @@ from ....physics.mechanism import Isometric
 from ....physics.muscle import Muscle
 from ....physics.muscle.geometry import Vessel
 from ....physics.plant.plant import Plant
-from ....physics.pneumatics import Circuit, EnergyBalance, FillDischarge, Supply, Tube, Valve, WithTubes
+from ....physics.pneumatics import EnergyBalance, FillDischarge, Supply, Tube, Valve, WithTubes
 from ..dynamic import stated_ambient
 from .record import CampaignRecord
 
@@ -38,10 +38,10 @@ def vessel_plant(record: CampaignRecord) -> Plant:
     )
 
 
-def circuit_of(plant: object) -> Circuit:
-    """The one circuit of a plant."""
+def plant_of(plant: object) -> Plant:
+    """The plant of a fill, which the records of a fit keep as any system."""
     assert isinstance(plant, Plant)
-    return plant.circuits[0]
+    return plant
 
 
 def valves_of(circuit: object) -> FillDischarge:
@@ -51,16 +51,15 @@ def valves_of(circuit: object) -> FillDischarge:
     return valves
 
 
-def rescaled(plant: object, scale: float) -> Plant:
+def rescaled(plant: Plant, scale: float) -> Plant:
     """The plant with its conductances, heat transfer and volumes of supply and tube multiplied by the scale."""
-    assert isinstance(plant, Plant)
-    values = [leaf.value for leaf in tree.leaves(plant)]
-    for i, leaf in enumerate(tree.leaves(plant)):
-        if leaf.path == HEAT_TRANSFER:
-            values[i] = float(np.clip(leaf.value * scale, *HEAT_TRANSFER_BOUNDS))
-        elif leaf.path.startswith("circuit.") and leaf.path.endswith(("conductance", "volume")):
-            values[i] = leaf.value * scale
-    changed: Plant = tree.with_parameters(plant, values)
+    values = {leaf.path: leaf.value for leaf in tree.leaves(plant)}
+    for path, value in values.items():
+        if path == HEAT_TRANSFER:
+            values[path] = float(np.clip(value * scale, *HEAT_TRANSFER_BOUNDS))
+        elif path.startswith("circuit.") and path.endswith(("conductance", "volume")):
+            values[path] = value * scale
+    changed: Plant = tree.with_parameters(plant, list(values.values()))
     return changed
 
 
@@ -73,22 +72,20 @@ def at_record(plant: Plant, record: CampaignRecord, volume: float) -> Plant:
     )  # fmt: skip
 
 
-def tube_guess(plant: object) -> Tube:
+def tube_guess(plant: Plant) -> Tube:
     """Initial guess of a tube for a plant without one (chosen): a tenth of its volume, twice the conductance."""
-    assert isinstance(plant, Plant)
     valve = valves_of(plant.circuit).fill
     assert isinstance(valve, Valve)
     volume = min(max(0.1 * volume_at_rest(plant), 1e-9), 1e-2)
     return Tube(Valve(2.0 * valve.conductance, 0.3), volume)
 
 
-def volume_at_rest(plant: object) -> float:
+def volume_at_rest(plant: Plant) -> float:
     """Volume of the first muscle of a plant at its resting length [m3]."""
-    assert isinstance(plant, Plant)
     return float(plant.muscles[0].geometry.volume(0.0))
 
 
-def sensor_of(plant: object) -> str:
+def sensor_of(plant: Plant) -> str:
     """The output at the pressure sensor of a plant, which is behind the valves: in the first segment of a tube."""
-    circuit = plant.circuit if isinstance(plant, Plant) else None
+    circuit = plant.circuit
     return f"{circuit.tube.prefixes[0]}pressure" if isinstance(circuit, WithTubes) else "pressure"

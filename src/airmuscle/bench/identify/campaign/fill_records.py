@@ -11,8 +11,7 @@ from ....physics.plant.plant import Plant
 from ....physics.pneumatics import Circuit, Tank, Valve, WithTubes
 from ...baselines import ARX, PERSISTENCE, TimedRecord, baseline_errors, skill
 from .. import dynamic
-from ..result import Estimate
-from .fill_plants import HEAT_TRANSFER, HEAT_TRANSFER_BOUNDS, sensor_of, valves_of
+from .fill_plants import HEAT_TRANSFER, HEAT_TRANSFER_BOUNDS, plant_of, sensor_of, valves_of, volume_at_rest
 from .record import CampaignRecord
 from .transient import thin
 
@@ -36,12 +35,10 @@ class ValveUnknowns:
     tube: bool = False
 
     @classmethod
-    def of(cls, records: Sequence[CampaignRecord], plant: object = None, common_ratio: str = "") -> "ValveUnknowns":
+    def of(cls, records: Sequence[CampaignRecord], plant: object, common_ratio: str = "") -> "ValveUnknowns":
         """The valves through which the air of these records flows, with the supply and the tube of a plant."""
-        changes = [step.change for record in records for step in record.steps]
-        circuits = plant.circuits if isinstance(plant, Plant) else ()
-        sinks = any(isinstance(valves_of(circuit).supply, Tank) for circuit in circuits)
-        tube = any(isinstance(circuit, WithTubes) for circuit in circuits)
+        changes, circuit = [step.change for record in records for step in record.steps], plant_of(plant).circuit
+        sinks, tube = isinstance(valves_of(circuit).supply, Tank), isinstance(circuit, WithTubes)
         return cls(any(c > 0 for c in changes), any(c < 0 for c in changes), common_ratio, sinks, tube)
 
     @property
@@ -82,21 +79,13 @@ class ValveUnknowns:
 
 def poor_ratios(fit: dynamic.DynamicFit) -> str:
     """The critical ratios that a fit does not determine, as a sentence; empty if there are none."""
-    poor = [
-        e
-        for e in fit.estimates
-        if e.name.endswith(RATIO) and "orifice" not in e.name and (e.on_bound or not e.stderr <= MAX_RATIO_ERROR)
-    ]
-    if not poor:
-        return ""
-    parts = [f"{estimate.name.split('.')[-2]} valve ({_reason(estimate)})" for estimate in poor]
-    return f"The records do not determine the critical ratio of the {' and the '.join(parts)}."
-
-
-def _reason(estimate: Estimate) -> str:
-    if estimate.on_bound:
-        return f"on its bound, {estimate.value:.3g}"
-    return f"standard error {estimate.stderr:.2g}" if np.isfinite(estimate.stderr) else "it has no effect on them"
+    poor = []
+    for e in (e for e in fit.estimates if e.name.endswith(RATIO) and "orifice" not in e.name):
+        reason = f"standard error {e.stderr:.2g}" if np.isfinite(e.stderr) else "it has no effect on them"
+        reason = f"on its bound, {e.value:.3g}" if e.on_bound else reason
+        if e.on_bound or not e.stderr <= MAX_RATIO_ERROR:
+            poor.append(f"{e.name.split('.')[-2]} valve ({reason})")
+    return f"The records do not determine the critical ratio of the {' and the '.join(poor)}." if poor else ""
 
 
 TUBE_STARTS = 16
@@ -120,19 +109,16 @@ def instant_margin(records: Sequence[CampaignRecord]) -> float:
 
 def with_supply_volume(experiment: dynamic.Experiment) -> dynamic.Experiment:
     """The experiment with a volume before its valve that is fed from the supply; initial guess (chosen)."""
-    plant = experiment.plant
-    assert isinstance(plant, Plant)
+    plant = plant_of(experiment.plant)
     circuit = valves_of(plant.circuit)
     assert isinstance(circuit.fill, Valve)
-    feed = Valve(3.0 * circuit.fill.conductance, 0.3)
-    tank = Tank(circuit.supply, feed, 3.0 * float(plant.muscles[0].geometry.volume(0.0)))
+    tank = Tank(circuit.supply, Valve(3.0 * circuit.fill.conductance, 0.3), 3.0 * volume_at_rest(plant))
     return with_circuit(experiment, dataclasses.replace(circuit, supply=tank))
 
 
 def with_circuit(experiment: dynamic.Experiment, circuit: Circuit) -> dynamic.Experiment:
     """The experiment with another circuit; the recorded pressure is that behind the valves."""
-    assert isinstance(experiment.plant, Plant)
-    plant = dataclasses.replace(experiment.plant, circuit=circuit)
+    plant = dataclasses.replace(plant_of(experiment.plant), circuit=circuit)
     initial = dynamic.InitialConditions.at_rest(plant, experiment.initial_conditions.known["pressure"])
     recording = experiment.recording.with_columns(**{sensor_of(plant): experiment.recording["pressure"]})
     return dataclasses.replace(experiment, recording=recording, plant=plant, initial_conditions=initial)
@@ -145,10 +131,9 @@ TUBE_AREA = math.pi * 0.002**2
 def describe_tube(fit: dynamic.DynamicFit) -> str:
     """The tube between valves and muscle, as a sentence."""
     volume, conductance = fit[TUBE_VOLUME], fit[TUBE_CONDUCTANCE]
-    plant = fit.plant()
-    assert isinstance(plant, Plant)
-    assert isinstance(plant.circuit, WithTubes)
-    count = plant.circuit.tube.segment_count
+    circuit = plant_of(fit.plant()).circuit
+    assert isinstance(circuit, WithTubes)
+    count = circuit.tube.segment_count
     along = f"fills along its length ({count} segments by AICc)" if count > 1 else "fills evenly (one segment by AICc)"
     return (
         f"A tube between valves and muscle, with the pressure sensor at the valves, {along}: its volume of "
@@ -205,8 +190,7 @@ def fit_pressure(
     own: tuple[str, ...] = (),
 ) -> dynamic.DynamicFit:  # fmt: skip
     """A fit with the heat transfer, and own instants of the valve commands, because the detected ones are inexact."""
-    first, margin = experiments[0].plant, instant_margin(records)
-    assert first is not None
+    first, margin = plant_of(experiments[0].plant), instant_margin(records)
     return dynamic.fit_dynamic(
         first, experiments, free=(HEAT_TRANSFER, *free), observed={sensor_of(first): pressure_deviation(records)},
         per_record=(*own, dynamic.StartTime(margin), dynamic.CommandInstants(margin)),

@@ -61,9 +61,7 @@ class FillStage(ShortRepr):
     @property
     def circuit(self) -> FillDischarge:
         """The circuit with the fitted valves and supply, without a tube."""
-        plant = self.fit.plant()
-        assert isinstance(plant, Plant)
-        return plants.valves_of(plant.circuit)
+        return plants.valves_of(plants.plant_of(self.fit.plant()).circuit)
 
     def commands(self, record: CampaignRecord) -> Mapping[str, Sequence[tuple[float, float]]]:
         """The instants [s] and values of the commands of both valves in a record, with the estimated instants."""
@@ -130,7 +128,8 @@ def fit_fill_stage(
         progress(0.5)
         estimate = None
         if geometry is None:
-            estimate = None if change is None else relative.relate(change)
+            if change is not None:
+                estimate = relate_volumes(*relative.volumes, relative.contractions, change)
             if estimate is None or change is None:
                 return LeftOutStage(NAME, _no_volume(relative.contractions, change), REMEDY)
             geometry, scale = change.geometry(estimate.volume_at_rest), estimate.scale
@@ -167,37 +166,34 @@ class _RelativeFit:
             return fills.fit_pressure(records, experiments, free, (VOLUME,))
 
         experiments = [fills.detected_experiment(record, plants.vessel_plant(record)) for record in records]
-        return cls(_with_supply(records, experiments, fills.ValveUnknowns.of(records), fitted)[0], tuple(records))
+        valves = fills.ValveUnknowns.of(records, experiments[0].plant)
+        return cls(_with_supply(records, experiments, valves, fitted)[0], tuple(records))
 
     @property
     def contractions(self) -> Array:
         return np.array([plants.held_contraction(record) for record in self.records])
 
-    def _volumes(self) -> tuple[Array, Array]:
+    @property
+    def volumes(self) -> tuple[Array, Array]:
         """The relative volumes and their standard errors, shape (K,) each."""
         own = [estimate for estimate in self.fit.estimates if estimate.name.startswith(VOLUME)]
         return np.array([e.value for e in own]), np.array([e.stderr for e in own])
 
-    def relate(self, change: VolumeChange) -> VolumeEstimate | None:
-        return relate_volumes(*self._volumes(), self.contractions, change)
-
     def scale_to(self, geometry: Geometry) -> float:
         """The factor of the relative volumes that makes them those of a geometry."""
         known = np.array([float(geometry.volume(c)) for c in self.contractions])
-        values, _ = self._volumes()
+        values, _ = self.volumes
         return float(known @ values / (values @ values))
 
     def experiments(self, records: Sequence[CampaignRecord], geometry: Geometry, scale: float) -> list[Experiment]:
         """All records with the volumes of a geometry, from the valves and instants of this fit."""
-        found = plants.rescaled(self.fit.plant(), scale)
-        experiments = []
+        found, experiments = plants.rescaled(plants.plant_of(self.fit.plant()), scale), []
         for record in records:
             plant = plants.at_record(found, record, float(geometry.volume(plants.held_contraction(record))))
             experiment = fills.detected_experiment(record, plant)
-            known = record in self.records
-            experiments.append(
-                fills.with_instants(experiment, self.fit, self.records.index(record)) if known else experiment
-            )
+            if record in self.records:
+                experiment = fills.with_instants(experiment, self.fit, self.records.index(record))
+            experiments.append(experiment)
         return experiments
 
 
@@ -264,7 +260,8 @@ def _with_supply(
             continue
         estimate = next(each for each in fit.estimates if each.name.endswith(volume))
         determined = not estimate.on_bound and estimate.stderr <= MAX_VOLUME_ERROR * estimate.value
-        possible = change is _with_volume or estimate.value <= MAX_TUBE_VOLUME * plants.volume_at_rest(fit.plant())
+        muscle = plants.volume_at_rest(plants.plant_of(fit.plant()))
+        possible = change is _with_volume or estimate.value <= MAX_TUBE_VOLUME * muscle
         if determined and possible and max(fills.record_rms(fit)) <= limit:
             return fit, changed, unknowns
     return constant, experiments, valves
@@ -278,12 +275,11 @@ def _with_volume(experiments: Sequence[Experiment], valves: fills.ValveUnknowns,
 
 def _with_tube(experiments: Sequence[Experiment], valves: fills.ValveUnknowns, fitted: Fitted) -> Supplied:
     """The fit with a tube between valves and muscle, whose number of segments AICc chooses."""
-    unknowns, plant = dataclasses.replace(valves, tube=True), experiments[0].plant
-    assert isinstance(plant, Plant)
+    unknowns, plant = dataclasses.replace(valves, tube=True), plants.plant_of(experiments[0].plant)
 
-    def divided(plant: object) -> list[Experiment]:
-        return [fills.with_circuit(each, plants.circuit_of(plant)) for each in experiments]
+    def divided(changed: Plant) -> list[Experiment]:
+        return [fills.with_circuit(each, changed.circuits[0]) for each in experiments]
 
     guess = dataclasses.replace(plant, circuit=WithTubes(plants.valves_of(plant.circuit), plants.tube_guess(plant)))
     fit = fit_tube(guess, lambda changed, _: fitted(divided(changed), unknowns))
-    return fit, divided(fit.problem.record_models[0].plant), unknowns
+    return fit, divided(plants.plant_of(fit.plant())), unknowns

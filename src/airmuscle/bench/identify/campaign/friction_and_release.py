@@ -1,6 +1,7 @@
 """Friction of all loops of a campaign, dependent on the pressure; damping by the quick releases of a hanging load."""
 
 import dataclasses
+import itertools
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from typing import Any
@@ -22,7 +23,7 @@ from ..candidates import evaluate_force
 from ..dynamic import DynamicFit, Experiment, InitialConditions, StartTime, fit_dynamic, stated_ambient
 from .creep_stage import creep_force
 from .record import CampaignRecord, RecordKind
-from .transient import PREDICTED_ROWS, LeftOutStage, displacement, find_motion, held_steady, path_rows, thin, with_force
+from .transient import LeftOutStage, displacement, find_motion, held_steady, path_rows, thin, thinned_rows, with_force
 
 NAME = "release"
 FIT_ROWS = 300
@@ -76,24 +77,22 @@ def fit_release_stage(records: Sequence[CampaignRecord], muscle: Muscle | None) 
         return LeftOutStage(NAME, "no record is a release", REMEDY)
     if muscle is None:
         return LeftOutStage(NAME, "the enclosed volume of the muscle is not known", "identify the volume from fills")
-    usable = [record for record in records if _mass(record) is not None]
-    if not usable:
+    masses = {record: mass for record in records if (mass := _mass(record)) is not None}
+    if not masses:
         return LeftOutStage(
             NAME, "the moving mass is neither stated nor determined by a force at the end", "state the mass in the file"
         )
-    masses = tuple(float(_mass(record) or 0.0) for record in usable)
     try:
-        experiments = [_experiment(record, muscle, mass) for record, mass in zip(usable, masses, strict=True)]
-        first = experiments[0].plant
-        assert first is not None
-        deviations = {name: _deviation(usable, name) for name in ("position", "pressure")}
+        plants = [_plant(record, muscle, mass) for record, mass in masses.items()]
+        experiments = [_experiment(record, plant) for record, plant in zip(masses, plants, strict=True)]
+        deviations = {name: _deviation(list(masses), name) for name in ("position", "pressure")}
         fit = fit_dynamic(
-            first, experiments, free=(DAMPING, "gas.exponent"), observed=deviations,
+            plants[0], experiments, free=(DAMPING, "gas.exponent"), observed=deviations,
             per_record=(StartTime(0.02),), bounds={DAMPING: (0.1, 1e5)},
         )  # fmt: skip
     except AirmuscleError as error:
         return LeftOutStage(NAME, str(error.message), REMEDY)
-    return ReleaseStage(fit, tuple(usable), masses)
+    return ReleaseStage(fit, tuple(masses), tuple(masses.values()))
 
 
 def _mass(record: CampaignRecord) -> float | None:
@@ -115,28 +114,27 @@ def _deviation(records: Sequence[CampaignRecord], name: str) -> float:
     return max([MIN_DEVIATIONS[name], *values])
 
 
-def _experiment(record: CampaignRecord, muscle: Muscle, mass: float) -> Experiment:
+def _plant(record: CampaignRecord, muscle: Muscle, mass: float) -> Plant:
+    mechanism, ambient = WithLatch(HangingMass(mass)), stated_ambient(record.recording)
+    damped = dataclasses.replace(muscle, damper=LinearDamper(INITIAL_DAMPING))
+    return Plant(damped, ClosedChamber(), mechanism, gas=Polytropic(1.2), ambient=ambient)
+
+
+def _experiment(record: CampaignRecord, plant: Plant) -> Experiment:
     whole = record.recording
-    motion = find_motion(whole)
+    motion, path = find_motion(whole), displacement(whole)
     assert motion is not None
-    path = displacement(whole)
-    before = whole["time"] < motion.start
-    count = max(int(before.sum()), 3)
-    plant = Plant(
-        dataclasses.replace(muscle, damper=LinearDamper(INITIAL_DAMPING)),
-        ClosedChamber(),
-        WithLatch(HangingMass(mass)),
-        gas=Polytropic(1.2),
-        ambient=stated_ambient(whole),
-    )
-    rest = {"position": float(np.median(path[:count])), "speed": 0.0}
-    conditions = InitialConditions.at_coordinates(plant, float(np.median(whole["pressure"][:count])), **rest)
+    count = max(int((whole["time"] < motion.start).sum()), 3)
+    pressure, position = (float(np.median(column[:count])) for column in (whole["pressure"], path))
+    conditions = InitialConditions.at_coordinates(plant, pressure, position=position, speed=0.0)
     recording = thin(whole.with_columns(position=path), FIT_ROWS)
     command = Schedule({"latched": ((0.0, 0.0),)})
     return Experiment(recording, command, conditions, max(motion.start - 0.005, float(whole["time"][0])), plant)
 
 
 NAME = "hysteresis"
+PREDICTED_ROWS = 3000
+"""Maximum number of rows of a record for which the friction is computed (chosen)."""
 MAX_LOOPS = 6
 """Maximum number of loops that are fitted; of more, those at evenly spaced pressures (chosen)."""
 
@@ -187,13 +185,10 @@ def fit_friction_stage(
         )
     kept = _spread(loops)
     fits = DistributedCalls(executor, _fit_loop, None).results(kept, lambda done: progress(0.5 * done / len(kept)))
-    count = [0]
-
-    def advance(_: str) -> None:
-        count[0] += 1
-        progress(0.5 + 0.5 * min(count[0] / 5.0, 1.0))
-
-    joint = hysteresis.fit_jointly(fits, progress=advance, workers=executor or 1)
+    laws = itertools.count(1)
+    joint = hysteresis.fit_jointly(
+        fits, progress=lambda _: progress(0.5 + 0.5 * min(next(laws) / 5.0, 1.0)), workers=executor or 1
+    )
     best = hysteresis.preferred_fit(joint)
     return FrictionStage(_friction(best, fits), tuple(fits), joint, len(loops) - len(kept))
 
@@ -235,8 +230,7 @@ def _find_loops(
 def _spread(loops: Sequence[hysteresis.HysteresisLoop]) -> list[hysteresis.HysteresisLoop]:
     """At most `MAX_LOOPS` loops, at evenly spaced places in the order of their pressure."""
     ordered = sorted(loops, key=lambda loop: loop.run.constant_value or 0.0)
-    places = np.unique(np.linspace(0, len(ordered) - 1, min(MAX_LOOPS, len(ordered))).round().astype(int))
-    return [ordered[i] for i in places]
+    return [ordered[i] for i in thinned_rows(len(ordered), MAX_LOOPS)]
 
 
 def friction_along(friction: Friction, recording: Recording) -> Array:

@@ -11,7 +11,7 @@ from ....physics.muscle.characteristic.base import ForceLaw
 from ....recording import Recording
 from ...segment.runs import CONTRACTION_BAND
 from ..hysteresis import Hold, creep_elements, find_holds, fit_creep
-from .creep_stage import CreepStage, HeldRows, creep_force, fit_held_rows
+from .creep_stage import CreepStage, HeldRows, creep_force, describe_elements, fit_held_rows
 from .transient import LeftOutStage, with_force
 
 MAX_MOTION = 0.3
@@ -47,6 +47,11 @@ def fit_held_creep(recordings: Sequence[Recording], *, law: ForceLaw | None = No
         if hold is None:
             continue
         try:
+            if not _has_path(recording):
+                raise IdentificationError(
+                    f"{recording.origin}: creep elements need the resting length and the time; the contraction alone "
+                    "gives no stiffness."
+                )
             if hold.quantity == "force":
                 held.append((recording.origin, _held_rows(recording, hold)))
             else:
@@ -82,7 +87,6 @@ def _sentence(recording: Recording, hold: Hold | None) -> str:
 
 def _held_rows(recording: Recording, hold: Hold) -> HeldRows:
     """The rows up to the end of the hold. Raises IdentificationError without a motion before it."""
-    _check_path(recording)
     before = recording["contraction"][: hold.interval.start + 1]
     if float(np.ptp(before)) <= CONTRACTION_BAND:
         raise IdentificationError(
@@ -93,17 +97,8 @@ def _held_rows(recording: Recording, hold: Hold) -> HeldRows:
     return HeldRows.after(recording.rows(slice(0, hold.interval.stop)), start)
 
 
-def _check_path(recording: Recording) -> None:
-    if not _has_path(recording):
-        raise IdentificationError(
-            f"{recording.origin}: creep elements need the resting length and the time; the contraction alone gives no "
-            "stiffness."
-        )
-
-
 def _elements_under_load(recording: Recording, hold: Hold, law: ForceLaw | None) -> tuple[float, str, CreepElements]:
     """Duration [s], origin and elements of a hold under a constant load."""
-    _check_path(recording)
     if law is None:
         raise IdentificationError(
             f"{recording.origin}: the creep under a constant load needs the stiffness of the muscle, that is, its "
@@ -152,9 +147,7 @@ def _select(
     usable = [each for each in loaded if each[2].stiffnesses]
     if usable:
         _, origin, elements = max(usable, key=lambda each: each[0])
-        pairs = zip(elements.stiffnesses, elements.relaxation_times, strict=True)
-        text = " and ".join(f"{k:.4g} N/m with {tau:.4g} s" for k, tau in pairs)
-        verdict = f"Maxwell elements of {text}, from the hold of {origin} under a constant load."
+        verdict = f"{describe_elements(elements)}, from the hold of {origin} under a constant load."
         return HeldCreep(sentences, elements, verdict, np.full(2 * len(elements.stiffnesses), np.nan))
     causes = [*([stage.verdict] if stage is not None else []), *reasons]
     if not causes:

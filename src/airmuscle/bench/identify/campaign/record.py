@@ -11,8 +11,9 @@ import numpy.typing as npt
 from ....core import Array, ShortRepr
 from ....recording import Recording
 from ...segment import Inspection, Sensor, estimate_sensors, inspect, inspect_all, quasi_static_rows
-from ...segment.interval import true_intervals
+from ...segment.interval import Interval, true_intervals
 from ...segment.runs import AT_REST, CONTRACTION_BAND, ISOBARIC, ISOMETRIC, ISOTONIC, RELATIVE_BAND, Run
+from ..hysteresis.loops import describe_run, rows_of
 from .transient import MIN_STEP, PressureStep, find_motion, find_pressure_steps
 
 RowMask = npt.NDArray[np.bool_]
@@ -111,15 +112,7 @@ def _long_runs(record: CampaignRecord) -> list[Recording]:
     """The rows of each long run of a record with time; empty unless there are several."""
     recording = record.recording
     runs = [run for run in record.inspection.runs if len(run.interval) >= MIN_RUN_ROWS and run.constant_column]
-    if "time" not in recording or len(runs) < 2:
-        return []
-    return [
-        dataclasses.replace(
-            recording.rows(run.interval.rows),
-            origin=f"{recording.origin}, rows {run.interval.start + 1} to {run.interval.stop}",
-        )
-        for run in runs
-    ]
+    return [rows_of(recording, run.interval) for run in runs] if "time" in recording and len(runs) > 1 else []
 
 
 def _cut_at_levels(record: CampaignRecord, sensors: Mapping[str, Sensor]) -> list[CampaignRecord]:
@@ -142,8 +135,7 @@ def _cut_at_levels(record: CampaignRecord, sensors: Mapping[str, Sensor]) -> lis
     for (_, begin, end), (value, _, stop) in itertools.pairwise(levels):
         start = max(begin, end - max(MIN_ROWS, (end - begin) // 4))  # without the end of the step before
         if min(abs(value - low), abs(value - high)) <= margin:
-            origin = f"{recording.origin}, rows {start + 1} to {stop}"
-            part = _classify(inspect(dataclasses.replace(recording.rows(slice(start, stop)), origin=origin), sensors))
+            part = _classify(inspect(rows_of(recording, Interval(start, stop)), sensors))
             parts += [part] if part.kind is RecordKind.FILL else []
     reason = (
         f"{len(levels) - 1 - len(parts)} of {len(levels) - 1} pressure steps at a held length end between the lowest "
@@ -193,7 +185,7 @@ def _classify_static(inspection: Inspection) -> CampaignRecord:
         return CampaignRecord(recording, RecordKind.UNUSED, reason, inspection)
     kind = _KINDS.get(run.kind, RecordKind.STATIC)
     count = "" if len(inspection.runs) == 1 else f"{len(inspection.runs)} runs, the longest "
-    reason = f"{count}{_describe(run)}" if kind is not RecordKind.STATIC else "slow, with no constant quantity"
+    reason = f"{count}{describe_run(run)}" if kind is not RecordKind.STATIC else "slow, with no constant quantity"
     return CampaignRecord(recording, kind, reason, inspection)
 
 
@@ -218,15 +210,6 @@ def _unusable(recording: Recording) -> str:
     if not np.isfinite(recording["pressure"]).all():
         return "values of the pressure are missing"
     return ""
-
-
-def _describe(run: Run) -> str:
-    units = {"pressure": (1e-3, "kPa"), "contraction": (100.0, "%"), "length": (1e3, "mm"), "force": (1.0, "N")}
-    if run.constant_column is None or run.constant_value is None:
-        return run.kind.name
-    factor, unit = units.get(run.constant_column, (1e3, "mm"))
-    value = run.constant_value * factor
-    return f"{run.kind.name} at {0.0 if abs(value) < 5e-3 else value:.3g} {unit}"
 
 
 def _longest(runs: Sequence[Run]) -> Run | None:

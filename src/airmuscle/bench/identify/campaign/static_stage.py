@@ -68,24 +68,23 @@ class ErrorBand:
 
 def calibrate(fit: Fit, points: Sequence[Recording], records: Sequence[CampaignRecord]) -> tuple[ErrorBand, ...]:
     """The band for further runs of the measured muscles, and that for other lengths if there are three or more."""
-    max_force = FORCE_MARGIN * max(float(np.nanmax(run["force"])) for run in points)
-    lengths = [_length(run) for run in points]
-    levels = [record.level for record in records]
     bands: list[ErrorBand] = []
-    for purpose, labels in (
-        ("further pressures and speeds of the measured muscles", _inner(levels)),
-        ("other lengths of the same type", _inner(lengths)),
+    for purpose, levels in (
+        ("further pressures and speeds of the measured muscles", [record.level for record in records]),
+        ("other lengths of the same type", [_length(run) for run in points]),
     ):
-        residuals, groups = _left_out_residuals(fit, points, labels, max_force)
-        if groups:
-            band = _band(purpose, residuals, groups)
-            widest = max(
-                [band.half_width, *(other.half_width for other in bands)]
-            )  # other lengths are further runs too
-            bands.append(dataclasses.replace(band, half_width=widest))
+        residuals, groups = _left_out_residuals(fit, points, _inner(levels))
+        if groups:  # other lengths are further runs, too
+            least = max((other.half_width for other in bands), default=0.0)
+            bands.append(_band(purpose, residuals, groups, least))
     if not bands:
-        bands.append(_band("the rows of the fit", force_residuals(fit.model, points, max_force), 0))
+        bands.append(_band("the rows of the fit", force_residuals(fit.model, points, force_limit(points)), 0))
     return tuple(bands)
+
+
+def force_limit(points: Sequence[Recording]) -> float:
+    """Limit [N] of the force of laws that give contraction or pressure."""
+    return FORCE_MARGIN * max(float(np.nanmax(run["force"])) for run in points)
 
 
 def calibrate_held(
@@ -99,18 +98,15 @@ def calibrate_held(
     labels = [("kind", 0) if record.kind is RecordKind.ISOMETRIC else None for record in records]
     if None not in labels or ("kind", 0) not in labels:
         return None
-    max_force = FORCE_MARGIN * max(float(np.nanmax(run["force"])) for run in points)
-    residuals, groups = _left_out_residuals(fit, points, labels, max_force, share=1.0)
-    if not groups:
-        return None
-    own = _band("further isometric runs", residuals, groups)
-    return dataclasses.replace(own, half_width=max(own.half_width, band.half_width))
+    residuals, groups = _left_out_residuals(fit, points, labels, share=1.0)
+    return _band("further isometric runs", residuals, groups, band.half_width) if groups else None
 
 
-def _band(purpose: str, residuals: Array, groups: int) -> ErrorBand:
+def _band(purpose: str, residuals: Array, groups: int, least: float = 0.0) -> ErrorBand:
+    """The band of these residuals [N], with a half width of at least `least` [N]."""
     size = residuals.size
     share = min(np.ceil((size + 1) * LEVEL) / size, 1.0)
-    half = float(np.quantile(np.abs(residuals), share))
+    half = max(float(np.quantile(np.abs(residuals), share)), least)
     return ErrorBand(purpose, half, float(np.sqrt(np.mean(residuals**2))), size, groups)
 
 
@@ -134,11 +130,10 @@ def _inner(values: Sequence[tuple[str, float] | None]) -> list[tuple[str, int] |
 
 
 def _left_out_residuals(
-    fit: Fit, points: Sequence[Recording], labels: Sequence[tuple[str, int] | None], max_force: float,
-    share: float = SHARE_OF_ERROR,
-) -> tuple[Array, int]:  # fmt: skip
+    fit: Fit, points: Sequence[Recording], labels: Sequence[tuple[str, int] | None], share: float = SHARE_OF_ERROR
+) -> tuple[Array, int]:
     """The residuals [N] at the rows of each group, with the share of the error without it; and the number of groups."""
-    residuals, count = [np.zeros(0)], 0
+    residuals, count, max_force = [np.zeros(0)], 0, force_limit(points)
     fixed = tuple(leaf.path for i, leaf in enumerate(fit.problem.leaves) if i not in set(fit.problem.free))
     for label in dict.fromkeys(label for label in labels if label is not None):
         training = [run for run, own in zip(points, labels, strict=True) if own != label]

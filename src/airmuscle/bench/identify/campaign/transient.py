@@ -27,8 +27,6 @@ class LeftOutStage:
 
 MAX_ROWS = 1000
 """Maximum number of rows of a record for a fit of friction (chosen)."""
-PREDICTED_ROWS = 3000
-"""Maximum number of rows of a record for which the friction is computed (chosen)."""
 NOISE_STEPS = 4.0
 """Mean step of the displacement between two rows, in standard deviations of its noise (chosen)."""
 NOISE_RANGE = 8.0

@@ -113,8 +113,3 @@ def relate_volumes(
     errors = np.sqrt(np.square(inverse) @ variance)
     rms = float(np.sqrt(np.mean(residuals**2))) if freedom else 0.0
     return VolumeEstimate(float(scale), float(errors[0]), float(volume), float(errors[1]), rms)
-
-
-def scaled_to_length(volume_at_rest: float, length: float, other: float) -> float:
-    """Volume at rest [m3] of a muscle of another length: proportional to the length (chosen)."""
-    return volume_at_rest * other / length

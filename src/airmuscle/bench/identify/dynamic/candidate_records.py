@@ -60,11 +60,14 @@ def candidate_records(fit: DynamicFit) -> tuple[CandidateRecord, ...]:
     experiment, start = model.experiment, model.start_time(fit.values)
     begun = dataclasses.replace(experiment, plant=plant, start_time=0.0)
     times = model.times - start
-    candidates = [CandidateRecord("a repeat of the record", _with_times(begun, times, model.names))]
+    candidates = [
+        CandidateRecord("a repeat of the record", _with_times(begun, times, model.names)),
+        CandidateRecord(f"the same record, {LONGER:g} times as long", _with_times(begun, LONGER * times, model.names)),
+    ]
     pressure = float(experiment.initial_conditions.known.get("pressure", 0.0))
     identified = frozenset(path for unknown in fit.unknowns for path in unknown.paths)
     context = _Context(plant, begun, times, model.names, pressure, identified)
-    candidates += [*context.longer(), *context.supplies(), *context.lengths()]
+    candidates += [*context.supplies(), *context.lengths()]
     if isinstance(plant.circuit, FillDischarge) and len(plant.muscles) == 1:
         candidates += [*context.valve_records(plant.circuit), *context.tank(plant.circuit)]
     return tuple(candidates)
@@ -80,10 +83,6 @@ class _Context:
     names: tuple[str, ...]
     pressure: float
     identified: frozenset[str]
-
-    def longer(self) -> Iterator[CandidateRecord]:
-        text = f"the same record, {LONGER:g} times as long"
-        yield CandidateRecord(text, _with_times(self.experiment, LONGER * self.times, self.names))
 
     def supplies(self) -> Iterator[CandidateRecord]:
         """The same record from other supply pressures, which are measured."""
@@ -112,9 +111,9 @@ class _Context:
         """A discharge, a fill that stops halfway, and a fill through a throttle."""
         end, high = float(self.times[-1]), float(tree.flatten(circuit.supply)[0])
         discharge = self._of(self.plant, Schedule({"discharge": ((0.0, 1.0),)}), high)
-        yield CandidateRecord(
-            "a discharge from the supply pressure", discharge, self._unidentified("circuit.discharge")
-        )
+        flow = [each.path for each in tree.leaves(self.plant) if each.path.startswith("circuit.discharge.")]
+        unknown = tuple(path for path in flow if path.endswith(VALVE_PARAMETERS) and path not in self.identified)
+        yield CandidateRecord("a discharge from the supply pressure", discharge, unknown)
         half = self._time_of_half_rise(high)
         closed = Schedule({"fill": ((0.0, 1.0), (half, 0.0))})
         yield CandidateRecord(
@@ -129,11 +128,6 @@ class _Context:
             yield CandidateRecord(
                 "a slow fill through a throttle", slow._of(plant, fill, 0.0), ("circuit.fill.conductance",)
             )
-
-    def _unidentified(self, part: str) -> tuple[str, ...]:
-        """The parameters of a part of the plant that the fit has not identified, except its resolution of the flow."""
-        paths = (leaf.path for leaf in tree.leaves(self.plant) if leaf.path.startswith(f"{part}."))
-        return tuple(path for path in paths if path.endswith(VALVE_PARAMETERS) and path not in self.identified)
 
     def tank(self, circuit: FillDischarge) -> Iterator[CandidateRecord]:
         """A fill of a rigid tank whose volume is known, at the valve of the muscle; its wall is another one."""

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ....core import BLACK, BLUE, RED, cite, legend_below, new_figure
+from ....core import BLACK, BLUE, RED, Array, cite, legend_below, new_figure
 from ....recording.columns import display_scale, displayed
 from ....report.chapter import BY_ROW, Chapter, Plot, Table, TableColumn
 from ...reported import unit_column
@@ -192,21 +192,36 @@ def _record(fit: DynamicFit, number: int) -> Chapter:
 
 def _record_figure(fit: DynamicFit, number: int) -> Any:
     """Return a figure with measured and modelled values above the residuals, for every observed quantity."""
-    course = fit.problem.record_models[number]
-    modelled, errors = fit.modelled(number), fit.residuals(number)
-    count = len(course.names)
-    figure, axes = new_figure(
-        2, count, width=2.2 + 4.2 * count if count > 1 else 6.4, height=4.6, sharex=True, squeeze=False,
-        height_ratios=(2, 1),
-    )  # fmt: skip
-    for i, name in enumerate(course.names):
-        (factor, unit), (upper, lower) = display_scale(name), axes[:, i]
-        dots = {"linestyle": "none", "marker": ".", "markersize": 3}
-        upper.plot(course.times, factor * course.experiment.recording[name], color=BLUE, label="measured", **dots)
-        upper.plot(course.times, factor * modelled[name], color=RED, label="modelled")
-        lower.plot(course.times, factor * errors[name], color=BLUE, **dots)
-        lower.axhline(0.0, color=BLACK, linewidth=0.8)
-        upper.set_ylabel(f"{name} [{unit}]")
-        lower.set(xlabel="time [s]", ylabel=f"residual\n[{unit}]")
+    course, modelled = fit.problem.record_models[number], fit.modelled(number)
+    figure, axes = residual_panels(len(course.names))
+    for name, panels in zip(course.names, axes.T, strict=True):
+        factor, unit = display_scale(name)
+        measured = factor * course.experiment.recording[name]
+        draw_residuals(panels, course.times, measured, factor * modelled[name], "modelled")
+        panels[0].set_ylabel(f"{name} [{unit}]")
+        panels[1].set(xlabel="time [s]", ylabel=f"residual\n[{unit}]")
     legend_below(figure, axes[0, 0])
     return figure
+
+
+def residual_panels(count: int, **options: Any) -> Any:
+    """Return a figure and its axes (2, count): panels of values, and flat ones of residuals below."""
+    size = {"width": 2.2 + 4.2 * count if count > 1 else 6.4, "height": 4.6}
+    return new_figure(2, count, **{**size, "sharex": "col", **options}, squeeze=False, height_ratios=(2, 1))
+
+
+def draw_residuals(
+    panels: Any, x: Array, measured: Array, modelled: Array, label: str, rows: Any = slice(None)
+) -> None:
+    """Draw the measured rows and the model over x in the first panel, and their difference in the second."""
+    dots = {"linestyle": "none", "marker": ".", "markersize": 3, "color": BLUE}
+    panels[0].plot(x[rows], measured[rows], label="measured", **dots)
+    panels[0].plot(x, modelled, color=RED, linewidth=1.0, label=label)
+    panels[1].plot(x[rows], (modelled - measured)[rows], **dots)
+    panels[1].axhline(0.0, color=BLACK, linewidth=0.8)
+
+
+def running_extreme(values: Array, extreme: np.ufunc, width: int = 9) -> Array:
+    """Return the running minimum or maximum over `width` rows (chosen), the envelope of a band with two branches."""
+    padded = np.pad(values, width // 2, mode="edge")
+    return np.asarray(extreme.reduce([padded[i : i + values.size] for i in range(width)]))

@@ -48,13 +48,8 @@ class InitialConditions:
 
         Raises ParameterError for another number of pressures than muscles, EquilibriumError where there is none.
         """
-        speeds = [c.speed for c in plant.mechanism.coordinates]
-        coordinates = [c.name for c in plant.mechanism.coordinates]
         pressures = check_pressures(pressure, len(plant.muscles), plant.ambient)
-        state = find_equilibrium(plant, pressure=tuple(pressures))
-        known, stationary, equal, settled = _steady_conditions(plant, state, pressures, (*speeds, *coordinates))
-        known |= dict.fromkeys(speeds, 0.0)
-        return cls({**_by_output(plant, pressures), **known}, state, (*stationary, *speeds), equal, settled)
+        return _steady_conditions(plant, find_equilibrium(plant, pressure=tuple(pressures)), pressures, at_rest=True)
 
     @classmethod
     def at_coordinates(cls, plant: Plant, pressure: MusclePressures, **coordinates: float) -> "InitialConditions":
@@ -65,9 +60,7 @@ class InitialConditions:
         than muscles, or an unknown name.
         """
         pressures = check_pressures(pressure, len(plant.muscles), plant.ambient)
-        state = plant.state_at(pressure=pressures, **coordinates)
-        known, stationary, equal, settled = _steady_conditions(plant, state, pressures)
-        return cls({**_by_output(plant, pressures), **known}, state, stationary, equal, settled)
+        return _steady_conditions(plant, plant.state_at(pressure=pressures, **coordinates), pressures, at_rest=False)
 
     def check_plant(self, system: System, values: Mapping[str, Any]) -> None:
         """Raise ParameterError for a name that the system lacks, or where the number of conditions is wrong."""
@@ -84,19 +77,14 @@ class InitialConditions:
             )
 
 
-def _by_output(plant: Plant, pressures: Sequence[float]) -> dict[str, float]:
-    """The gauge pressures [Pa] of the muscles by the names of their outputs."""
-    return {f"{prefix}pressure": value for prefix, value in zip(plant.prefixes, pressures, strict=True)}
-
-
 def _steady_conditions(
-    plant: Plant, state: Mapping[str, float], pressures: Sequence[float], excluded: Sequence[str] = ()
-) -> tuple[dict[str, float], tuple[str, ...], tuple[tuple[str, str], ...], tuple[str, ...]]:
-    """The conditions for the states other than the air masses: known values, stationary states, equal outputs, and
-    settled states.
+    plant: Plant, state: Mapping[str, float], pressures: Sequence[float], at_rest: bool
+) -> InitialConditions:
+    """The conditions at the gauge pressures [Pa] of the muscles: these, and one for each state but the air masses.
 
     A state that depends on no pressure of a muscle is settled if it is that of a circuit, such as the air of a tank,
-    else known. Of the others, a tube has the pressure of its muscle, and the remaining ones are stationary.
+    else known. Of the others, a tube has the pressure of its muscle, and the remaining ones are stationary; so are the
+    speeds of a mechanism at rest, in place of its known coordinates.
     """
     motion = {c.name: state[c.name] for c in plant.mechanism.coordinates}
     motion |= {c.speed: state[c.speed] for c in plant.mechanism.coordinates}
@@ -104,9 +92,10 @@ def _steady_conditions(
     others = [plant.state_at(pressure=each, **motion) for each in increased]
     outputs = plant.outputs(state, dict.fromkeys(plant.inputs, 0.0))
     of_circuits = _circuit_states(plant)
-    known, stationary, equal, settled = {}, [], [], []
+    known = {f"{prefix}pressure": value for prefix, value in zip(plant.prefixes, pressures, strict=True)}
+    stationary, equal, settled = list[str](), list[tuple[str, str]](), list[str]()
     for name, value in state.items():
-        if name in excluded or name in [f"{prefix}air_mass" for prefix in plant.prefixes]:
+        if (at_rest and name in motion) or name in [f"{prefix}air_mass" for prefix in plant.prefixes]:
             continue
         if all(other[name] == value for other in others):
             if name in of_circuits:
@@ -118,7 +107,9 @@ def _steady_conditions(
             equal.append((tube_pressure, f"{prefix}pressure"))
         else:
             stationary.append(name)
-    return known, tuple(stationary), tuple(equal), tuple(settled)
+    speeds = [c.speed for c in plant.mechanism.coordinates] if at_rest else []
+    known |= dict.fromkeys(speeds, 0.0)
+    return InitialConditions(known, state, (*stationary, *speeds), tuple(equal), tuple(settled))
 
 
 def _circuit_states(plant: Plant) -> dict[str, Any]:

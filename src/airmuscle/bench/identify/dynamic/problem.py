@@ -10,7 +10,7 @@ from ....core import AirmuscleError, Array
 from ..result import Estimate
 from .experiment import Unknown
 from .levenberg_marquardt import LevenbergMarquardt
-from .record_model import MAX_STEPS, RecordModel, stack_residuals
+from .record_model import MAX_STEPS, RecordModel
 
 MAX_RUNS = 200
 """Maximum number of simulations of all records in one search."""
@@ -64,11 +64,22 @@ class DynamicFitProblem:
         return residuals, jacobian
 
     def run(self, scaled: Array, max_steps: int = MAX_STEPS) -> tuple[Array, Array, int]:
-        """Residuals and Jacobian as in `residuals`, and the steps of the longest simulation.
+        """Residuals and Jacobian as in `residuals`, missing values omitted, and the steps of the longest simulation.
 
         Raises SimulationError or IdentificationError where a simulation fails or exceeds `max_steps`.
         """
-        return stack_residuals(self.record_models, self.values(scaled), self.sensor_deviations, self.scales, max_steps)
+        residuals, jacobians, longest = [], [], 0
+        values, factors = self.values(scaled), self.scales / self.sensor_deviations[:, None]
+        for model in self.record_models:
+            modelled, jacobian, steps = model.evaluate(values, max_steps)
+            residual = (modelled - model.measured) / self.sensor_deviations
+            jacobian = jacobian * factors
+            longest = max(longest, steps)
+            residuals.append(residual.ravel() if model.all_valid else residual[model.valid])
+            jacobians.append(jacobian.reshape(-1, values.size) if model.all_valid else jacobian[model.valid])
+        if len(residuals) == 1:
+            return residuals[0], jacobians[0], longest
+        return np.concatenate(residuals), np.concatenate(jacobians), longest
 
     def solve(self, scaled: Array, fixed: Sequence[int] = ()) -> tuple[Array, float]:
         """Least squares from an initial guess (P,) with some unknowns fixed, given by index.

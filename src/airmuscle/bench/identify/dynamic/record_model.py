@@ -47,18 +47,20 @@ class RecordModel:
         self.all_valid = bool(self.valid.all())
         groups = tuple(unknowns[k].paths for k in self.sensitivity_indices) or ((),)
         scales = tuple(unknowns[k].scale for k in self.sensitivity_indices) or (1.0,)
-        self._system = compile_system(_add_sensitivities(self.plant, groups, scales, self.names, experiment))
+        try:
+            self._system = compile_system(WithSensitivities(self.plant, groups, scales, self.names))
+        except ParameterError as error:
+            raise error.located(experiment.recording.origin) from None
         self._nominal = self._system.nominal
         leaf_index = {leaf.path: i for i, leaf in enumerate(tree.leaves(self.plant))}
         changed = [(leaf_index[path], k) for k in self.unknown_indices for path in unknowns[k].paths]
         self._changed = np.array([i for i, _ in changed], dtype=int), np.array([k for _, k in changed], dtype=int)
         self._leaves = tree.flatten(self.plant)
         self._conditions = compile_conditions(self.plant, experiment.initial_conditions)
-        self._known = np.array(list(experiment.initial_conditions.known.values()), dtype=float)
-        self._initial_values = [
-            (j, i) for j, k in enumerate(self.sensitivity_indices) for i in _known_index(unknowns[k], experiment)
-        ]
+        known = experiment.initial_conditions.known
+        self._known = np.array(list(known.values()), dtype=float)
         targets = [(j, unknowns[k].target) for j, k in enumerate(self.sensitivity_indices)]
+        self._initial_values = [(j, list(known).index(t.name)) for j, t in targets if isinstance(t, InitialValue)]
         self._instant_columns = [(j, target) for j, target in targets if isinstance(target, CommandInstant)]
         self._leaf_by_column = np.zeros((self._leaves.size, len(self.sensitivity_indices)))
         for j, k in enumerate(self.sensitivity_indices):
@@ -198,12 +200,6 @@ class ModelOutputs(NamedTuple):
     steps: int
 
 
-def _known_index(unknown: Unknown, experiment: Experiment) -> list[int]:
-    """The index of an unknown among the known initial values; empty if it is none of them."""
-    known, target = list(experiment.initial_conditions.known), unknown.target
-    return [known.index(target.name)] if isinstance(target, InitialValue) else []
-
-
 def _check_times(experiment: Experiment) -> Array:
     """The times of a record [s]. Raises IdentificationError where they decrease or there are none."""
     times, origin = experiment.recording["time"], experiment.recording.origin
@@ -216,38 +212,6 @@ def _check_times(experiment: Experiment) -> Array:
     if not times.size:
         raise IdentificationError(f"{origin}: the record has no rows. Give another one, or use a longer part of it.")
     return times
-
-
-def _add_sensitivities(
-    plant: System, groups: tuple[tuple[str, ...], ...], scales: tuple[float, ...], names: tuple[str, ...],
-    experiment: Experiment,
-) -> WithSensitivities:  # fmt: skip
-    """The plant with sensitivity states; errors name the recording."""
-    try:
-        return WithSensitivities(plant, groups, scales, names)
-    except ParameterError as error:
-        raise error.located(experiment.recording.origin) from None
-
-
-def stack_residuals(
-    models: Sequence[RecordModel], values: Array, deviations: Array, scales: Array, max_steps: int = MAX_STEPS
-) -> tuple[Array, Array, int]:
-    """Residuals (model - measured) in standard deviations (R,), missing values omitted, for unknowns at `values` (P,).
-
-    Also the Jacobian (R, P) by the scaled unknowns, and the steps of the longest simulation.
-    """
-    residuals, jacobians, longest = [], [], 0
-    factors = scales / deviations[:, None]
-    for model in models:
-        modelled, jacobian, steps = model.evaluate(values, max_steps)
-        residual = (modelled - model.measured) / deviations
-        jacobian = jacobian * factors
-        longest = max(longest, steps)
-        residuals.append(residual.ravel() if model.all_valid else residual[model.valid])
-        jacobians.append(jacobian.reshape(-1, scales.size) if model.all_valid else jacobian[model.valid])
-    if len(models) == 1:
-        return residuals[0], jacobians[0], longest
-    return np.concatenate(residuals), np.concatenate(jacobians), longest
 
 
 def separate_residuals(models: Sequence[RecordModel], residuals: Array) -> list[Array]:

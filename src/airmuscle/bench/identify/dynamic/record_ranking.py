@@ -194,7 +194,8 @@ def _candidate_sensitivities(fit: DynamicFit, candidate: CandidateRecord, unknow
     names, method = problem.record_models[0].names, problem.record_models[0].method
     observed = dict(zip(names, problem.sensor_deviations.tolist(), strict=True))
     model = RecordModel(plant, candidate.experiment, 0, [*unknowns, start], observed, method)
-    values = _values(plant, unknowns)
+    leaves = {leaf.path: float(leaf.value) for leaf in tree.leaves(plant)}
+    values = [leaves[unknown.paths[0]] for unknown in unknowns]
     outputs = model.evaluate(np.array([*values, 0.0]))
     scales = np.array([*(abs(value) or u.scale for value, u in zip(values, unknowns, strict=True)), 1.0])
     deviations = problem.sensor_deviations * max(fit.residual_std, 1e-12)
@@ -202,11 +203,6 @@ def _candidate_sensitivities(fit: DynamicFit, candidate: CandidateRecord, unknow
     if not np.isfinite(matrix).all():
         raise IdentificationError("its sensitivities are not finite.")
     return np.asarray(matrix)
-
-
-def _values(plant: object, unknowns: Sequence[Unknown]) -> list[float]:
-    values = {leaf.path: leaf.value for leaf in tree.leaves(plant)}
-    return [float(values[unknown.paths[0]]) for unknown in unknowns]
 
 
 def _precision(information: Array, names: Sequence[str], pair: tuple[str, str]) -> PairPrecision:

@@ -126,15 +126,15 @@ def _separate_runs(recording: Recording, sensors: Mapping[str, segment.Sensor]) 
     longest = max(runs, key=lambda run: len(run.interval))
     if all(_is_same_level(longest, run) for run in runs) or longest.kind not in (segment.ISOBARIC, segment.ISOMETRIC):
         return [(recording, longest)]
-    parts = [(_rows_of_run(recording, run), run) for run in runs]
+    parts = [(rows_of(recording, run.interval), run) for run in runs]
     both = [(part, run) for part, run in parts if {1.0, -1.0} <= set(_directions(part, _path_of(run)))]
-    return both or [(_rows_of_run(recording, longest), longest)]
+    return both or [(rows_of(recording, longest.interval), longest)]
 
 
-def _rows_of_run(recording: Recording, run: segment.Run) -> Recording:
-    """The rows of a run, named after the file and the rows."""
-    origin = f"{recording.origin}, rows {run.interval.start + 1} to {run.interval.stop}"
-    return dataclasses.replace(recording.rows(run.interval.rows), origin=origin)
+def rows_of(recording: Recording, interval: segment.Interval) -> Recording:
+    """The rows of an interval, named after the file and the rows."""
+    origin = f"{recording.origin}, rows {interval.start + 1} to {interval.stop}"
+    return dataclasses.replace(recording.rows(interval.rows), origin=origin)
 
 
 def _path_of(run: segment.Run) -> loop_fit.FrictionPath:

@@ -6,12 +6,13 @@ from typing import Any
 
 import numpy as np
 
-from ....core import BLACK, BLUE, RED, Array, cite, legend_below, new_figure
+from ....core import RED, Array, cite, legend_below
 from ....recording.columns import display_scale, displayed
 from ....report.chapter import BY_ROW, Chapter, Plot, Table, TableColumn
 from ...baselines import ARX, PERSISTENCE, TimedRecord, baseline_errors, skill
 from ...reported import unit_column
 from ...segment.runs import CONTRACTION_BAND
+from ..dynamic.dynamic_chapter import draw_residuals, residual_panels, running_extreme
 from . import QuantityPrediction, RecordPrediction
 
 BASELINES = (
@@ -159,41 +160,24 @@ def _record(number: int, prediction: RecordPrediction) -> Chapter:
 
 def _figure(prediction: RecordPrediction) -> Any:
     """Return a figure with measured and predicted values above the errors, for every quantity."""
-    count = len(prediction.quantities)
-    figure, axes = new_figure(
-        2, count, width=2.2 + 4.2 * count if count > 1 else 6.4, height=4.6, sharex="col", squeeze=False,
-        height_ratios=(2, 1),
-    )  # fmt: skip
+    figure, axes = residual_panels(len(prediction.quantities))
     for (upper, lower), quantity in zip(axes.T, prediction.quantities, strict=True):
-        x, label = _abscissa(prediction, quantity)
-        (factor, unit), order = display_scale(quantity.name), np.argsort(x, kind="stable")
-        dots = {"linestyle": "none", "marker": ".", "markersize": 3, "color": BLUE}
-        rows = quantity.compared
-        upper.plot(x[rows], factor * quantity.measured[rows], label="measured", **dots)
-        upper.plot(x, factor * quantity.predicted, color=RED, linewidth=1.0, label="predicted")
+        (x, label), (factor, unit) = _abscissa(prediction, quantity), display_scale(quantity.name)
+        predicted = factor * quantity.predicted
+        draw_residuals((upper, lower), x, factor * quantity.measured, predicted, "predicted", quantity.compared)
         if quantity.half_width is not None:
-            half = factor * quantity.half_width
-            low, high = (factor * quantity.predicted + sign * half for sign in (-1.0, 1.0))
-            style = {"color": RED, "alpha": 0.18, "linewidth": 0, "label": "95 % band"}
-            if np.all(np.diff(x) >= 0.0):
-                upper.fill_between(x, low, high, **style)
-            else:  # two branches over one abscissa
-                upper.fill_between(
-                    x[order], _running(low[order], np.minimum), _running(high[order], np.maximum), **style
-                )
-            lower.fill_between(x[order], -half[order], half[order], **{**style, "label": None})
-        lower.plot(x[rows], factor * quantity.errors[rows], **dots)
-        lower.axhline(0.0, color=BLACK, linewidth=0.8)
+            order = np.argsort(x, kind="stable")
+            half = factor * quantity.half_width[order]
+            low, high = predicted[order] - half, predicted[order] + half
+            if np.any(np.diff(x) < 0.0):  # two branches over one abscissa
+                low, high = running_extreme(low, np.minimum), running_extreme(high, np.maximum)
+            style = {"color": RED, "alpha": 0.18, "linewidth": 0}
+            upper.fill_between(x[order], low, high, label="95 % band", **style)
+            lower.fill_between(x[order], -half, half, **style)
         upper.set_ylabel(f"{quantity.name} [{unit}]")
         lower.set(xlabel=label, ylabel=f"error [{unit}]")
     legend_below(figure, axes[0, 0], columns=3)
     return figure
-
-
-def _running(values: Array, extreme: Any, width: int = 9) -> Array:
-    """Return the running extreme over `width` rows (chosen)."""
-    padded = np.pad(values, width // 2, mode="edge")
-    return np.asarray(extreme.reduce([padded[i : i + values.size] for i in range(width)]))
 
 
 def _abscissa(prediction: RecordPrediction, quantity: QuantityPrediction) -> tuple[Array, str]:
