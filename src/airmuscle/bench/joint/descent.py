@@ -114,10 +114,7 @@ class Descent:
 
     def _cost(self, values: Array, rows: int) -> float:
         """Robust mean square error [rad^2] of the free run of the joint over a fixed sample of the windows."""
-        arm = with_values(self.arm, self.names, values)
-        some = self.windows.part(
-            np.linspace(0, len(self.windows) - 1, min(SAMPLE, len(self.windows))).astype(int), rows
-        )
+        arm, some = with_values(self.arm, self.names, values), self.windows.sample(SAMPLE, rows)
         errors = self.errors(arm, self.joint, some)
         errors = np.where(np.isfinite(errors), np.clip(np.abs(errors), 0.0, OUTLIER), OUTLIER)
         errors = errors[some.counts[:, HISTORY + 1 :]]
@@ -177,24 +174,18 @@ def gradients(arm: PressureDriven, joint: int, paths: Sequence[str], windows: Wi
     system, known = OneJoint(arm, joint), start_of(arm, windows)
     names = [s.name for s in system.states]
     state = {name: known[name] for name in names}
+    values = {leaf.path: float(leaf.value) for leaf in tree.leaves(arm)}
     for k, path in enumerate(paths):
-        if _field(path) in ("presliding_angle", "lags"):
-            moved = _start_slope(arm, path, known, windows)
-            state |= {sensitivity(name, k): moved[name] for name in names}
+        if _field(path) in ("presliding_angle", "lags"):  # on which the initial state depends
+            step = 1e-4 * values[path]
+            moved = start_of(with_values(arm, [path], [values[path] + step]), windows)
+            state |= {sensitivity(name, k): (moved[name] - known[name]) / step for name in names}
     of_arm, inputs = [f"arm.{path}" for path in paths], inputs_of(system, windows)
     found, slopes = with_slopes(system, of_arm, inputs, windows.sample_time, state, names[:1])
     error, gradient = found[:, 1:, 0] - windows.angle[:, HISTORY + 1 :, joint], slopes[:, 1:, 0]
     lost = ~np.isfinite(error) | (np.abs(error) > OUTLIER) | ~np.isfinite(gradient).all(axis=-1)
     lost |= np.logical_not(windows.counts[:, HISTORY + 1 :])
     return np.where(lost, 0.0, error), np.where(lost[..., None], 0.0, gradient)
-
-
-def _start_slope(arm: PressureDriven, path: str, known: Mapping[str, Array], windows: Windows) -> dict[str, Array]:
-    """Derivative of the initial state by a parameter on which it depends."""
-    value = next(float(leaf.value) for leaf in tree.leaves(arm) if leaf.path == path)
-    step = 1e-4 * value
-    moved = start_of(with_values(arm, [path], [value + step]), windows)
-    return {name: (moved[name] - known[name]) / step for name in known}
 
 
 def inputs_of(system: "OneJoint", windows: Windows) -> Array:

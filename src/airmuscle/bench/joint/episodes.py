@@ -171,6 +171,10 @@ class Windows:
         columns = {n: getattr(self, n)[which][:, :end] for n in ("angle", "speed", "rate", "pressure", "counts")}
         return dataclasses.replace(self, **columns, episode=self.episode[which], first=self.first[which])
 
+    def sample(self, count: int, rows: int | None = None) -> "Windows":
+        """At most `count` of the windows, evenly spaced, with the first `rows` rows of their predictions."""
+        return self.part(np.linspace(0, len(self) - 1, min(count, len(self))).astype(int), rows)
+
 
 def long_enough(episodes: Episodes, rows: int) -> tuple[Episodes, list[str]]:
     """The episodes that hold a window, and a remark on the others. Raises IdentificationError if none does."""

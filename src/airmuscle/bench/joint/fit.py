@@ -165,7 +165,7 @@ def separate(
 ) -> tuple[list[ArmParameter], list[str], Array]:
     """Estimates of one joint, what the record does not separate, in words, and the covariance (P, P) along what it
     separates; from the Fisher information."""
-    some = windows.part(np.linspace(0, len(windows) - 1, min(WINDOWS, len(windows))).astype(int))
+    some = windows.sample(WINDOWS)
     leaves = {leaf.path: leaf for leaf in tree.leaves(arm)}
     values = np.array([float(leaves[path].value) for path in paths])
     sizes = np.maximum(np.abs(values), [typical_size(path, leaves) for path in paths])

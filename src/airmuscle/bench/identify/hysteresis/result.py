@@ -34,25 +34,23 @@ def plot_hysteresis(series: LoopSeries, friction: Friction, coefficients: Array,
     if ax is None:
         figure, axes = new_figure(2, 1, width=6.0, height=5.6, sharex=True)
     else:
-        figure, axes = None, given_axes(ax, 1, "plot of a loop")
-    upper, lower = axes[0], axes[1] if len(axes) > 1 else None
-    path, rows = series.path * series.axis.factor, series.fitted_rows
-    force = -series.friction_force(friction)
+        figure, axes = None, given_axes(ax, 1, "plot of a loop")[:2]
+    path, rows, force = series.path * series.axis.factor, series.fitted_rows, -series.friction_force(friction)
     points: dict[str, Any] = {"marker": "o", "markersize": 3, "linestyle": "none", "color": LINES[0], "alpha": 0.5}
-    upper.plot(path[rows], measured[rows], **points, label="measured - static curve")
-    upper.plot(path, force, color=LINES[1], label=f"{type(friction).__name__}, whole path")
-    upper.set_ylabel("force [N]")
-    if lower is not None:
+    axes[0].plot(path[rows], measured[rows], **points, label="measured - static curve")
+    axes[0].plot(path, force, color=LINES[1], label=f"{type(friction).__name__}, whole path")
+    axes[0].set_ylabel("force [N]")
+    for lower in axes[1:]:
         lower.plot(path[rows], (force - measured)[rows], **points)
         lower.axhline(0.0, color=LINES[1])
         lower.set_ylabel("residual (model - measured) [N]")
-    (upper if lower is None else lower).set_xlabel(series.axis.label)
-    relabel_in_display_units([upper] if lower is None else [upper, lower])
+    axes[-1].set_xlabel(series.axis.label)
+    relabel_in_display_units(axes)
     if figure is None:
-        upper.legend(loc="best", frameon=False, fontsize=8)
+        axes[0].legend(loc="best", frameon=False, fontsize=8)
         return ax
-    upper.set_title(title)
-    legend_below(figure, upper, 2)
+    axes[0].set_title(title)
+    legend_below(figure, axes[0], 2)
     return figure
 
 
