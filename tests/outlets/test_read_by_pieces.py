@@ -85,7 +85,7 @@ def test_the_pieces_of_a_column_give_the_rows_of_the_whole(small_pieces, size, d
         return FORCE[first:end]
 
     np.testing.assert_allclose(
-        pieces.read_reduced(get, ROWS, step, downsampling()), downsampling().reduce(FORCE, step), rtol=1e-12
+        pieces.Reduction(downsampling(size), ROWS).read(get, ROWS), downsampling().reduce(FORCE, step), rtol=1e-12
     )
     assert step == 1 or max(requested) <= max(900, step)
 

@@ -616,7 +616,7 @@ def test_decimation_keeps_rows_as_measured(long_file: Path, most: int):
     assert np.array_equal(recording["force"], 0.5 * recording["time"])
     assert len(recording) <= most
     assert (step == 1) == (recording.notes == ())
-    table = raw_csv.read_large_csv(long_file, downsampling=Decimation(most))
+    table = raw_csv.read_large_csv(long_file, raw_csv.TextFormat(), Decimation(most))
     assert np.array_equal(table.rows, np.arange(4, 20_004, step)), "rows have the line numbers of the file"
     assert step == 1 or recording.notes[0].startswith(f"The file has 20000 rows; one in {step} is kept as measured")
 
@@ -636,7 +636,7 @@ def test_block_means_are_means(long_file: Path, most: int):
     expected = [np.mean(np.arange(20_000)[i : i + step]) for i in range(0, 20_000, step)]
     assert recording["time"] == pytest.approx(np.array(expected), rel=1e-12)
     assert f"each block of {step} is replaced by its mean" in recording.notes[0]
-    table = raw_csv.read_large_csv(long_file, downsampling=BlockMeans(most))
+    table = raw_csv.read_large_csv(long_file, raw_csv.TextFormat(), BlockMeans(most))
     assert np.array_equal(table.rows, np.arange(4, 20_004, step)), (
         "rows have the number of the first line of their block"
     )

@@ -15,7 +15,7 @@ import numpy as np
 from ...core import Array, ColumnError, FileError
 from ..readers.raw_csv import read_csv_table
 from ..readers.raw_rosbag import read_rosbag_tables
-from ..readers.separate_process import import_lab_package, run_reader
+from ..readers.separate_process import import_lab_package, reading
 from .episode_inspection import TURN
 
 Arrays = Mapping[str, Array]
@@ -63,7 +63,8 @@ def read_arrays(path: Path, sample_time: float | None = None) -> tuple[list[Arra
         raise FileError(
             f"{path}: no format of episodes; supported are {', '.join(SUPPORTED)}, and folders of ROS 2 bags."
         )
-    return run_reader(path, path.suffix[1:].upper(), lambda: reader(path)), ()
+    with reading(path, path.suffix[1:].upper()):
+        return reader(path), ()
 
 
 def _read_bag(path: Path, sample_time: float | None) -> tuple[list[Arrays], tuple[str, ...]]:

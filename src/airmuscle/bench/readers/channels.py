@@ -36,9 +36,33 @@ class RawTable:
     fields: frozenset[str] = frozenset()
     """Headings that are names of fields of a message and state no quantity."""
 
+    def of_columns(self, kept: Sequence[int], **changes: Any) -> "RawTable":
+        """The table with these columns alone, by their indices, and with further changes of its fields."""
+        units = None if self.units is None else tuple(self.units[i] for i in kept if i < len(self.units))
+        headings, columns = tuple(self.headings[i] for i in kept), tuple(self.columns[i] for i in kept)
+        return dataclasses.replace(self, headings=headings, units=units, columns=columns, **changes)
+
+    def of_rows(self, kept: npt.NDArray[np.intp], **changes: Any) -> "RawTable":
+        """The table with these rows alone, by their indices, and with further changes of its fields."""
+        columns = tuple(taken(cells, kept) for cells in self.columns)
+        return dataclasses.replace(self, columns=columns, rows=self.rows[kept], **changes)
+
     def location(self, row: int) -> str:
         """The location of a row in the file, for messages: `bench.csv, line 41`."""
         return f"{self.origin}, {self.row_label} {self.rows[row]}"
+
+
+def taken(cells: Cells, rows: npt.NDArray[np.intp]) -> Cells:
+    """The cells of these rows."""
+    return [cells[i] for i in rows] if isinstance(cells, list) else cells[rows]
+
+
+def numbers_if_all(texts: list[str]) -> Cells:
+    """Texts as numbers if each of them is one; otherwise the texts."""
+    try:
+        return np.array([float(text) for text in texts])
+    except ValueError:
+        return texts
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

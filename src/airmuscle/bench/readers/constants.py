@@ -1,7 +1,6 @@
 """Constants of a run, by the user, a comment or a column with one value, and division of a table by its specimens."""
 
 import contextlib
-import dataclasses
 import re
 from collections.abc import Mapping
 from typing import Any
@@ -33,27 +32,20 @@ def split_specimens(table: RawTable) -> tuple[RawTable, ...]:
     values = list(dict.fromkeys(labels.tolist()))
     if not 0 < len(values) <= MAX_SPECIMENS:
         return (table,)
-    return tuple(_part(table, column, value, labels == value, len(values)) for value in values)
+    others = table.of_columns([i for i in range(len(names)) if i != column])
+    return tuple(
+        others.of_rows(
+            np.flatnonzero(labels == value),
+            origin=table.origin if len(values) == 1 else f"{table.origin}, specimen {value}",
+            constants={**table.constants, SPECIMEN: value},
+        )
+        for value in values
+    )
 
 
 def label_texts(cells: Cells) -> npt.NDArray[np.str_]:
     """The cells of a column as texts (N,); whole numbers without decimals."""
     return np.array([cell.strip() if isinstance(cell, str) else f"{cell:g}" for cell in cells], dtype=str)
-
-
-def _part(table: RawTable, column: int, value: str, rows: npt.NDArray[np.bool_], count: int) -> RawTable:
-    kept = [i for i in range(len(table.headings)) if i != column]
-    chosen = np.flatnonzero(rows)
-    cells = [table.columns[i] for i in kept]
-    return dataclasses.replace(
-        table,
-        origin=table.origin if count == 1 else f"{table.origin}, specimen {value}",
-        headings=tuple(table.headings[i] for i in kept),
-        units=tuple(table.units[i] for i in kept if i < len(table.units)) if table.units else None,
-        columns=tuple([each[i] for i in chosen] if isinstance(each, list) else each[chosen] for each in cells),
-        rows=table.rows[chosen],
-        constants={**table.constants, SPECIMEN: value},
-    )
 
 
 CONSTANT_UNITS = {"resting_length": "m", "ambient": "Pa", "ambient_temperature": "K", "displacement_zero": "m"}

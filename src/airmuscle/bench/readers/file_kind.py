@@ -3,10 +3,12 @@
 A pipe or a device may have no end, and the contents of a binary file are no table.
 """
 
+import contextlib
 import os
 import re
 import stat
 import tomllib
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -49,15 +51,23 @@ def check_regular_file(path: Path) -> None:
         raise FileError(f"{path}: the file is empty.")
 
 
+@contextlib.contextmanager
+def readable(path: object) -> Iterator[None]:
+    """Raise FileError where the system refuses what is done with the file in this context."""
+    try:
+        yield
+    except OSError as reason:
+        raise FileError(f"{path}: cannot be read ({reason.strerror}). Check the name and the folder.") from None
+
+
 def read_toml(path: Path) -> dict[str, Any]:
     """The tables of a TOML file. Raises FileError if it cannot be read or is not valid TOML."""
     check_regular_file(path)
     if path.stat().st_size > MAX_TOML:
         raise FileError(f"{path}: the file has more than {MAX_TOML} bytes. Write its numbers to a data file.")
     try:
-        return parse_toml(path.read_text(encoding="utf-8-sig"), str(path))
-    except OSError as error:
-        raise FileError(f"{path}: cannot be read ({error.strerror}). Check the name and the folder.") from None
+        with readable(path):
+            return parse_toml(path.read_text(encoding="utf-8-sig"), str(path))
     except UnicodeDecodeError as error:
         raise FileError(f"{path}: is not UTF-8 text (byte {error.start}). Save it as UTF-8.") from None
 
@@ -77,28 +87,18 @@ def parse_toml(text: str, origin: str) -> dict[str, Any]:
 def check_text_file(path: Path) -> None:
     """Raise FileError unless the path is a regular file that begins with text."""
     check_regular_file(path)
-    try:
-        with path.open("rb") as file:
-            beginning = file.read(4096)
-    except OSError as reason:
-        raise FileError(f"{path}: cannot be read ({reason.strerror}). Check the name and the folder.") from None
-    check_beginning(path.name, beginning)
+    with readable(path), path.open("rb") as file:
+        check_beginning(path.name, file.read(4096))
 
 
 def check_beginning(origin: str, beginning: bytes) -> None:
     """Raise FileError if the first bytes are not those of a text."""
-    kind = _binary_kind(beginning)
+    known = next((kind for signature, kind in _SIGNATURES if beginning.startswith(signature)), "")
+    has_control = len(beginning) != len(beginning.translate(None, _CONTROL))
+    is_binary = has_control and not beginning.startswith(_BYTE_ORDER_MARKS)
+    kind = (known or "a binary file") if is_binary else known if known == "a PDF document" else ""
     if kind:
         raise FileError(
             f"{origin}: the file is {kind}, not a table of text. Export the data as text (.csv), or give the file "
             "the extension of its format (.xlsx, .ods, .mat, .tdms, .mf4, .parquet, .h5)."
         )
-
-
-def _binary_kind(beginning: bytes) -> str:
-    """Name of the binary format of a file that begins like this; empty for text."""
-    known = next((kind for signature, kind in _SIGNATURES if beginning.startswith(signature)), "")
-    control = len(beginning) - len(beginning.translate(None, _CONTROL))
-    if beginning.startswith(_BYTE_ORDER_MARKS) or not control:
-        return known if known == "a PDF document" else ""
-    return known or "a binary file"

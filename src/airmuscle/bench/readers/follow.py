@@ -1,6 +1,5 @@
 """Follower of a growing table: rows of a file, a pipe or a serial log as they arrive, in SI units."""
 
-import contextlib
 import csv
 import time
 from collections.abc import Callable, Iterator
@@ -12,6 +11,7 @@ import numpy as np
 from ...core import AMBIENT_PRESSURE, ColumnError, FileError, ParameterError, UnitConversion, abridged, listed
 from ...recording.columns import displacement_columns, find_quantity_name
 from .channels import RawTable
+from .file_kind import readable
 from .header import is_number
 from .interpret import interpret, resolve_headings, unit_conversion
 from .mapping import ColumnMapping
@@ -110,13 +110,17 @@ class RowReader:
             if len(cells) < self._width or any(cells[self._width :]):
                 raise ValueError
             values = [float(self._point(cell)) for cell in cells[: self._width]]
+            assert self._conversions is not None
+            row = {**self._held, **{name: float(convert(values[i])) for i, name, convert in self._conversions}}
+            if not all(self._is_possible(name, value) for name, value in row.items()):
+                raise ValueError
         except (ValueError, csv.Error):  # such as a carriage return within the line
-            self._skip()
-            return None
-        assert self._conversions is not None
-        row = {**self._held, **{name: float(convert(values[i])) for i, name, convert in self._conversions}}
-        if not all(self._is_possible(name, value) for name, value in row.items()):
-            self._skip()
+            self.skipped, self._unreadable = self.skipped + 1, self._unreadable + 1
+            if self._unreadable > MAX_UNREADABLE:
+                raise ColumnError(
+                    f"{self.origin}, line {self._line}: {MAX_UNREADABLE} successive lines are no rows of {self._width} "
+                    "numbers. Check the baud rate and the format of the stream."
+                ) from None
             return None
         self._unreadable = 0
         row, _ = displacement_columns(row, self._first.constants)
@@ -127,20 +131,9 @@ class RowReader:
 
     def _is_possible(self, name: str, value: float) -> bool:
         """Whether a value may be a measurement: a damaged number may still be a number."""
-        quantity = name.rpartition(".")[2]
-        low, high = {"pressure": (-self._ambient, MAX_MAGNITUDE), "contraction": CONTRACTION_RANGE}.get(
-            quantity, (-MAX_MAGNITUDE, MAX_MAGNITUDE)
-        )
+        ranges = {"pressure": (-self._ambient, MAX_MAGNITUDE), "contraction": CONTRACTION_RANGE}
+        low, high = ranges.get(name.rpartition(".")[2], (-MAX_MAGNITUDE, MAX_MAGNITUDE))
         return low < value < high
-
-    def _skip(self) -> None:
-        self.skipped += 1
-        self._unreadable += 1
-        if self._unreadable > MAX_UNREADABLE:
-            raise ColumnError(
-                f"{self.origin}, line {self._line}: {MAX_UNREADABLE} successive lines are no rows of {self._width} "
-                "numbers. Check the baud rate and the format of the stream."
-            )
 
     def _point(self, cell: str) -> str:
         return cell.replace(",", ".") if self._comma else cell
@@ -158,11 +151,7 @@ def follow_lines(
     if not isinstance(source, str | Path):
         yield from source
         return
-    with contextlib.ExitStack() as stack:
-        try:
-            file = stack.enter_context(Path(source).open(encoding="utf-8", errors="replace", newline=""))
-        except OSError as reason:
-            raise FileError(f"{source}: cannot be read ({reason.strerror}). Check the name and the folder.") from None
+    with readable(source), Path(source).open(encoding="utf-8", errors="replace", newline="") as file:
         partial, last = "", clock()
         while True:
             line = file.readline(MAX_LINE)

@@ -79,8 +79,8 @@ def parse_unit_row(headings: Sequence[str], cells: Sequence[str]) -> tuple[str, 
     bare = [re.sub(r"^\[(.*)\]$|^\((.*)\)$", r"\1\2", cell) for cell in cells]
     if any(is_number(cell) and cell != "1" for cell in bare):
         return None
-    candidates = [pair for pair in zip(headings, bare, strict=False) if pair[1] not in ("", "1")]
-    return tuple(bare) if any(_is_unit(text, cell) for text, cell in candidates) else None
+    pairs = zip(headings, bare, strict=False)
+    return tuple(bare) if any(cell not in ("", "1") and _is_unit(text, cell) for text, cell in pairs) else None
 
 
 def count_cells(cells: Sequence[object]) -> int:

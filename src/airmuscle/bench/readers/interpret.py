@@ -53,7 +53,7 @@ def interpret(table: RawTable, mapping: ColumnMapping, constants: Mapping[str, f
     constants = mapping.constants_of() if constants is None else constants
     check_width(table)
     table = without_repeated_columns(table)
-    held = {name: value for name, value in constants.items() if _is_quantity(name)}
+    held = {n: value for n, value in constants.items() if parse_constant_name(n) is None and parse_heading(n).known}
     run_constants = collect_constants(
         table.origin, {**table.constants, **{n: value for n, value in constants.items() if n not in held}}
     )
@@ -87,32 +87,26 @@ def interpret(table: RawTable, mapping: ColumnMapping, constants: Mapping[str, f
     return Recording(columns, table.origin, run_constants, tuple(notes), written)
 
 
-def _is_quantity(name: str) -> bool:
-    return parse_constant_name(name) is None and parse_heading(name).known
-
-
 def _standard_atmosphere(table: RawTable, headings: list[Heading]) -> list[str]:
     """A note where absolute pressures become gauge pressures although the ambient pressure is not stated."""
     absolute = [h.name for h in headings if h.target == "Pa" and unit_conversion(table, h, AMBIENT_PRESSURE).offset]
-    if not absolute:
-        return []
-    return [
+    text = (
         f"The {' and '.join(absolute)} is absolute, and the ambient pressure is not stated: it is converted to gauge "
         f"with the standard atmosphere, {AMBIENT_PRESSURE / 1e3:.4g} kPa."
-    ]
+    )
+    return [text] if absolute else []
 
 
 def _add_held(table: RawTable, columns: dict[str, Array], held: Mapping[str, float | str], ambient: float) -> list[str]:
     """Add a column for each quantity that the user states for the whole run; returns a note on each."""
     notes = []
-    rows = len(table.rows)
     for text, value in held.items():
         heading = parse_heading(text)
         where = f"{table.origin}: {heading.name}"
         if heading.name in columns:
             raise ColumnError(f"{where} is stated as a constant, but a column contains it. Omit one of them.")
         si = held_value(heading, value, ambient, where)
-        columns[heading.name] = np.full(rows, si)
+        columns[heading.name] = np.full(len(table.rows), si)
         unit = "" if heading.target == "1" else f" {heading.target}"
         notes.append(f"The {heading.name} is {si:.6g}{unit} in every row, as specified by the user.")
     return notes
@@ -252,9 +246,7 @@ def _keep_unknown_column(
     A column of which nothing else is known is added to `unknown`, for one note on all.
     """
     if isinstance(cells, list):
-        if not any(cells):
-            return ""
-        return _keep_labels(heading, cells, columns)
+        return _keep_labels(heading, cells, columns) if any(cells) else ""
     constant = constant_from_column(table, heading.text, heading.unit, cells)
     if constant:
         return f"Column '{heading.text}' is constant and states the {constant[0]}: {constant[1]:.4g} (SI)."
@@ -278,8 +270,7 @@ def _field_note(heading: Heading) -> str:
 
 def _keep_labels(heading: Heading, cells: list[str], columns: dict[str, Array]) -> str:
     """Keep a column with a few different texts as their numbers, and return the note on a column of text."""
-    labels = label_texts(cells)
-    values, numbers, counts = np.unique(labels, return_inverse=True, return_counts=True)
+    values, numbers, counts = np.unique(label_texts(cells), return_inverse=True, return_counts=True)
     if not 2 <= values.size <= MAX_LABELS or counts.min() < MIN_LABEL_ROWS:
         return f"Column '{heading.text}' contains text and is ignored."
     columns[heading.text] = (numbers.ravel() + 1).astype(np.float64)

@@ -215,20 +215,11 @@ def apply_mapping(table: RawTable, mapping: ColumnMapping) -> RawTable:
         action = f"read as {heading}" if heading else "ignored"
         notes.append(f"Column '{table.headings[index]}' is {action}, according to the mapping.")
         headings[index] = heading
-        units[index] = "" if _has_unit(heading) else units[index]
-    kept = [i for i in range(len(headings)) if mapped.get(i, "kept")]
-    return dataclasses.replace(
-        table,
-        headings=tuple(headings[i] for i in kept),
-        units=tuple(units[i] for i in kept if i < len(units)) if table.units else None,
-        columns=tuple(table.columns[i] for i in kept),
-        notes=tuple(notes),
-    )
-
-
-def _has_unit(heading: str) -> bool:
-    constant = parse_constant_name(heading)
-    return bool(constant[1]) if constant else parse_heading(heading).unit is not None
+        constant = parse_constant_name(heading)
+        if constant[1] if constant else parse_heading(heading).unit is not None:
+            units[index] = ""
+    changed = dataclasses.replace(table, headings=tuple(headings), units=tuple(units) if table.units else None)
+    return changed.of_columns([i for i in range(len(headings)) if mapped.get(i, "kept")], notes=tuple(notes))
 
 
 def _column_index(table: RawTable, column: str) -> int:

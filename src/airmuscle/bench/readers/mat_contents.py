@@ -15,7 +15,7 @@ import numpy as np
 from ...core import Array
 from .raw_columnar import check_no_external_links, check_own_values
 from .separate_process import import_lab_package
-from .time_base import Downsampling, Reduction, check_reduced_lengths, read_reduced
+from .time_base import Downsampling, Reduction, check_reduced_lengths
 
 MAX_CELLS = 10_000
 """Maximum number of elements of a cell array of version 7.3 that is read, such as names of columns (chosen)."""
@@ -163,7 +163,7 @@ def _reduced(
     result: dict[str, Any] = {}
     for key, value in fields.items():
         if key in arrays:
-            result[key] = _reduce_array(value, reduction.step, downsampling)
+            result[key] = _reduced_array(value, reduction)
         elif isinstance(value, Mapping):
             result[key] = _reduced(origin, f"{name}.{key}".lstrip("."), value, downsampling, reductions)
         else:
@@ -182,9 +182,8 @@ def _whole(value: Any) -> Any:
     return [_whole(item) for item in value] if isinstance(value, list) else value
 
 
-def _reduce_array(value: Any, step: int, downsampling: Downsampling) -> Any:
-    rows = _row_count(value)
+def _reduced_array(value: Any, reduction: Reduction) -> Any:
     if isinstance(value, _Slices):
-        return read_reduced(value.rows, rows, step, downsampling)
+        return reduction.read(value.rows, _row_count(value))
     flat = value.reshape(-1) if value.ndim == 2 and 1 in value.shape else value
-    return read_reduced(lambda first, end: flat[first:end], rows, step, downsampling)
+    return reduction.read(lambda first, end: flat[first:end], _row_count(value))

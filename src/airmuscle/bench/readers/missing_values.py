@@ -12,7 +12,7 @@ import numpy.typing as npt
 from ...core import Array, ColumnError, Hint, HintedText, check_field_types, one_line
 from ...recording.columns import Heading
 from ...recording.recording import RowNote, list_rows
-from .channels import Cells, RawTable
+from .channels import Cells, RawTable, taken
 from .constants import parse_constant_name
 from .time_base import seconds_from_clock
 
@@ -78,13 +78,6 @@ def number(cell: str) -> float:
         return float(cell)
     except ValueError:
         return math.nan
-
-
-def faulty_cells(columns: Sequence[ExaminedColumn], *, missing: bool) -> list[tuple[int, ExaminedColumn]]:
-    """The rows and columns of the cells that are no numbers, by row; with `missing` also those without a value."""
-    masks = [each.bad | each.missing if missing else each.bad for each in columns]
-    found = [(int(row), each) for each, mask in zip(columns, masks, strict=True) for row in np.flatnonzero(mask)]
-    return sorted(found, key=lambda pair: pair[0])
 
 
 def describe_faulty(table: RawTable, found: Sequence[tuple[int, ExaminedColumn]]) -> str:
@@ -170,8 +163,7 @@ class InterpolateMissing(MissingValues):
                 hint=Hint("To leave out the rows", "missing", DropMissing(self.codes), "ColumnMapping"),
             )
         table, cells, time = _with_time(table, cells, timed)
-        columns, filled = list(table.columns), np.zeros(len(time), dtype=bool)
-        left = np.zeros(len(time), dtype=bool)
+        columns, filled, left = list(table.columns), *np.zeros((2, len(time)), dtype=bool)
         for each in cells:
             if each.missing.any():
                 columns[each.index], done = _interpolated(each, time, self.max_gap)
@@ -201,26 +193,25 @@ def parse_code(code: float | str) -> float | str:
 
 def _refuse(table: RawTable, columns: Sequence[ExaminedColumn], *, missing: bool = False) -> None:
     """Raise ColumnError for the cells that are no numbers, and with `missing` also for those without a value."""
-    found = faulty_cells(columns, missing=missing)
+    faulty = [(each, each.bad | each.missing if missing else each.bad) for each in columns]
+    found = [(int(row), each) for each, mask in faulty for row in np.flatnonzero(mask)]
     if found:
+        found.sort(key=lambda pair: pair[0])
         raise ColumnError(HintedText(describe_faulty(table, found), *_remedies(found)))
 
 
 def _remedies(found: Sequence[tuple[int, ExaminedColumn]]) -> Iterator[Hint]:
-    texts = [each.cells[row] for row, each in found if each.bad[row]]
-    if any(isinstance(text, str) and _GROUPED.fullmatch(text) for text in texts):
-        text = next(text for text in texts if isinstance(text, str) and _GROUPED.fullmatch(text))
-        sign = "," if text.rfind(",") > text.rfind(".") else "."
+    bad = list(dict.fromkeys(each.cells[row] for row, each in found if each.bad[row]))
+    texts = [cell for cell in bad if isinstance(cell, str)]
+    grouped = next(filter(_GROUPED.fullmatch, texts), None)
+    if grouped is not None:
+        sign = "," if grouped.rfind(",") > grouped.rfind(".") else "."
         yield Hint("To specify the decimal sign", "decimal", sign, "ColumnMapping")
-    elif len(set(texts)) == 1 and isinstance(texts[0], str) and _is_code(texts[0]):
+    elif len(bad) == len(texts) == 1 and len(texts[0]) <= MAX_CODE and not any(map(str.isdigit, texts[0])):
         yield Hint("If it stands for a missing value", "missing", DropMissing((texts[0],)), "ColumnMapping")
     if any(each.missing[row] for row, each in found):
         yield Hint("To leave out the rows with missing values", "missing", DropMissing(), "ColumnMapping")
         yield Hint("To interpolate short gaps", "missing", InterpolateMissing(), "ColumnMapping")
-
-
-def _is_code(text: str) -> bool:
-    return len(text) <= MAX_CODE and not any(map(str.isdigit, text))
 
 
 def _without_rows(table: RawTable, left_out: Mask) -> RawTable:
@@ -228,17 +219,11 @@ def _without_rows(table: RawTable, left_out: Mask) -> RawTable:
         return table
     if left_out.all():
         raise ColumnError(f"{table.origin}: every row contains a missing value; no row is left.")
-    kept = np.flatnonzero(~left_out)
     note = (
         f"{table.origin}: rows left out, because a value is missing: {np.count_nonzero(left_out)} of {len(left_out)} "
         f"({list_rows(table.row_label, table.rows[left_out], MAX_LISTED)})."
     )
-    columns = tuple(_take(cells, kept) for cells in table.columns)
-    return dataclasses.replace(table, columns=columns, rows=table.rows[kept], notes=(*table.notes, RowNote(note)))
-
-
-def _take(cells: Cells, rows: npt.NDArray[np.intp]) -> Cells:
-    return [cells[i] for i in rows] if isinstance(cells, list) else cells[rows]
+    return table.of_rows(np.flatnonzero(~left_out), notes=(*table.notes, RowNote(note)))
 
 
 def _with_time(
@@ -248,9 +233,9 @@ def _with_time(
     kept = np.flatnonzero(~timed.missing)
     table = _without_rows(table, timed.missing)
     cells = [
-        dataclasses.replace(c, cells=_take(c.cells, kept), missing=c.missing[kept], bad=c.bad[kept]) for c in cells
+        dataclasses.replace(c, cells=taken(c.cells, kept), missing=c.missing[kept], bad=c.bad[kept]) for c in cells
     ]
-    time = _take(timed.cells, kept)
+    time = taken(timed.cells, kept)
     if isinstance(time, list):
         clock = seconds_from_clock(time)
         time = np.array([float(cell) for cell in time]) if clock is None else clock
@@ -260,21 +245,14 @@ def _with_time(
 def _interpolated(column: ExaminedColumn, time: Array, max_gap: float) -> tuple[Array, Mask]:
     """The values (N,) with short gaps filled, and the filled rows."""
     values = np.array([number(c) for c in column.cells] if isinstance(column.cells, list) else column.cells)
-    known = np.flatnonzero(~column.missing)
-    steps = np.diff(time)
+    known, rows, steps = np.flatnonzero(~column.missing), np.flatnonzero(column.missing), np.diff(time)
     sample_time = float(np.median(steps[steps > 0])) if (steps > 0).any() else 0.0
-    rows = np.flatnonzero(column.missing)
     after = np.searchsorted(known, rows)
     inside = (after > 0) & (after < len(known))
     rows, after = rows[inside], after[inside]
-    first, last = known[after - 1], known[np.minimum(after, len(known) - 1)]
-    span = time[last] - time[first]
+    span = time[known[after]] - time[known[after - 1]]
     short = (span > 0) & (span <= (max_gap + 1e-6) * sample_time)
-    rows, first, last, span = rows[short], first[short], last[short], span[short]
-    share = (
-        np.zeros(len(rows)) if column.heading.name.rpartition(".")[2] in _HELD else (time[rows] - time[first]) / span
-    )
+    rows, first, last, span = rows[short], known[after - 1][short], known[after][short], span[short]
+    share = 0.0 if column.heading.name.rpartition(".")[2] in _HELD else (time[rows] - time[first]) / span
     values[rows] = values[first] + share * (values[last] - values[first])
-    filled = np.zeros(len(time), dtype=bool)
-    filled[rows] = True
-    return values, filled
+    return values, np.isin(np.arange(len(time)), rows)

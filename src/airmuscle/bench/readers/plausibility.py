@@ -3,26 +3,22 @@
 Two files with similar numbers under different units contradict each other: at least one of the units is wrong.
 """
 
-import dataclasses
 import itertools
 import warnings
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from ...core import STANDARD_GRAVITY, AirmuscleWarning, Array, ColumnError, Hint, HintedText, UnitError, conversion
 from ...recording.columns import Heading, quantity_of
 from ...recording.recording import Recording
 from ..checks.contractions import code_of
 from .channels import Cells, RawTable
-from .missing_values import DropMissing
+from .missing_values import DropMissing, Mask
 from .time_base import AS_RECORDED, UNIFORM, WITHOUT_TIME
 
 CONTRACTION_RANGE = (-0.5, 1.0)
 """Plausible contractions (chosen): a contraction of 1 is impossible, as is a stretch by half of the length."""
-
-CODE_PURPOSE = "If {:g} is a code for a missing value"
 
 MAX_MAGNITUDE = 1e15
 """Maximum magnitude of a measured value in SI units (chosen: no measurement, but its powers do not overflow)."""
@@ -46,7 +42,7 @@ def check_plausible(
             _refuse(table, values, ~(values + ambient > 0), text, unit=1e3)
         elif quantity == "contraction":
             remedy = "For values in percent, rename the column header to 'contraction [%]'."
-            _check_contraction(table, values, "contraction", remedy)
+            _check_contraction(table, values, quantity, remedy)
         elif quantity == "length":
             _refuse(table, values, ~(values > 0), "length is {} m; it must be positive.")
             if resting_length is not None:
@@ -63,28 +59,22 @@ def _check_contraction(table: RawTable, contraction: Array, label: str, remedy: 
 
 
 def _refuse(
-    table: RawTable,
-    values: Array,
-    wrong: npt.NDArray[np.bool_],
-    text: str,
-    *,
-    unit: float = 1.0,
-    may_be_code: bool = True,
+    table: RawTable, values: Array, wrong: Mask, text: str, *, unit: float = 1.0, may_be_code: bool = True
 ) -> None:
     """Raise ColumnError at the first wrong value, which stands for `{}` in the text, in this unit."""
     if wrong.any():
         row = int(np.argmax(wrong))
         code = code_of(float(values[row])) if may_be_code else None
-        remedy = DropMissing(() if code is None else (code,))
-        hint = None if code is None else Hint(CODE_PURPOSE.format(code), "missing", remedy, "ColumnMapping")
+        purpose = f"If {code or 0:g} is a code for a missing value"
+        hint = Hint(purpose, "missing", DropMissing((code,)), "ColumnMapping") if code is not None else None
         raise ColumnError(f"{table.location(row)}: {text.replace('{}', f'{values[row] / unit:.4g}')}", hint=hint)
 
 
 def _check_ordered(table: RawTable, time: Array) -> None:
-    not_increasing = np.diff(time) <= 0
-    if not_increasing.any():
-        row = int(np.argmax(not_increasing)) + 1
-        hints = (WITHOUT_TIME,) if (np.diff(time) < 0).any() else (UNIFORM, AS_RECORDED, WITHOUT_TIME)
+    steps = np.diff(time)
+    if (steps <= 0).any():
+        row = int(np.argmax(steps <= 0)) + 1
+        hints = (WITHOUT_TIME,) if (steps < 0).any() else (UNIFORM, AS_RECORDED, WITHOUT_TIME)
         relation = "repeats the time" if time[row] == time[row - 1] else "is less than the time"
         message = (
             f"{table.location(row)}: time {time[row]:.9g} s {relation} of the previous row ({time[row - 1]:.9g} s). "
@@ -202,13 +192,7 @@ def without_repeated_columns(table: RawTable) -> RawTable:
         return table
     names = ", ".join(f"'{name}'" for name in dict.fromkeys(repeated))
     note = f"Columns that repeat the values of an equally named column are read once: {names}."
-    return dataclasses.replace(
-        table,
-        headings=tuple(table.headings[i] for i in kept),
-        units=None if table.units is None else tuple(units[i] for i in kept),
-        columns=tuple(table.columns[i] for i in kept),
-        notes=(*table.notes, note),
-    )
+    return table.of_columns(kept, notes=(*table.notes, note))
 
 
 def check_width(table: RawTable) -> None:

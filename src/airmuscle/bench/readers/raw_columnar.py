@@ -1,5 +1,6 @@
 """Readers of Parquet and HDF5 files: columns with their names and units."""
 
+import contextlib
 import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -8,10 +9,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core import FileError, alternatives
+from ...core import FileError, check_known
 from .channels import Channel, RawTable, merge_channels
-from .separate_process import import_lab_package, in_separate_process, run_reader
-from .time_base import Decimation, Downsampling, Reduction, check_reduced_lengths, read_reduced, with_reduction
+from .separate_process import import_lab_package, in_separate_process, reading
+from .time_base import Decimation, Downsampling, Reduction, check_reduced_lengths
 
 
 class StoredTable(NamedTuple):
@@ -29,8 +30,7 @@ def read_parquet_tables_here(path: Path, group: str | None = None) -> tuple[RawT
     A Parquet file has no groups; `group` is not used. Raises FileError or ColumnError.
     """
     parquet = import_lab_package("pyarrow.parquet", path)
-
-    def read() -> tuple[RawTable, ...]:
+    with reading(path, "Parquet"):
         table = parquet.read_table(str(path))
         channels = [
             Channel(field.name, table.column(i).to_numpy(), unit=_text((field.metadata or {}).get(b"unit", b"")))
@@ -43,8 +43,6 @@ def read_parquet_tables_here(path: Path, group: str | None = None) -> tuple[RawT
         }
         return (merge_channels(path.name, channels, constants),)
 
-    return run_reader(path, "Parquet", read)
-
 
 def read_hdf5_tables_here(
     path: Path, group: str | None = None, downsampling: Downsampling = Decimation()
@@ -55,25 +53,17 @@ def read_hdf5_tables_here(
     of more than `downsampling.max_rows` rows is read by pieces and reduced. Raises FileError or ColumnError.
     """
     h5py = import_lab_package("h5py", path)
-
-    def read() -> dict[str, StoredTable]:
-        with h5py.File(path, "r") as file:
-            check_own_values(h5py, file, path)
-            return {each.name: each for each in _groups(h5py, file, path.name, downsampling) if each.channels}
-
-    contents = run_reader(path, "HDF5", read)
+    with reading(path, "HDF5"), h5py.File(path, "r") as file:
+        check_own_values(h5py, file, path)
+        contents = {each.name: each for each in _groups(h5py, file, path.name, downsampling) if each.channels}
     if not contents:
         raise FileError(
             f"{path.name}: no dataset is a vector of numbers, a matrix with columns, or a table of records."
         )
-    if group is not None and group not in contents:
-        raise FileError(f"{path.name}: no group '{group}'{alternatives(group, contents, 'the groups are')}")
-    several, selected = len(contents) > 1, contents if group is None else {group: contents[group]}
-    tables = []
-    for name, each in selected.items():
-        table = merge_channels(f"{path.name}, group '{name}'" if several else path.name, each.channels, each.constants)
-        tables.append(with_reduction(table, each.reduction, downsampling))
-    return tuple(tables)
+    check_known(f"{path.name}: no group", [] if group is None else group, contents, "the groups are", FileError)
+    origins = {name: f"{path.name}, group '{name}'" if len(contents) > 1 else path.name for name in contents}
+    selected = [each for name, each in contents.items() if group in (None, name)]
+    return tuple(t.reduction.noted(merge_channels(origins[t.name], t.channels, t.constants)) for t in selected)
 
 
 read_parquet_tables = in_separate_process("pyarrow", read_parquet_tables_here)
@@ -123,17 +113,14 @@ def _groups(
             (vectors if _is_vector(item) else tables).append(item)
     constants, numeric = {**outer, **_constants(group.attrs)}, [d for d in vectors if d.dtype.kind in "biuf"]
     reduction = Reduction.of((d.size for d in numeric), downsampling)
-    channels = [
-        Channel(str(d.name).rpartition("/")[2], _values(d, reduction.step, downsampling), unit=_unit(d.attrs))
-        for d in numeric
-    ]
+    channels = [Channel(d.name.rpartition("/")[2], _values(d, reduction), unit=_unit(d.attrs)) for d in numeric]
     place = f"{origin}, group '{group.name}'"
     check_reduced_lengths(place, (d.size for d in numeric), (len(c.values) for c in channels))
     yield StoredTable(group.name, channels, constants, reduction)
     for dataset in tables:
         reduction = Reduction.of([dataset.shape[0]], downsampling)
-        channels = _columns(dataset, reduction.step, downsampling)
-        yield StoredTable(dataset.name, channels, {**constants, **_constants(dataset.attrs)}, reduction)
+        own = {**constants, **_constants(dataset.attrs)}
+        yield StoredTable(dataset.name, _columns(dataset, reduction), own, reduction)
     for inner in groups:
         yield from _groups(h5py, inner, origin, downsampling, constants)
 
@@ -144,30 +131,27 @@ def _is_vector(dataset: Any) -> bool:
     return (dataset.ndim == 1 or single) and dataset.dtype.names is None
 
 
-def _values(dataset: Any, step: int, downsampling: Downsampling, field: str | None = None) -> Any:
+def _values(dataset: Any, reduction: Reduction, field: str | None = None) -> Any:
     """The reduced rows of a dataset, or of one of its fields."""
-
+    if field is not None:
+        return reduction.read(lambda first, end: dataset[first:end][field], dataset.shape[0])
+    if not _is_vector(dataset):
+        return reduction.read(lambda first, end: dataset[first:end], dataset.shape[0])
     row = dataset.ndim == 2 and dataset.shape[0] == 1
-
-    def get(first: int, end: int) -> Any:
-        if field is not None or not _is_vector(dataset):
-            return dataset[first:end] if field is None else dataset[first:end][field]
-        return (dataset[0, first:end] if row else dataset[first:end]).reshape(-1)
-
-    return read_reduced(get, dataset.size if _is_vector(dataset) else dataset.shape[0], step, downsampling)
+    return reduction.read(lambda a, b: (dataset[0, a:b] if row else dataset[a:b]).reshape(-1), dataset.size)
 
 
-def _columns(dataset: Any, step: int, downsampling: Downsampling) -> list[Channel]:
+def _columns(dataset: Any, reduction: Reduction) -> list[Channel]:
     """Channels of a dataset of records, or of a matrix with an attribute `columns`; empty for another dataset."""
     units = _texts(dataset.attrs.get("units", ()))
     if dataset.dtype.names is not None and dataset.ndim == 1:
         names = list(dataset.dtype.names)
-        values = [_values(dataset, step, downsampling, name) for name in names]
+        values = [_values(dataset, reduction, name) for name in names]
     else:
         names = _texts(dataset.attrs.get("columns", ()))
         if dataset.ndim != 2 or len(names) != dataset.shape[1]:
             return []
-        values = list(np.asarray(_values(dataset, step, downsampling)).T)
+        values = list(np.asarray(_values(dataset, reduction)).T)
     units = units if len(units) == len(names) else [""] * len(names)
     return [Channel(name, value, unit=unit) for name, value, unit in zip(names, values, units, strict=True)]
 
@@ -195,17 +179,10 @@ def _texts(values: Any) -> list[str]:
 
 
 def _number(text: str) -> float | str:
-    """A constant in the metadata: a number, a text in quotation marks, or any other text as it is."""
-    try:
+    """A constant in the metadata: a number, or a text, which `write` puts in quotation marks if it looks like one."""
+    with contextlib.suppress(ValueError):
         return float(text)
-    except ValueError:
-        return _without_quotation_marks(text)
-
-
-def _without_quotation_marks(text: str) -> str:
-    """The text that `write` put in quotation marks because it looks like a number; any other text as it is."""
-    try:
-        value = json.loads(text)
-    except json.JSONDecodeError:
-        return text
-    return value if isinstance(value, str) else text
+    with contextlib.suppress(json.JSONDecodeError):
+        if isinstance(value := json.loads(text), str):
+            return value
+    return text

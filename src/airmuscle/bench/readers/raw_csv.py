@@ -11,8 +11,8 @@ import numpy as np
 
 from ...core import ColumnError, FileError, Hint, abridged, listed
 from ...recording.recording import list_rows
-from .channels import Cells, RawTable
-from .file_kind import check_beginning, check_text_file
+from .channels import Cells, RawTable, numbers_if_all
+from .file_kind import check_beginning, check_text_file, readable
 from .header import COMMA_NUMBER, POINT_NUMBER
 from .missing_values import MAX_LISTED
 from .text_format import (
@@ -44,16 +44,12 @@ def parse_text(origin: str, text: str, text_format: TextFormat) -> RawTable:
     lines = [(i, line) for i, line in enumerate(re.split(r"\r\n|\n|\r", text), 1) if has_content(line)]
     header = parse_header(origin, lines, text_format)
     body = [(i, line) for i, line in lines if not is_comment(line)][header.header_lines :]
-    columns = parse_columns(origin, header, body, text_format)
-    rows = np.array([i for i, _ in body], dtype=np.int64)
-    return RawTable(origin, header.headings, header.units, columns, rows, constants=header.constants)
+    return header.table(origin, parse_columns(origin, header, body, text_format), [i for i, _ in body])
 
 
 def read_text(path: Path) -> str:
-    try:
+    with readable(path):
         content = path.read_bytes()
-    except OSError as reason:
-        raise FileError(f"{path}: cannot be read ({reason.strerror}). Check the name and the folder.") from None
     if not content.strip():
         raise FileError(f"{path}: the file is empty.")
     return content.decode(detect_encoding(content), errors="replace")
@@ -89,7 +85,7 @@ def _parse_by_cell(origin: str, header: TextHeader, body: NumberedLines, decimal
         _check_decimal_sign(origin, body, rows)
     else:
         _check_thousands(origin, body, rows, decimal)
-    return tuple(_to_cells([_with_decimal_point(row[i], decimal) for row in rows]) for i in range(width))
+    return tuple(numbers_if_all([_with_decimal_point(row[i], decimal) for row in rows]) for i in range(width))
 
 
 def _with_decimal_point(cell: str, decimal: str | None) -> str:
@@ -99,13 +95,6 @@ def _with_decimal_point(cell: str, decimal: str | None) -> str:
     thousands = "." if decimal == "," else ","
     plain = cell.replace(thousands, "").replace(",", ".")
     return plain if re.fullmatch(r"[-+]?[\d.]+(?:[eE][-+]?\d+)?", plain) else cell
-
-
-def _to_cells(cells: list[str]) -> Cells:
-    try:
-        return np.array([float(cell) for cell in cells])
-    except ValueError:
-        return cells
 
 
 def _check_thousands(origin: str, body: NumberedLines, rows: list[list[str]], decimal: str) -> None:
@@ -160,10 +149,7 @@ def is_large_file(path: Path) -> bool:
 
 
 def read_large_csv(
-    path: Path,
-    text_format: TextFormat = TextFormat(),
-    downsampling: Downsampling = Decimation(),
-    progress: Progress | None = None,
+    path: Path, text_format: TextFormat, downsampling: Downsampling, progress: Progress | None = None
 ) -> RawTable:
     """The table in a large text file, with at most `downsampling.max_rows` rows; a note reports a reduction.
 
@@ -185,15 +171,7 @@ def read_large_csv(
         if progress:
             progress(path.name, min(1.0, (rows[-1] - first + 1) / total))
     notes = (downsampling.note(total, step),) if step > 1 else ()
-    return RawTable(
-        path.name,
-        header.headings,
-        header.units,
-        _joined(columns),
-        np.array(rows),
-        constants=header.constants,
-        notes=notes,
-    )
+    return header.table(path.name, _joined(columns), rows, notes)
 
 
 def read_text_stream(
@@ -226,10 +204,7 @@ def read_text_stream(
         while isinstance(downsampling, Decimation) and len(rows) > downsampling.max_rows:
             parts, rows, stride = [tuple(each[::2] for each in _joined(parts))], rows[::2], 2 * stride
     notes = (downsampling.note(total, stride),) if stride > 1 else ()
-    table = RawTable(
-        origin, header.headings, header.units, _joined(parts), np.array(rows), constants=header.constants, notes=notes
-    )
-    return downsample(table, downsampling)
+    return downsample(header.table(origin, _joined(parts), rows, notes), downsampling)
 
 
 def _split_lines(blocks: Iterable[str]) -> Iterator[str]:

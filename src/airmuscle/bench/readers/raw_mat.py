@@ -19,8 +19,8 @@ from .channels import Channel, RawTable, merge_channels
 from .mat_contents import is_plain_hdf5, read_contents
 from .mat_objects import READABLE, MatlabObject, find_objects, read_objects
 from .raw_columnar import read_hdf5_tables
-from .separate_process import in_separate_process, run_reader
-from .time_base import Decimation, Downsampling, Reduction, with_reduction
+from .separate_process import in_separate_process, reading
+from .time_base import Decimation, Downsampling, Reduction
 
 
 def read_mat_tables(
@@ -43,9 +43,9 @@ def read_mat_tables_here(
     path: Path, group: str | None, columns: Sequence[str] = (), downsampling: Downsampling = Decimation()
 ) -> tuple[RawTable, ...]:
     """As `read_mat_tables`, in this process."""
-    contents = run_reader(path, "MATLAB", lambda: read_contents(path, downsampling))
-    objects = find_objects(path)
-    tables = run_reader(path, "MATLAB", lambda: read_objects(path, objects))
+    with reading(path, "MATLAB"):
+        contents, objects = read_contents(path, downsampling), find_objects(path)
+        tables = read_objects(path, objects)
     unread = [each for each in objects if each.name not in tables]
     opaque = {each.name for each in objects}
     variables = {name: value for name, value in contents.variables.items() if name not in opaque} | tables
@@ -64,7 +64,7 @@ def read_mat_tables_here(
     made = []
     for name, fields in selected.items():
         table = _make_table(path, name, fields, constants, len(groups) > 1, columns)
-        table = with_reduction(table, contents.reductions.get(name, Reduction(0, 1)), downsampling)
+        table = contents.reductions.get(name, Reduction(downsampling)).noted(table)
         made.append(dataclasses.replace(table, notes=(*table.notes, *notes)))
     return tuple(made)
 

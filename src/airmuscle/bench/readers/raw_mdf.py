@@ -2,16 +2,16 @@
 
 import dataclasses
 import functools
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ...core import Array, FileError, alternatives, check_known
+from ...core import Array, FileError, check_known
 from .channels import Channel, RawTable, merge_channels
-from .separate_process import import_lab_package, in_separate_process, run_reader
-from .time_base import Decimation, Downsampling, read_reduced
+from .separate_process import import_lab_package, in_separate_process, reading
+from .time_base import Decimation, Downsampling, Reduction
 
 _TIME_MASTER = 1
 """Type of a master channel that contains time, in both versions of the format."""
@@ -26,57 +26,40 @@ def read_mdf_tables_here(
     format is native code, therefore a separate process reads the file.
     """
     asammdf = import_lab_package("asammdf", path)
-
-    def read() -> tuple[RawTable, ...]:
-        with asammdf.MDF(path) as file:
-            names = [
-                str(getattr(g.channel_group, "acq_name", "") or f"group {i}") for i, g in enumerate(file.groups, 1)
-            ]
-            if group is not None and group not in names:
-                raise FileError(f"{path.name}: no group '{group}'{alternatives(group, names, 'the groups are')}")
-            selected = [i for i, name in enumerate(names) if group in (None, name)]
-            table = merge_channels(path.name, list(_channels(file, selected, downsampling)), {})
-            notes = [note for i in selected for note in _notes(file.groups[i], names[i], downsampling)]
-            return (dataclasses.replace(table, notes=(*table.notes, *notes)),)
-
-    return run_reader(path, "MDF", read)
+    with reading(path, "MDF"), asammdf.MDF(path) as file:
+        names = [str(getattr(g.channel_group, "acq_name", "") or f"group {i}") for i, g in enumerate(file.groups, 1)]
+        check_known(f"{path.name}: no group", [] if group is None else group, names, "the groups are", FileError)
+        reductions = {
+            i: Reduction(downsampling, int(file.groups[i].channel_group.cycles_nr))
+            for i, name in enumerate(names) if group in (None, name)
+        }  # fmt: skip
+        table = merge_channels(path.name, list(_channels(file, reductions)), {})
+        notes = [f"Channel group '{names[i]}': {each.note}" for i, each in reductions.items() if each.note]
+        return (dataclasses.replace(table, notes=(*table.notes, *notes)),)
 
 
 read_mdf_tables = in_separate_process("asammdf", read_mdf_tables_here)
 
 
-def _rows(group: Any) -> int:
-    return int(group.channel_group.cycles_nr)
-
-
-def _notes(group: Any, name: str, downsampling: Downsampling) -> list[str]:
-    """The note on the reduction of a channel group; none if it is read as a whole."""
-    step = downsampling.step(max(_rows(group), 1))
-    return [] if step == 1 else [f"Channel group '{name}': {downsampling.note(_rows(group), step)}"]
-
-
-def _channels(file: Any, groups: list[int], downsampling: Downsampling) -> Iterator[Channel]:
-    for i in groups:
+def _channels(file: Any, reductions: Mapping[int, Reduction]) -> Iterator[Channel]:
+    """The channels of groups by their indices."""
+    for i, reduction in reductions.items():
         master = file.masters_db.get(i)
-        timed = (
-            master is not None and getattr(file.groups[i].channels[master], "sync_type", _TIME_MASTER) == _TIME_MASTER
-        )
-        rows = _rows(file.groups[i])
-        step = downsampling.step(max(rows, 1))
-        time = None
-        for j, channel in enumerate(file.groups[i].channels):
+        channels, time = file.groups[i].channels, None
+        timed = master is not None and getattr(channels[master], "sync_type", _TIME_MASTER) == _TIME_MASTER
+        for j, channel in enumerate(channels):
             if j == master and timed:
                 continue
-            if step == 1:
+            if reduction.step == 1:
                 signal = file.get(group=i, index=j)
                 time = np.asarray(signal.timestamps, dtype=float) if timed else None
                 yield Channel(channel.name, signal.samples, time, signal.unit or "")
                 continue
             if timed and time is None:
-                time = read_reduced(functools.partial(_times, file, i), rows, step, downsampling)
-            samples = functools.partial(_samples, file, i, j)
+                time = reduction.read(functools.partial(_times, file, i), reduction.rows)
+            samples = reduction.read(functools.partial(_samples, file, i, j), reduction.rows)
             unit = file.get(group=i, index=j, record_offset=0, record_count=1).unit or ""
-            yield Channel(channel.name, read_reduced(samples, rows, step, downsampling), time, unit)
+            yield Channel(channel.name, samples, time, unit)
 
 
 def _times(file: Any, group: int, first: int, end: int) -> Array:
@@ -95,24 +78,13 @@ def read_tdms_tables(path: Path, group: str | None = None) -> tuple[RawTable, ..
     """Read one table from each group with channels, or from the named group. Raises FileError or ColumnError."""
     nptdms = import_lab_package("nptdms", path)
     nptdms.log.log_manager.set_level("CRITICAL")  # what it prints of a damaged file is the contents of the file
-
-    def read() -> tuple[RawTable, ...]:
-        with nptdms.TdmsFile.open(path) as file:
-            nonempty = {g.name: g for g in file.groups() if any(len(c) for c in g.channels())}
-            selected = _select_groups(path, nonempty, group)
-            several = len(selected) > 1
-            return tuple(_make_table(path, g, dict(file.properties), several) for g in selected)
-
-    return run_reader(path, "TDMS", read)
-
-
-def _select_groups(path: Path, groups: dict[str, Any], name: str | None) -> list[Any]:
-    if not groups:
-        raise FileError(f"{path.name}: no channel contains values.")
-    if name is None:
-        return list(groups.values())
-    check_known(f"{path.name}: no group", name, groups, "the groups are", FileError)
-    return [groups[name]]
+    with reading(path, "TDMS"), nptdms.TdmsFile.open(path) as file:
+        nonempty = {g.name: g for g in file.groups() if any(len(c) for c in g.channels())}
+        if not nonempty:
+            raise FileError(f"{path.name}: no channel contains values.")
+        check_known(f"{path.name}: no group", [] if group is None else group, nonempty, "the groups are", FileError)
+        selected = [each for name, each in nonempty.items() if group in (None, name)]
+        return tuple(_make_table(path, each, dict(file.properties), len(selected) > 1) for each in selected)
 
 
 def _make_table(path: Path, group: Any, properties: dict[str, Any], several: bool) -> RawTable:
@@ -123,16 +95,11 @@ def _make_table(path: Path, group: Any, properties: dict[str, Any], several: boo
         if isinstance(value, float | int | str) and name not in ("name", "description", "title", "author")
     }
     origin = f"{path.name}, group '{group.name}'" if several else path.name
-    channels = group.channels()
-    starts = _start_times(channels)
-    return merge_channels(
-        origin, [_make_channel(c, start) for c, start in zip(channels, starts, strict=True)], constants
-    )
-
-
-def _make_channel(channel: Any, start: float) -> Channel:
-    unit = str(channel.properties.get("unit_string") or channel.properties.get("NI_UnitDescription") or "")
-    return Channel(channel.name, channel[:], _waveform_time(channel, start), unit)
+    channels = []
+    for channel, start in zip(group.channels(), _start_times(group.channels()), strict=True):
+        unit = str(channel.properties.get("unit_string") or channel.properties.get("NI_UnitDescription") or "")
+        channels.append(Channel(channel.name, channel[:], _waveform_time(channel, start), unit))
+    return merge_channels(origin, channels, constants)
 
 
 def _start_times(channels: list[Any]) -> list[float]:

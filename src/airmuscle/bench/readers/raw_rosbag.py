@@ -9,7 +9,7 @@ import numpy as np
 
 from ...core import FileError
 from .channels import Channel, RawTable, merge_channels
-from .separate_process import import_lab_package, run_reader
+from .separate_process import import_lab_package, reading
 
 STANDARD = ("geometry_msgs/", "sensor_msgs/", "nav_msgs/", "trajectory_msgs/", "control_msgs/")
 """Packages whose fields are no quantities of a muscle by their names, except those in QUANTITY_FIELDS."""
@@ -35,11 +35,6 @@ FIELD_UNITS = {
 """The unit of a field and of the numbers inside it, by type and name; those of JointState are of revolute joints."""
 QUANTITY_FIELDS = {"fluid_pressure": "pressure", "temperature": "temperature"}
 """Fields of standard messages that are quantities, with the names of these."""
-
-
-def is_quantity_field(message_type: str, field: str) -> bool:
-    """Whether the name of a field may state a quantity; x, y and z are parts of a vector in every message."""
-    return len(field) > 1 and not message_type.startswith(STANDARD)
 
 
 MAX_ELEMENTS = 64
@@ -70,14 +65,11 @@ def read_rosbag_tables(path: Path, group: str | None = None) -> tuple[RawTable, 
         raise FileError(f"{path}: there is no metadata.yaml next to it; copy the whole folder of the ROS 2 bag.")
     if path.suffix != ".bag" and path != min(p for p in folder.iterdir() if p.suffix == path.suffix):
         return ()
-
-    def read() -> dict[str, list[tuple[float, dict[_Field, float]]]]:
+    with reading(path, "ROS bag"):
         typestore = import_lab_package("rosbags.typesys", path)
         default = typestore.get_typestore(typestore.Stores.ROS2_HUMBLE)
         with highlevel.AnyReader([folder], default_typestore=default) as bag:
-            return _messages(bag, group)
-
-    topics = run_reader(path, "ROS bag", read)
+            topics = _messages(bag, group)
     channels = [channel for topic, messages in topics.items() for channel in _channels(topic, messages)]
     if not channels:
         raise FileError(f"{path}: no topic contains numbers{f', or there is no topic {group}' if group else ''}.")
@@ -109,7 +101,8 @@ def _numbers(value: Any, path: str, unit: str = "") -> Iterator[tuple[_Field, fl
             continue
         if isinstance(item, bool | int | float | np.number):
             number = item.item() if isinstance(item, np.number) else item
-            yield _Field(inner, within, stated or is_quantity_field(kind, field)), number
+            own = len(field) > 1 and not kind.startswith(STANDARD)  # x, y and z are parts of a vector in every message
+            yield _Field(inner, within, stated or own), number
         elif isinstance(item, np.ndarray) and item.dtype.kind in "biuf" and 0 < item.size <= MAX_ELEMENTS:
             words = labels if len(labels) == item.size else [str(i) for i in range(item.size)]
             fields = (_Field(f"{inner}.{word}", within, False) for word in words)
@@ -124,8 +117,9 @@ def _channels(topic: str, messages: list[tuple[float, dict[_Field, float]]]) -> 
     channels = []
     for field in fields:
         rows = [(time, numbers[field]) for time, numbers in messages if field in numbers]
-        time = np.array([row[0] for row in rows])
-        values = np.array([row[1] for row in rows])  # integers remain integers, which are held between messages
+        time, values = map(
+            np.array, zip(*rows, strict=True)
+        )  # integers remain integers, which are held between messages
         first = np.concatenate([[True], np.diff(time) > 0])
         name = topic if field.name == "data" else f"{topic}.{field.name}"
         channels.append(Channel(name, values[first], time[first], field.unit, field.is_quantity))

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from ...core import ColumnError, FileError, alternatives, listed
+from ...core import ColumnError, FileError, check_known, listed
 from . import header
-from .channels import Cells, RawTable
-from .separate_process import import_lab_package, in_separate_process, run_reader
+from .channels import Cells, RawTable, numbers_if_all
+from .separate_process import import_lab_package, in_separate_process, reading
 from .text_format import TextFormat
 from .time_base import seconds_from_clock
 
@@ -29,25 +29,17 @@ def read_workbook_tables_here(
     for these formats is native code, therefore a separate process reads the file. Raises FileError or ColumnError.
     """
     calamine = import_lab_package("python_calamine", path)
-
-    def read() -> dict[str, Rows]:
-        with calamine.CalamineWorkbook.from_path(str(path)) as book:
-            names = [each.name for each in book.sheets_metadata if each.typ == calamine.SheetTypeEnum.WorkSheet]
-            if sheet is not None and sheet not in names:
-                raise FileError(f"{path.name}: no sheet '{sheet}'{alternatives(sheet, names, 'the sheets are')}")
-            return {name: _nonempty_rows(book.get_sheet_by_name(name)) for name in names if sheet in (None, name)}
-
-    found = run_reader(path, "a workbook", read)
+    with reading(path, "a workbook"), calamine.CalamineWorkbook.from_path(str(path)) as book:
+        names = [each.name for each in book.sheets_metadata if each.typ == calamine.SheetTypeEnum.WorkSheet]
+        check_known(f"{path.name}: no sheet", [] if sheet is None else sheet, names, "the sheets are", FileError)
+        found = {name: _nonempty_rows(book.get_sheet_by_name(name)) for name in names if sheet in (None, name)}
     sheets = {name: rows for name, rows in found.items() if any(_is_numeric(row) for _, row in rows)}
     if not sheets:
         raise FileError(
             f"{path.name}: no worksheet contains a table. A table consists of a row of headings and rows of numbers."
         )
-    several = len(sheets) > 1
-    return tuple(
-        _parse_table(f"{path.name}, sheet '{name}'" if several else path.name, rows, text_format)
-        for name, rows in sheets.items()
-    )
+    origins = [f"{path.name}, sheet '{name}'" if len(sheets) > 1 else path.name for name in sheets]
+    return tuple(_parse_table(*each, text_format) for each in zip(origins, sheets.values(), strict=True))
 
 
 read_workbook_tables = in_separate_process("python_calamine", read_workbook_tables_here)
@@ -134,7 +126,4 @@ def _column(cells: list[Any]) -> Cells:
     stored = [cell for cell in cells if isinstance(cell, str)]
     if not any(header.POINT_NUMBER.fullmatch(text.strip()) for text in stored):
         texts = [text.replace(",", ".") if header.COMMA_NUMBER.fullmatch(text) else text for text in texts]
-    try:
-        return np.array([float(text) for text in texts])
-    except ValueError:
-        return texts
+    return numbers_if_all(texts)

@@ -1,11 +1,12 @@
 """Optional packages that read laboratory formats (extra `lab`), and a separate process for readers in native code."""
 
+import contextlib
 import functools
 import importlib
 import importlib.util
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any, ParamSpec, TypeVar
 
@@ -20,12 +21,6 @@ Given = ParamSpec("Given")
 def is_installed(name: str) -> bool:
     """Whether a package is installed; it is not imported."""
     return importlib.util.find_spec(name) is not None
-
-
-def check_lab_package(name: str, path: Path) -> None:
-    """Raise FileError with the install command if a package is missing; the package is not imported."""
-    if not is_installed(name):
-        raise _missing_package(name, path)
 
 
 def import_lab_package(name: str, path: Path) -> Any:
@@ -43,11 +38,12 @@ def _missing_package(name: str, path: Path) -> FileError:
     )
 
 
-def run_reader(path: Path, format_name: str, read: Callable[[], Result]) -> Result:
-    """Call `read` and return its result; any exception of the package becomes a FileError that names the file."""
+@contextlib.contextmanager
+def reading(path: Path, format_name: str) -> Iterator[None]:
+    """Raise FileError, which names the file, in place of any exception of a package in this context."""
     check_regular_file(path)
     try:
-        return read()
+        yield
     except AirmuscleError:
         raise
     except Exception as reason:  # each package raises its own exceptions for a damaged file
@@ -82,7 +78,8 @@ def in_separate_process(package: str, read: Callable[Given, Result]) -> Callable
     @functools.wraps(read)
     def call(*arguments: Given.args, **named: Given.kwargs) -> Result:
         path: Any = arguments[0]
-        check_lab_package(package, path)
+        if not is_installed(package):
+            raise _missing_package(package, path)
         check_regular_file(path)
         found: Result = call_in_separate_process(read.__module__, read.__name__, path, *arguments[1:])
         return found

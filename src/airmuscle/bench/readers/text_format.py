@@ -4,10 +4,13 @@ import codecs
 import csv
 import dataclasses
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+
+import numpy as np
 
 from ...core import FileError, ParameterError, abridged, listed
 from . import header
+from .channels import Cells, RawTable
 
 NumberedLines = list[tuple[int, str]]
 """Lines of a file with their numbers, counted from 1."""
@@ -70,6 +73,13 @@ class TextHeader:
     delimiter: str
     header_lines: int
     """Number of lines, without comments, above the numbers: headings, unit row, and lines above the headings."""
+
+    def table(
+        self, origin: str, columns: tuple[Cells, ...], rows: Sequence[int], notes: tuple[str, ...] = ()
+    ) -> RawTable:
+        """The table of these columns, whose rows are the lines of these numbers."""
+        lines = np.array(rows, dtype=np.int64)
+        return RawTable(origin, self.headings, self.units, columns, lines, constants=self.constants, notes=notes)
 
 
 def detect_encoding(content: bytes) -> str:

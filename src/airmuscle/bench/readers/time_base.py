@@ -9,7 +9,7 @@ import datetime
 import math
 import re
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -143,6 +143,8 @@ TIME_BASES: dict[str, TimeBase] = {
 class Downsampling(abc.ABC):
     """Reduction of a longer file to at most `max_rows` rows."""
 
+    rule: ClassVar[str]
+    """What becomes of every {} rows, as a phrase for the note."""
     max_rows: int = 2_000_000
 
     def __post_init__(self) -> None:
@@ -158,20 +160,19 @@ class Downsampling(abc.ABC):
     def reduce(self, cells: Cells, step: int) -> Cells:
         """The column with one row for every `step` rows."""
 
-    @abc.abstractmethod
     def note(self, rows: int, step: int) -> str:
         """The note for the user on the reduction of `rows` rows."""
+        kept = math.ceil(rows / step)
+        return RowNote(f"The file has {rows} rows; {self.rule.format(step)}, {kept} in total (max_rows).")
 
 
 class Decimation(Downsampling):
     """Every n-th row as measured: resolution and saturation of the sensors are preserved, noise is not averaged."""
 
+    rule = "one in {} is kept as measured"
+
     def reduce(self, cells: Cells, step: int) -> Cells:
         return cells[::step]
-
-    def note(self, rows: int, step: int) -> str:
-        kept = math.ceil(rows / step)
-        return RowNote(f"The file has {rows} rows; one in {step} is kept as measured, {kept} in total (max_rows).")
 
 
 class BlockMeans(Downsampling):
@@ -180,17 +181,14 @@ class BlockMeans(Downsampling):
     A text, such as a clock time, is that of the middle row of its block.
     """
 
+    rule = "each block of {} is replaced by its mean"
+
     def reduce(self, cells: Cells, step: int) -> Cells:
         starts = np.arange(0, len(cells), step)
         sizes: npt.NDArray[np.int64] = np.diff(np.append(starts, len(cells)))
         if isinstance(cells, list):
             return [cells[row] for row in (starts + (sizes - 1) // 2).tolist()]
         return np.asarray(np.add.reduceat(cells, starts) / sizes, dtype=float)
-
-    def note(self, rows: int, step: int) -> str:
-        kept = math.ceil(rows / step)
-        replaced = f"each block of {step} is replaced by its mean, {kept} in total (max_rows)"
-        return RowNote(f"The file has {rows} rows; {replaced}.")
 
 
 def downsample(table: RawTable, downsampling: Downsampling) -> RawTable:
@@ -212,34 +210,48 @@ PIECE_ROWS = 500_000
 
 @dataclasses.dataclass(frozen=True)
 class Reduction:
-    """The number of rows of a table in its file, and the number of rows that are reduced to one."""
+    """The reduction of a table while it is read: `rows` rows of the file, of which `step` are reduced to one."""
 
-    rows: int
-    step: int
+    downsampling: Downsampling
+    rows: int = 0
 
     @classmethod
     def of(cls, sizes: Iterable[int], downsampling: Downsampling) -> "Reduction":
         """That of columns of these sizes, by the longest one."""
-        longest = max(sizes, default=0)
-        return cls(longest, downsampling.step(longest) if longest else 1)
+        return cls(downsampling, max(sizes, default=0))
 
+    @property
+    def step(self) -> int:
+        """The number of rows that are reduced to one."""
+        return self.downsampling.step(self.rows)
 
-def read_reduced(get: Callable[[int, int], Any], rows: int, step: int, downsampling: Downsampling) -> Any:
-    """The rows of a column, or of the first axis of a matrix, with one for every `step` rows.
+    @property
+    def note(self) -> str:
+        """The note for the user; empty if nothing is reduced."""
+        return self.downsampling.note(self.rows, self.step) if self.step > 1 else ""
 
-    `get(first, end)` returns the rows from `first` up to `end`, of which at most `PIECE_ROWS` are requested at once.
-    """
-    if step == 1:
-        return get(0, rows)
-    size = max(PIECE_ROWS // step, 1) * step
-    parts = []
-    for first in range(0, rows, size):
-        piece = np.asarray(get(first, min(first + size, rows)))
-        if piece.ndim == 1:
-            parts.append(np.array(downsampling.reduce(piece, step)))
-        else:
-            parts.append(np.column_stack([downsampling.reduce(column, step) for column in piece.T]))
-    return np.concatenate(parts)
+    def read(self, get: Callable[[int, int], Any], rows: int) -> Any:
+        """The reduced rows of a column, or of the first axis of a matrix.
+
+        `get(first, end)` returns the rows from `first` up to `end`; at most `PIECE_ROWS` are requested at once.
+        """
+        if self.step == 1:
+            return get(0, rows)
+        size = max(PIECE_ROWS // self.step, 1) * self.step
+        parts = []
+        for first in range(0, rows, size):
+            piece = np.asarray(get(first, min(first + size, rows)))
+            columns = [self.downsampling.reduce(column, self.step) for column in np.atleast_2d(piece.T)]
+            parts.append(np.array(columns[0]) if piece.ndim == 1 else np.column_stack(columns))
+        return np.concatenate(parts)
+
+    def noted(self, table: RawTable) -> RawTable:
+        """The table of reduced columns with its row numbers in the file and a note on the reduction."""
+        if self.step == 1:
+            return table
+        return dataclasses.replace(
+            table, rows=1 + self.step * np.arange(len(table.rows)), notes=(*table.notes, self.note)
+        )
 
 
 def check_reduced_lengths(origin: str, full: Iterable[int], reduced: Iterable[int]) -> None:
@@ -250,12 +262,3 @@ def check_reduced_lengths(origin: str, full: Iterable[int], reduced: Iterable[in
             f"{origin}: the columns have different lengths ({', '.join(map(str, sizes))} rows), which the reduction "
             "of the rows would hide. Store the columns of one length in a group of their own."
         )
-
-
-def with_reduction(table: RawTable, reduction: Reduction, downsampling: Downsampling, of: str = "") -> RawTable:
-    """The table of reduced columns with its row numbers and a note on the reduction; `of` begins the note."""
-    if reduction.step == 1:
-        return table
-    rows = 1 + reduction.step * np.arange(len(table.rows))
-    note = f"{of}{downsampling.note(reduction.rows, reduction.step)}"
-    return dataclasses.replace(table, rows=rows, notes=(*table.notes, note))
