@@ -37,11 +37,12 @@ from laboratories import (
 from airmuscle.bench import Candidate, ColumnMapping, Fit, StaticStage, classify_records, compare, fit, read
 from airmuscle.bench.identify import blank_surface
 from airmuscle.bench.identify.campaign import fit_static_stage
-from airmuscle.bench.identify.data_checks import DataChecks
+from airmuscle.bench.identify.data_checks import check_data
 from airmuscle.errors import AirmuscleWarning, ColumnError, IdentificationError
 from airmuscle.physics import Braid, CreepElements, NoFriction, TonduLopez2000
 from airmuscle.recording import Recording
 
+EXAMINED = "airmuscle.bench.identify.fit_points.check_data"
 OTHER = dataclasses.replace(MUSCLE, radius=0.0128)
 FRICTIONLESS = dataclasses.replace(MUSCLE, friction=0.0)
 
@@ -53,7 +54,7 @@ def read_all(folder: Path, tables: dict[str, Table]) -> tuple[Recording, ...]:
 
 
 def notes_of(folder: Path, tables: dict[str, Table]) -> str:
-    return "\n".join(DataChecks.of(read_all(folder, tables)).notes)
+    return "\n".join(check_data(read_all(folder, tables)).notes)
 
 
 def fitted(folder: Path, tables: dict[str, Table]) -> Fit:
@@ -89,7 +90,7 @@ def group_notes(*parts: dict[str, float]) -> str:
         tables = [cycles(pressure, **part) for part in parts]
         columns = {name: np.concatenate([table[name] for table in tables]) for name in tables[0]}
         recordings.append(Recording(columns, f"{pressure / 1e3:.0f}.csv", {"resting_length": RESTING_LENGTH}))
-    return "\n".join(note for note in DataChecks.of(recordings).notes if "two groups" in note)
+    return "\n".join(note for note in check_data(recordings).notes if "two groups" in note)
 
 
 def test_two_muscles_in_files_without_a_column_are_named():
@@ -148,7 +149,7 @@ def test_a_column_that_names_the_specimen_divides_the_file(tmp_path):
     assert [run.constants["specimen"] for run in found] == ["A", "B"]
     assert [run.origin for run in found] == ["both.csv, specimen A", "both.csv, specimen B"]
     assert found[1]["force"].max() > 1.3 * found[0]["force"].max()
-    assert DataChecks.of(found).notes == (), "two specimens do not contradict each other"
+    assert check_data(found).notes == (), "two specimens do not contradict each other"
 
 
 def test_two_muscles_in_two_files_of_one_specimen_contradict_each_other(tmp_path):
@@ -216,12 +217,12 @@ def test_a_fit_refuses_contractions_of_no_muscle(tmp_path):
 
 def test_the_data_of_a_fit_are_examined_when_its_notes_are_first_read(tmp_path, monkeypatch):
     result = fitted(tmp_path, changed(ramps(), FORCE, lambda f: f + 40.0))
-    monkeypatch.setattr(DataChecks, "of", lambda runs: pytest.fail("examined"))
+    monkeypatch.setattr(EXAMINED, lambda runs: pytest.fail("examined"))
     with pytest.raises(pytest.fail.Exception, match="examined"):
         _ = result.notes
     monkeypatch.undo()
     sent = pickle.loads(pickle.dumps(result))
-    monkeypatch.setattr(DataChecks, "of", lambda runs: pytest.fail("examined"))
+    monkeypatch.setattr(EXAMINED, lambda runs: pytest.fail("examined"))
     assert "40.2 N at zero pressure" in "".join(sent.notes)
     assert sent.notes == result.notes
     assert sent.scatter == result.scatter
@@ -229,7 +230,7 @@ def test_the_data_of_a_fit_are_examined_when_its_notes_are_first_read(tmp_path, 
 
 @pytest.mark.parametrize(("column", "code"), [(FORCE, -999.0), (FORCE, 9999.0), (PRESSURE, 9999.0)])
 def test_a_code_for_missing_values_is_named_and_nothing_else_is_blamed(tmp_path, column, code):
-    (note,) = DataChecks.of(read_all(tmp_path, with_code(sweeps(), column, code))).notes
+    (note,) = check_data(read_all(tmp_path, with_code(sweeps(), column, code))).notes
     assert f"is {code:g} in 72 rows" in note
     assert "a code for a missing value" in note
     assert f"use missing=DropMissing(codes=({code},)) of ColumnMapping" in note

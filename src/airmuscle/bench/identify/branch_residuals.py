@@ -8,7 +8,6 @@ turning point give the same tau.
 
 import dataclasses
 import itertools
-import weakref
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -103,10 +102,8 @@ def _turn(recording: Recording, up: Branch, down: Branch) -> _Turn | None:
     dwell = int(np.count_nonzero(pressure > pressure[top] - 0.02 * span))
     if step <= 0 or dwell > DWELL_ROWS + 0.06 * time.size:
         return None
-    loop = _loop_delay(time, pressure, force, top)
-    if loop is None:
-        return None
-    return _Turn(loop[0], float(time[int(np.argmax(force))] - time[top]), loop[1], step)
+    loop, late = _loop_delay(time, pressure, force, top), float(time[int(np.argmax(force))] - time[top])
+    return None if loop is None else _Turn(loop[0], late, loop[1], step)
 
 
 def _loop_delay(time: Array, pressure: Array, force: Array, top: int) -> tuple[float, float] | None:
@@ -156,10 +153,6 @@ class _BranchBins(NamedTuple):
     column: str
 
 
-_known: weakref.WeakKeyDictionary[Recording, _BranchBins] = weakref.WeakKeyDictionary()
-"""Branches by recording: a comparison asks for the same recordings for every law."""
-
-
 def branch_distance(runs: Sequence[Recording], residuals: Sequence[Array], quantity: str) -> float:
     """The distance [SI] of the two branches that the residuals of a fit follow; 0 if they follow none.
 
@@ -176,9 +169,8 @@ def branch_distance(runs: Sequence[Recording], residuals: Sequence[Array], quant
         return 0.0
     mean = abs(float(np.mean(differences)))
     standard_error = float(np.std(differences, ddof=1) / np.sqrt(differences.size))
-    if mean <= MIN_STANDARD_ERRORS * standard_error or mean <= _sensor_deviation(runs, quantity):
-        return 0.0
-    return mean
+    random = mean <= MIN_STANDARD_ERRORS * standard_error or mean <= _sensor_deviation(runs, quantity)
+    return 0.0 if random else mean
 
 
 def branch_notes(runs: Sequence[Recording], distance: float, quantity: str, *, delayed: bool = False) -> list[str]:
@@ -190,7 +182,7 @@ def branch_notes(runs: Sequence[Recording], distance: float, quantity: str, *, d
         return []
     unit = QUANTITIES[quantity].unit
     text = f"{100 * distance:.3g} %" if unit == "1" else f"{distance:.3g} {unit}"
-    columns = {column for run in runs if (column := _known[run].column)}
+    columns = {column for run in runs if (column := _branch_bins(run).column)}
     names = [" and ".join(branch_name(column, d) for d in (1, -1)) for column in sorted(columns, reverse=True)]
     return [
         HintedText(
@@ -202,9 +194,7 @@ def branch_notes(runs: Sequence[Recording], distance: float, quantity: str, *, d
 
 def _branch_differences(run: Recording, residuals: Array) -> Array:
     """Median residual of inflating or contracting rows minus that of the others, by interval; shape (intervals,)."""
-    if run not in _known:
-        _known[run] = _branch_bins(run)
-    known, direction, bins, _ = _known[run]
+    known, direction, bins, _ = _branch_bins(run)
     if not direction.any():
         return np.zeros(0)
     values = residuals[known]
@@ -215,7 +205,9 @@ def _branch_differences(run: Recording, residuals: Array) -> Array:
     return np.array([float(np.median(a) - np.median(b)) for a, b in zip(up, down, strict=True) if a.size and b.size])
 
 
+@remembered
 def _branch_bins(run: Recording) -> _BranchBins:
+    """The branches of a recording: a comparison asks for them for every law."""
     known = np.isfinite(run["pressure"])
     complete = run if known.all() else run.rows(known)
     branches = tuple(each for each in find_branches(complete) if len(each.interval) >= MIN_BRANCH_ROWS)
@@ -227,17 +219,9 @@ def _branch_bins(run: Recording) -> _BranchBins:
     return _BranchBins(known, branch_directions(complete, branches), np.digitize(driven, edges), column)
 
 
+@remembered
 def _sensor_deviation(runs: Sequence[Recording], quantity: str) -> float:
     """Standard deviation of one reading of the quantity [SI]; 0 where it cannot be estimated."""
-    known = _deviations(runs)
-    if quantity not in known:
-        columns = [run[quantity][np.isfinite(run[quantity])] for run in runs]
-        sensors = estimate_sensors([Recording({quantity: values}, "fit") for values in columns if values.size])
-        known[quantity] = sensors[quantity].std if quantity in sensors else 0.0
-    return known[quantity]
-
-
-@remembered
-def _deviations(runs: Sequence[Recording]) -> dict[str, float]:
-    """The standard deviations of the sensors that are known, by quantity: a comparison asks for them for every law."""
-    return {}
+    columns = [run[quantity][np.isfinite(run[quantity])] for run in runs]
+    sensors = estimate_sensors([Recording({quantity: values}, "fit") for values in columns if values.size])
+    return sensors[quantity].std if quantity in sensors else 0.0

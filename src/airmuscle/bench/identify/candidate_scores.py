@@ -2,7 +2,7 @@
 this process or in several."""
 
 import dataclasses
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from typing import Any
 
 import numpy as np
@@ -12,7 +12,7 @@ from ...engine.distribution import DistributedCalls
 from ...engine.processes import Workers, process_pool
 from ...physics.muscle.characteristic import Characteristic, PooledLengthLaw
 from ...recording import Recording
-from .candidates import Candidate
+from .candidates import Candidate, ExcludedModel
 from .compared_points import ComparedPoints, cause_of, residuals_of_rows
 from .cross_validation import GroupSplit, label_folds
 from .fit_points import FitPoints
@@ -84,23 +84,6 @@ class RankedModel:
 def count_parameters(fit: Fit) -> int:
     """Number of estimates, and the rounded effective number of the specimen effects."""
     return len(fit.estimates) + (0 if fit.effects is None else round(fit.effects.degrees_of_freedom))
-
-
-@dataclasses.dataclass(frozen=True)
-class ExcludedModel:
-    """A candidate whose parameters the data do not determine, or that gives no force at measured points, with the
-    reason."""
-
-    name: str
-    reason: str
-    """The complete reason, with what to do."""
-    cause: str
-    """The cause in one phrase."""
-    error: float | None = None
-    """Error in force [N] at which the cross-validation of a law that cannot be recommended was ended."""
-
-    def __str__(self) -> str:
-        return f"{self.name}: {self.cause}."
 
 
 Score = RankedModel | ExcludedModel
@@ -177,12 +160,11 @@ def _slack_notes(model: Characteristic, points: ComparedPoints) -> tuple[str, ..
     Raises IdentificationError where it gives no force although it is not slack.
     """
     slack, count = points.slack_count(model)
-    if not slack:
-        return ()
-    return (
+    text = (
         f"it is slack at {slack} of {count} points with a positive force and is ranked with zero force there; its "
-        "method force raises SolveError at these points.",
+        "method force raises SolveError at these points."
     )
+    return (text,) if slack else ()
 
 
 def in_fitted_quantity(loss: Loss, law: Characteristic, points: FitPoints) -> Loss:
@@ -217,17 +199,15 @@ def score_candidates(
     with process_pool(workers, one_thread_each=True) as pool:
         if pool is not None:
             for split in splits:
-                split.points.prepare()  # before they are sent
+                _ = split.points.checks  # before they are sent
         distribution = DistributedCalls(pool, _score_tasks, (tuple(splits), loss))
         for indices in (early, late):
             lowest = _lowest_errors(scores_of.values(), len(splits)) if indices is late else ()
             groups = _of_one_population(candidates, indices)
             if pool is not None:  # those that take longest first
                 groups.sort(key=lambda group: -sum(1 for i in group for _ in tree.leaves(candidates[i].law)))
-            tasks = [
-                [(candidates[i], [max_excess(candidates[i]) * each for each in lowest]) for i in group]
-                for group in groups
-            ]
+            limits = {i: [max_excess(candidates[i]) * each for each in lowest] for i in indices}
+            tasks = [[(candidates[i], limits[i]) for i in group] for group in groups]
             for position, scores in distribution.completed(tasks):
                 for i, score in zip(groups[position], scores, strict=True):
                     scores_of[i] = score
@@ -241,18 +221,16 @@ def score_candidates(
 def max_excess(candidate: Candidate) -> float:
     """The ratio to the lowest error of other laws above which a law is not cross-validated further.
 
-    That of a recommended law for those whose fits take longest, a greater one for other laws that are not linear.
+    That of a recommended law for those whose fits take longest, because they are linear in some of their fitted
+    parameters only, and a greater one for other laws that are not linear.
     """
-    if is_fitted_by_projection(candidate):
-        return 1.0 + MAX_RECOMMENDED_EXCESS
-    return float("inf") if linear_fields(candidate.law) or isinstance(candidate.law, PooledLengthLaw) else MAX_EXCESS
-
-
-def is_fitted_by_projection(candidate: Candidate) -> bool:
-    """Whether a law is linear in some of its fitted parameters only."""
     fields = linear_fields(candidate.law)
-    names = [leaf.path.partition("[")[0] for leaf in tree.leaves(candidate.law) if leaf.declared.fitted]
-    return bool(fields) and not isinstance(candidate.law, PooledLengthLaw) and any(name not in fields for name in names)
+    if isinstance(candidate.law, PooledLengthLaw):
+        return float("inf")
+    if not fields:
+        return MAX_EXCESS
+    names = {leaf.path.partition("[")[0] for leaf in tree.leaves(candidate.law) if leaf.declared.fitted}
+    return float("inf") if names <= set(fields) else 1.0 + MAX_RECOMMENDED_EXCESS
 
 
 def _score_tasks(common: tuple[Sequence[ComparedPoints], Loss], tasks: Sequence[_Task]) -> Scores:
@@ -267,11 +245,8 @@ def _of_one_population(candidates: Sequence[Candidate], indices: Sequence[int]) 
     return list(groups.values())
 
 
-def _lowest_errors(scores: Iterable[tuple[Score, ...]], count: int) -> tuple[float, ...]:
+def _lowest_errors(scores: Collection[tuple[Score, ...]], count: int) -> tuple[float, ...]:
     """The lowest cross-validated error [N] for each split; infinite where no law is ranked."""
-    rows = list(scores)
-    ranked = [[s[i] for s in rows] for i in range(count)]
-    return tuple(
-        min((s.cross_validated_rmse for s in each if isinstance(s, RankedModel)), default=float("inf"))
-        for each in ranked
-    )
+    splits = ([score[i] for score in scores] for i in range(count))
+    ranked = ([each.cross_validated_rmse for each in split if isinstance(each, RankedModel)] for split in splits)
+    return tuple(min(errors, default=float("inf")) for errors in ranked)

@@ -41,9 +41,8 @@ def slack_rows(law: Any, pressure: Array, contraction: Array) -> npt.NDArray[np.
 
     Always False for force laws. Raises IdentificationError where the law gives no force at a point without being slack.
     """
-    nowhere = np.zeros(pressure.size, dtype=bool)
     if isinstance(law, ForceLaw) or _solve_error(law, pressure, contraction) is None:
-        return nowhere
+        return np.zeros(pressure.size, dtype=bool)
     slack = np.asarray(_deficit(law, pressure, contraction, np.zeros(pressure.size)) > 0)
     error = _solve_error(law, pressure[~slack], contraction[~slack])
     if error is not None:
@@ -115,27 +114,39 @@ class Candidate(ShortRepr):
     fixed: tuple[str, ...] = ()
 
 
+@dataclasses.dataclass(frozen=True)
+class ExcludedModel:
+    """A candidate whose parameters the data do not determine, or that gives no force at measured points, with the
+    reason."""
+
+    name: str
+    reason: str
+    """The complete reason, with what to do."""
+    cause: str
+    """The cause in one phrase."""
+    error: float | None = None
+    """Error in force [N] at which the cross-validation of a law that cannot be recommended was ended."""
+
+    def __str__(self) -> str:
+        return f"{self.name}: {self.cause}."
+
+
 def standard_candidates(recordings: Sequence[Recording]) -> tuple[Candidate, ...]:
     """Every law whose initial values follow from the data: those of all classes of `characteristic` that define `guess`
     or `variants`, and laws of partial pooling for three specimens or more."""
-    return _started(DataScales.of(recordings))[0]
+    return started_candidates(recordings)[0]
 
 
-def unavailable_candidates(recordings: Sequence[Recording]) -> tuple[tuple[str, str, str], ...]:
-    """The standard candidates whose initial values do not follow from the data: name, reason and cause."""
-    return _started(DataScales.of(recordings))[1]
-
-
-def _started(scales: DataScales) -> tuple[tuple[Candidate, ...], tuple[tuple[str, str, str], ...]]:
-    """The candidates, and the classes that these data do not start."""
-    candidates, missing = list[Candidate](), list[tuple[str, str, str]]()
+def started_candidates(recordings: Sequence[Recording]) -> tuple[tuple[Candidate, ...], tuple[ExcludedModel, ...]]:
+    """The standard candidates, and those whose initial values do not follow from the data."""
+    scales, candidates, missing = DataScales.of(recordings), list[Candidate](), list[ExcludedModel]()
     for name in dir(characteristic):
         cls = getattr(characteristic, name)
         if inspect.isclass(cls) and issubclass(cls, Characteristic):
             try:
                 laws = cls.variants(scales, blank_surface)
             except IdentificationError as error:
-                missing.append((name, error.message, error.cause))
+                missing.append(ExcludedModel(name, error.message, error.cause))
             else:
                 candidates += [Candidate(each, law, cls.redundant) for each, law in laws.items()]
     return (*candidates, *_pooled_laws(scales)), tuple(missing)

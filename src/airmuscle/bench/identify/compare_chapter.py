@@ -13,6 +13,7 @@ import numpy as np
 from ...core import BLUE, LINES, MARKERS, IdentificationError, ShortRepr, legend_outside, new_figure
 from ...engine.processes import Workers
 from ...recording import Recording
+from ...recording.columns import display_scale
 from ...report.chapter import Chapter, Plot, Table, TableColumn
 from ...report.formula import symbol_formula, to_mathtext
 from . import Fit
@@ -114,20 +115,15 @@ def select_law(
 
     Raises IdentificationError where no candidate is determined.
     """
-    if both or (both is None and leave_out is None and serves_both(recordings)):
+    counts = Counter(specimen_name(run) for run in recordings)
+    serves_both = len(counts) >= MIN_POOLED and min(counts.values()) > 1
+    if both or (both is None and leave_out is None and serves_both):
         joint = select_for_both(recordings, candidates, loss=loss, workers=workers, progress=progress)
         return LawSelection(joint.comparisons, joint.recommended[0], str(joint))
     comparison = compare(recordings, candidates, leave_out=leave_out, loss=loss, workers=workers, progress=progress)
     return LawSelection((comparison,), comparison.recommended, comparison.reason)
 
 
-def serves_both(recordings: Sequence[Recording]) -> bool:
-    """Whether there are three specimens or more, each with several runs."""
-    counts = Counter(specimen_name(run) for run in recordings)
-    return len(counts) >= MIN_POOLED and min(counts.values()) > 1
-
-
-_DISPLAY_UNITS = {"pressure": (1e-3, "kPa"), "contraction": (100.0, "%"), "force": (1.0, "N")}
 _MAX_LABELS = 24
 """Maximum number of parameters that are labelled in the figure of the correlations."""
 _MAX_CURVES = 6
@@ -148,23 +144,20 @@ def compare_chapter(
     fit, chapter = (recommended or comparison.recommended).fit, comparison.chapter()
     joint = () if reason in ("", comparison.reason) else (reason,)
     folds = Plot("left-out", "Cross-validation error of the laws on each fold.", partial(_fold_figure, comparison))
-    chapter = replace(
-        chapter,
-        summary=(*joint, *chapter.paragraphs),
-        tables=(*chapter.tables, _fold_table(comparison)),
-        plots=(folds, *(_plots_of_fit(fit) if figures_of_fit else ())),
-    )
-    group = comparison.leave_out.group_name
-    return replace(chapter.among(f"{group}-"), name=f"comparison-{group}") if joint else chapter
-
-
-def _plots_of_fit(fit: Fit) -> tuple[Plot, ...]:
-    return (
+    of_fit = (
         Plot("residuals", "Residuals of the recommended law over each variable.", partial(residual_figure, fit)),
         Plot(
             "correlations", "Correlations of the parameters of the recommended law.", partial(correlation_figure, fit)
         ),
     )
+    chapter = replace(
+        chapter,
+        summary=(*joint, *chapter.paragraphs),
+        tables=(*chapter.tables, _fold_table(comparison)),
+        plots=(folds, *of_fit) if figures_of_fit else (folds,),
+    )
+    group = comparison.leave_out.group_name
+    return replace(chapter.among(f"{group}-"), name=f"comparison-{group}") if joint else chapter
 
 
 def _fold_table(comparison: Comparison) -> Table:
@@ -205,9 +198,10 @@ def _common_word(names: Sequence[str]) -> str:
 
 def residual_figure(fit: Fit) -> Any:
     """Return the figure of the residuals over pressure, contraction and force."""
-    factor, unit = _DISPLAY_UNITS[fit.fitted_quantity.name]
+    factor, unit = display_scale(fit.fitted_quantity.name)
     figure, panels = new_figure(1, 3, width=7.5, height=2.8, sharey=True)
-    for axes, (name, (scale, axis_unit)) in zip(panels, _DISPLAY_UNITS.items(), strict=True):
+    for axes, name in zip(panels, ("pressure", "contraction", "force"), strict=True):
+        scale, axis_unit = display_scale(name)
         axes.plot(fit.recording[name] * scale, fit.residuals * factor, "o", color=BLUE, markersize=2.5, alpha=0.6)
         axes.axhline(0.0, color="black", linewidth=0.8)
         axes.set(xlabel=f"measured {name} [{axis_unit}]")

@@ -16,7 +16,7 @@ from .cross_validation import Labels, specimen_name
 from .fit_points import FitPoints
 from .group_refits import GroupRefits
 from .pooling import Pooling, make_pooling
-from .problem import FitProblem
+from .problem import FitProblem, with_length
 from .result import Fit
 from .slack import SlackPull, pull_limit, slack_pull, with_slack_bounds
 from .solver import LeastSquaresSolution, design_matrix, is_linear
@@ -54,13 +54,11 @@ def evaluated_rows(run: Recording, rows: npt.NDArray[np.bool_] | None = None) ->
                          specimen_name(run))  # fmt: skip
 
 
-def law_of_length(model: Characteristic, length: float | None, specimen: str = "") -> Any:
-    """The law of a specimen if the model knows it, else of a muscle with this resting length [m], if the model depends
-    on it."""
-    law: Any = model
+def law_of_length(law: Characteristic, length: float | None, specimen: str = "") -> Any:
+    """The law of a specimen if it is known, else of a muscle with this resting length [m], if the law depends on it."""
     if isinstance(law, PooledLengthLaw) and specimen in law.specimens:
         return law.for_specimen(specimen)
-    return law.with_resting_length(length) if length is not None and hasattr(law, "with_resting_length") else law
+    return with_length(law, length)
 
 
 def force_residuals(model: Characteristic, runs: Sequence[Recording], max_force: float) -> Array:
@@ -188,8 +186,8 @@ class ComparedPoints:
 
         Raises IdentificationError where the other rows do not determine the parameters.
         """
-        refits = self._refits_of(fit) if isinstance(loss, LeastSquares) else None
-        pooling = self._pooling(candidate, fit)
+        law, refits = candidate.law, self._refits_of(fit) if isinstance(loss, LeastSquares) else None
+        pooling = make_pooling(law, self.points, fit.problem) if isinstance(law, PooledLengthLaw) else None
         for i, (fold, rows) in enumerate(zip(self.folds, self._left_out_rows, strict=True)):
             model = None if refits is None else refits.law_without(i, pooling)
             if model is None:
@@ -206,10 +204,6 @@ class ComparedPoints:
     @functools.cached_property
     def _kept_refits(self) -> "list[_FoldRefits]":
         return []
-
-    def _pooling(self, candidate: Candidate, fit: Fit) -> Pooling | None:
-        law = candidate.law
-        return make_pooling(law, self.points, fit.problem) if isinstance(law, PooledLengthLaw) else None
 
     def _refit_exactly(self, candidate: Candidate, fit: Fit, fold: LeftOutGroup, loss: Loss) -> Characteristic:
         """The refit by a search of its own."""

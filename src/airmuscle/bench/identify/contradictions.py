@@ -45,8 +45,9 @@ def find_repeated_rows(recordings: Sequence[Recording], columns: Sequence[str]) 
     keys = [_keys(run, columns) for run in recordings]
     found = []
     for here, there, offset in _candidates(keys):
-        for rows in _equal_stretches(recordings[here], recordings[there], offset, columns):
-            found.append(RepeatedRows(here, rows, there, (recordings[here].origin, recordings[there].origin)))
+        one, other = recordings[here], recordings[there]
+        stretches = _equal_stretches(one, other, offset, columns)
+        found += [RepeatedRows(here, rows, there, (one.origin, other.origin)) for rows in stretches]
     return tuple(found)
 
 
@@ -149,22 +150,16 @@ def _cause(contradicting: Sequence[MatchedRuns], matches: Matches) -> list[str |
     """The cause and the remedy, as far as the contradictions show them."""
     column = _separating_column(contradicting, matches)
     if column is not None:
+        mapped = {re.sub(r"\s*[\[(].*", "", column): "specimen"}
         return [
             f" Column '{column}' tells the contradicting rows apart: it probably names the specimen.",
-            Hint(
-                "To state it as the specimen",
-                "columns",
-                {re.sub(r"\s*[\[(].*", "", column): "specimen"},
-                "ColumnMapping",
-            ),
+            Hint("To state it as the specimen", "columns", mapped, "ColumnMapping"),
             " Fit each specimen by itself, or at least three together with --compare.",
         ]
     shifts = np.array([each.pressure_shift for each in contradicting])
     if np.mean(np.abs(np.abs(shifts) / AMBIENT_PRESSURE - 1.0) < SHIFT_TOLERANCE) > 0.5:
-        names = [
-            (each.first if shift > 0 else each.second).recording.origin
-            for each, shift in zip(contradicting, shifts, strict=True)
-        ]
+        pairs = zip(contradicting, shifts, strict=True)
+        names = [(each.first if shift > 0 else each.second).recording.origin for each, shift in pairs]
         return [
             f" A pressure of one atmosphere, {AMBIENT_PRESSURE / 1e3:.4g} kPa, explains the difference: the pressures "
             f"of {file_list(names)} are probably absolute. State their unit in the heading, 'kPa(a)'."

@@ -169,15 +169,13 @@ class BlockSplit(GroupSplit):
         names = np.array([f"block {k + 1}" for k in range(self.folds)])
         labels = []
         for i, run in enumerate(recordings):
-            interval = self._interval_index(run[self.quantity])
+            values = run[self.quantity]
+            low, high = float(np.nanmin(values)), float(np.nanmax(values))
+            fractions = (np.nan_to_num(values, nan=low) - low) / (high - low if high > low else 1.0)
+            interval = np.minimum((2 * self.folds * fractions).astype(np.intp), 2 * self.folds - 1)
             inside = (interval > 0) & (interval < 2 * self.folds - 1)
             labels.append(np.where(inside, names[(i + interval) % self.folds], ALWAYS_FITTED))
         return labels
-
-    def _interval_index(self, values: npt.NDArray[np.float64]) -> npt.NDArray[np.intp]:
-        low, high = float(np.nanmin(values)), float(np.nanmax(values))
-        fractions = (np.nan_to_num(values, nan=low) - low) / (high - low if high > low else 1.0)
-        return np.minimum((2 * self.folds * fractions).astype(np.intp), 2 * self.folds - 1)
 
 
 def label_folds(recordings: Sequence[Recording], leave_out: GroupSplit) -> tuple[list[Labels], list[str]]:

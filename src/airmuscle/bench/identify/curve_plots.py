@@ -7,10 +7,12 @@ import numpy as np
 
 from ...core import Array, IdentificationError, level_text, plotting
 from ...recording import Recording
+from ...recording.columns import display_scale
 from ...report.chapter import Plot
 from . import Band, Fit, confidence_band
 from .candidates import evaluate_force
 from .cross_validation import LEVEL_TOLERANCE, MAX_LEVEL_WIDTH, held_levels, is_pressure_ramp, levels_of
+from .problem import with_length
 
 MAX_PANELS, MAX_RAMPS = 4, 6
 """Maximum numbers of resting lengths, and of contractions for each of them; evenly selected if there are more."""
@@ -18,7 +20,6 @@ POINTS = 121
 LEVEL = 0.95
 MAX_CURVES = 5
 """Maximum number of curves: more bands would overlap."""
-_DISPLAY_UNITS = {"pressure": (1e-3, "kPa"), "contraction": (100.0, "%"), "force": (1.0, "N")}
 
 
 def ramp_plot(fit: Fit) -> Plot | None:
@@ -50,9 +51,7 @@ def _at(values: Array, level: float) -> Any:
 
 def _draw_panel(axes: Any, fit: Fit, data: Recording, length: float | None) -> None:
     """Draw the ramps of one resting length [m]."""
-    law: Any = fit.model
-    if length is not None and hasattr(law, "with_resting_length"):
-        law = law.with_resting_length(length)
+    law = with_length(fit.model, length)
     levels = held_levels(data["contraction"]).values
     selected = levels[np.unique(np.linspace(0, levels.size - 1, min(levels.size, MAX_RAMPS)).astype(int))]
     for i, level in enumerate(selected):
@@ -103,8 +102,13 @@ class BandCurve:
 
 
 def band_curves(fit: Fit) -> tuple[CurveAxes, tuple[BandCurve, ...]] | None:
-    """Return the fitted curves at measured levels with their bands; None if no band can be computed."""
-    curve, curves = _curve_axes(fit), []
+    """Return the fitted curves at measured levels with their bands; None if no band can be computed.
+
+    They are over the pressure if it was swept at held contractions.
+    """
+    data, quantity = fit.recording, fit.fitted_quantity.name
+    ramp = quantity == "force" and is_pressure_ramp(data["pressure"], data["contraction"])
+    curve, curves = CurveAxes("contraction", "pressure") if ramp else _CURVE_AXES[quantity], []
     for level in levels_of(fit.recording[curve.constant], MAX_CURVES):
         points = _curve_points(fit, curve, float(level))
         try:
@@ -115,14 +119,14 @@ def band_curves(fit: Fit) -> tuple[CurveAxes, tuple[BandCurve, ...]] | None:
     return curve, tuple(curves)
 
 
-def band_plot(fit: Fit, name: str = "bands") -> Plot | None:
+def band_plot(fit: Fit) -> Plot | None:
     """Return the fitted curves with 95 % bands and the half width of the bands; None if no band can be computed."""
     computed, quantity = band_curves(fit), fit.fitted_quantity.name
     if computed is None:
         return None
     curve, curves = computed
     figure, (left, right) = plotting.new_figure(1, 2, width=7.4, height=3.7)
-    (factor, unit), (x_factor, x_unit) = _DISPLAY_UNITS[quantity], _DISPLAY_UNITS[curve.varying]
+    (factor, unit), (x_factor, x_unit) = display_scale(quantity), display_scale(curve.varying)
     for i, each in enumerate(curves):
         confidence, prediction = each.confidence, each.prediction
         colour = plotting.LINES[i % len(plotting.LINES)]
@@ -138,14 +142,7 @@ def band_plot(fit: Fit, name: str = "bands") -> Plot | None:
     left.set(xlabel=f"{curve.varying} [{x_unit}]", ylabel=f"{quantity} [{unit}]")
     right.set(xlabel=f"{curve.varying} [{x_unit}]", ylabel=f"half width of the band [{unit}]", ylim=(0.0, None))
     plotting.legend_below(figure, left, columns=MAX_CURVES + 1)
-    return Plot(name, f"{_CAPTION}{fit.error_basis}.", figure)
-
-
-def _curve_axes(fit: Fit) -> CurveAxes:
-    """Return the quantities of the curves; over the pressure if it was swept at held contractions."""
-    data, quantity = fit.recording, fit.fitted_quantity.name
-    ramp = quantity == "force" and is_pressure_ramp(data["pressure"], data["contraction"])
-    return CurveAxes("contraction", "pressure") if ramp else _CURVE_AXES[quantity]
+    return Plot("bands", f"{_CAPTION}{fit.error_basis}.", figure)
 
 
 def _curve_points(fit: Fit, curve: CurveAxes, level: float) -> Recording:
@@ -159,10 +156,8 @@ def _curve_points(fit: Fit, curve: CurveAxes, level: float) -> Recording:
 
 def _draw_measured(axes: Any, fit: Fit, curve: CurveAxes, factor: float, x_factor: float) -> None:
     measured = fit.recording.rows(fit.censoring == 0)
-    style = {"marker": ".", "linestyle": "none", "markersize": 2, "color": plotting.BLACK, "alpha": 0.35}
-    axes.plot(
-        x_factor * measured[curve.varying], factor * measured[fit.fitted_quantity.name], label="measured", **style
-    )
     values = factor * measured[fit.fitted_quantity.name]
+    style = {"marker": ".", "linestyle": "none", "markersize": 2, "color": plotting.BLACK, "alpha": 0.35}
+    axes.plot(x_factor * measured[curve.varying], values, label="measured", **style)
     margin = 0.08 * float(np.ptp(values)) or 1.0
     axes.set_ylim(float(values.min()) - margin, float(values.max()) + margin)

@@ -1,6 +1,6 @@
 """Checks of the data of a static fit: contradictions, outliers, sensor delays and scatter, as notes with their cause.
 
-They need no law. `DataChecks` joins them with the checks of `bench.checks`, for every static fit.
+They need no law. `check_data` joins them with the checks of `bench.checks`, for every static fit.
 """
 
 import dataclasses
@@ -155,14 +155,10 @@ class DataChecks:
     scatter: Scatter
     delay: SensorDelay | None
 
-    @classmethod
-    def of(cls, recordings: Sequence[Recording]) -> "DataChecks":
-        """The checks of recordings, without the rows in which a code stands for a missing value."""
-        return _check(recordings)
-
 
 @remembered
-def _check(recordings: Sequence[Recording]) -> DataChecks:
+def check_data(recordings: Sequence[Recording]) -> DataChecks:
+    """The checks of recordings, without the rows in which a code stands for a missing value."""
     measured = without_missing_codes([recording for recording in recordings if len(recording)])
     matches, delay = match_rows(measured), find_delay(measured)
     contradictions = contradiction_notes(matches)

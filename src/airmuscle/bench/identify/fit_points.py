@@ -12,11 +12,12 @@ from ...core import Array, IdentificationError, cite
 from ...physics.muscle.characteristic.base import Characteristic, ForceLaw
 from ...recording import Recording
 from ..segment import ISOBARIC, ISOMETRIC, RELATIVE_BAND, find_runs, level_intervals
+from ..segment.interval import spread
 from .contradictions import RepeatedRows, find_repeated_rows
 from .cross_validation import specimen_name
-from .data_checks import DataChecks
+from .data_checks import DataChecks, check_data
 from .parameter_covariance import Runs
-from .problem import RESTING_LENGTH, FitProblem, fitted_quantity_of, make_problem
+from .problem import RESTING_LENGTH, FitProblem, fitted_quantity_of, make_problem, with_length
 from .weighting import Censoring, default_censoring, force_limits, sensor_deviations
 
 LEVEL_BAND = 0.1
@@ -71,22 +72,14 @@ class FitPoints:
         index, specimen = (np.repeat(each, lengths)[~self.missing] for each in numbers)
         return Runs(index, specimen, all("time" in run for run in self.recordings))
 
-    def prepare(self) -> None:
-        """Compute the checks of the data before copies of the points are sent to other processes."""
-        _ = self.checks
-
     @functools.cached_property
     def checks(self) -> DataChecks:
         """Contradictions, suspicious values and scatter of the recordings."""
-        return DataChecks.of(self.recordings)
+        return check_data(self.recordings)
 
     def deviations(self, quantity: str) -> Array | None:
         """The standard deviations of the sensors by recording; None unless they differ."""
-        if self.single or len(self.recordings) < 2:
-            return None
-        if quantity not in self._deviations:
-            self._deviations[quantity] = sensor_deviations(self.recordings, quantity)
-        return self._deviations[quantity]
+        return None if self.single or len(self.recordings) < 2 else sensor_deviations(self.recordings, quantity)
 
     @functools.cached_property
     def at_levels(self) -> Recording:
@@ -111,10 +104,6 @@ class FitPoints:
         return {}
 
     @functools.cached_property
-    def _deviations(self) -> dict[str, Array | None]:
-        return {}
-
-    @functools.cached_property
     def _force_limits(self) -> Censoring:
         return force_limits(self.recordings)
 
@@ -123,17 +112,16 @@ class FitPoints:
         fixed: Collection[str] = (),
     ) -> FitProblem:  # fmt: skip
         """The problem of fitting a law to these points; arguments as for `fit`. Raises IdentificationError."""
-        law = _with_validity_range(_with_length(characteristic, self.data), self.data)
+        law = _with_validity_range(with_length(characteristic, self.data.constants.get(RESTING_LENGTH)), self.data)
         if sigma is None:
             by_recording = self.deviations(fitted_quantity_of(characteristic).name)
             if by_recording is not None:
                 sigma = np.repeat(by_recording, [len(run) for run in self.recordings])
         weights = _row_weights(self.joined, self.missing, sigma)[~self.missing]
-        return make_problem(law, self.data, censoring or self._censoring(law), weights, fixed)
-
-    def _censoring(self, law: Characteristic) -> Censoring:
-        default = default_censoring(law)
-        return default.within(self._force_limits) if isinstance(law, ForceLaw) else default
+        if censoring is None:
+            censoring = default_censoring(law)
+            censoring = censoring.within(self._force_limits) if isinstance(law, ForceLaw) else censoring
+        return make_problem(law, self.data, censoring, weights, fixed)
 
 
 def _join_recordings(runs: Sequence[Recording]) -> tuple[Recording, npt.NDArray[np.bool_]]:
@@ -150,12 +138,11 @@ def _join_recordings(runs: Sequence[Recording]) -> tuple[Recording, npt.NDArray[
                 f"recording.rows(np.isfinite(recording['{name}']))."
             )
     missing = np.isnan(np.stack(list(columns.values()))).any(axis=0) if columns else np.zeros(0, dtype=bool)
-    lengths = {run.constants.get(RESTING_LENGTH) for run in runs} - {None}
+    lengths = {run.constants[RESTING_LENGTH] for run in runs if RESTING_LENGTH in run.constants}
     if len(lengths) > 1 and all(RESTING_LENGTH in run.constants for run in runs):
         by_row = [np.full(len(run), float(run.constants[RESTING_LENGTH])) for run in runs]
         columns[RESTING_LENGTH] = np.concatenate(by_row)
-    length = lengths.pop() if len(lengths) == 1 else None
-    constants = {} if length is None else {"resting_length": length}
+    constants = {"resting_length": lengths.pop()} if len(lengths) == 1 else {}
     return Recording(columns, origin, constants, references=tuple(cite(runs))), missing
 
 
@@ -172,7 +159,7 @@ def _columns_at_levels(recording: Recording) -> tuple[dict[str, Array], dict[str
     names = {ISOBARIC: "pressure", ISOMETRIC: "contraction"}
     for run in find_runs(recording):
         name, rows = names.get(run.kind), run.interval.rows
-        if name is not None and len(run.interval) >= MIN_ROWS_OF_RUN and _range(columns[name][rows]) <= bands[name]:
+        if name is not None and len(run.interval) >= MIN_ROWS_OF_RUN and spread(columns[name][rows]) <= bands[name]:
             columns[name][rows], held[name][rows] = np.median(columns[name][rows]), True
     return columns, held
 
@@ -203,12 +190,6 @@ def _may_be_constant(values: Array, band: float) -> bool:
     return bool((ordered[:, -2] - ordered[:, 1] <= band * (1 + 1e-9)).any())
 
 
-def _range(values: Array) -> float:
-    """The width of the band that contains 98 % of the values."""
-    low, high = np.quantile(values, [0.01, 0.99])
-    return float(high - low)
-
-
 def _row_weights(data: Recording, dropped: npt.NDArray[np.bool_], sigma: npt.ArrayLike | None) -> Array:
     if sigma is None:
         return np.ones(len(data))
@@ -223,12 +204,6 @@ def _row_weights(data: Recording, dropped: npt.NDArray[np.bool_], sigma: npt.Arr
         raise IdentificationError(f"{data.origin}: every sigma must be finite and positive.")
     weights = 1.0 / deviations
     return np.asarray(weights / np.sqrt(np.mean(weights[~dropped] ** 2)))
-
-
-def _with_length(law: Any, data: Recording) -> Any:
-    """A law for muscles of any resting length, at the resting length of the data if there is one."""
-    length = data.constants.get(RESTING_LENGTH)
-    return law.with_resting_length(float(length)) if length is not None and hasattr(law, "with_resting_length") else law
 
 
 def _with_validity_range(law: Characteristic, data: Recording) -> Characteristic:

@@ -11,15 +11,8 @@ from ...engine.processes import Workers
 from ...recording import Recording
 from ...report.chapter import Chapter, NamedValue, Table, TableColumn
 from ..reported import Reported
-from .candidate_scores import (
-    MAX_RECOMMENDED_EXCESS,
-    ExcludedModel,
-    RankedModel,
-    Score,
-    points_of_splits,
-    score_candidates,
-)
-from .candidates import Candidate, standard_candidates, unavailable_candidates
+from .candidate_scores import MAX_RECOMMENDED_EXCESS, RankedModel, Score, points_of_splits, score_candidates
+from .candidates import Candidate, ExcludedModel, started_candidates
 from .cross_validation import GroupSplit, default_split
 from .length_errors import find_length_errors, length_notes
 from .model_evidence import aicc
@@ -64,22 +57,17 @@ def recommend(ranking: Sequence[RankedModel], split: GroupSplit) -> tuple[Ranked
             f"{best.cross_validated_rmse:.4g} N, is not lower by more than one standard error of the difference."
         )
     simpler = min(equivalent, key=_simplicity)
-    return recommended, text + _contradiction(simpler, recommended, best) + _pulling(ranking, recommended)
+    if simpler is not recommended:  # the rows of the fit contradict it
+        text += (
+            f" {simpler.candidate.name} with {simpler.parameter_count} parameters is within one standard error, which "
+            f"{len(best.fold_scores)} folds do not determine well; on the rows of the fit its error is "
+            f"{simpler.in_sample_rmse:.4g} N against {best.in_sample_rmse:.4g} N, more than their noise explains."
+        )
+    return recommended, text + _pulling(ranking, recommended)
 
 
 def _simplicity(model: RankedModel) -> tuple[int, float]:
     return model.parameter_count, model.cross_validated_rmse
-
-
-def _contradiction(simpler: RankedModel, recommended: RankedModel, best: RankedModel) -> str:
-    """The sentence on a simpler law that the rows of the fit contradict; empty without one."""
-    if simpler is recommended:
-        return ""
-    return (
-        f" {simpler.candidate.name} with {simpler.parameter_count} parameters is within one standard error, which "
-        f"{len(best.fold_scores)} folds do not determine well; on the rows of the fit its error is "
-        f"{simpler.in_sample_rmse:.4g} N against {best.in_sample_rmse:.4g} N, more than their noise explains."
-    )
 
 
 def _pulling(ranking: Sequence[RankedModel], recommended: RankedModel) -> str:
@@ -252,10 +240,8 @@ def compare_splits(
 ) -> tuple[Comparison, ...]:  # fmt: skip
     """A comparison for each split, as `compare`; every candidate is fitted once to all rows."""
     points = points_of_splits(runs, splits)
-    compared = standard_candidates(runs) if candidates is None else candidates
+    compared, unavailable = started_candidates(runs) if candidates is None else (candidates, ())
     scores = score_candidates(compared, points, loss, workers, progress, can_exclude=candidates is None)
-    missing = () if candidates is not None else unavailable_candidates(runs)
-    unavailable = tuple(ExcludedModel(name, reason, cause) for name, reason, cause in missing)
     return tuple(_comparison(runs, split, [each[i] for each in scores], unavailable) for i, split in enumerate(splits))
 
 

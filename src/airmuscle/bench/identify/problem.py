@@ -47,6 +47,11 @@ def rows_by_length(law: Any, data: Recording) -> list[tuple[float | None, npt.ND
     return [(float(length), np.flatnonzero(lengths == length)) for length in np.unique(lengths)]
 
 
+def with_length(law: Any, length: Any) -> Any:
+    """The law of a muscle with this resting length [m], if it is known and the law depends on it."""
+    return law.with_resting_length(float(length)) if length is not None and hasattr(law, "with_resting_length") else law
+
+
 def of_length(law: Any, length: float | None) -> Any:
     """As `law.with_resting_length`, but without validation, because a search may pass through invalid parameters."""
     if length is None:
@@ -226,8 +231,7 @@ def make_problem(
     _check_known(law, leaves, fixed)
     kept = {leaf.path for leaf in leaves if fixed and {leaf.path, leaf.path.partition("[")[0]} & set(fixed)}
     free = tuple(i for i, leaf in enumerate(leaves) if leaf.declared.fitted and leaf.path not in kept)
-    measured = int(np.count_nonzero(signs == 0))
-    _check_row_count(law, data, len(free), measured)
+    _check_row_count(law, data, len(free), int(np.count_nonzero(signs == 0)))
     return FitProblem(law, quantity, data, target, signs, weights, leaves, free)
 
 

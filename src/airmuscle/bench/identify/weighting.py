@@ -4,7 +4,6 @@ different test rigs."""
 import abc
 import dataclasses
 import math
-import weakref
 from collections.abc import Sequence
 
 import numpy as np
@@ -13,7 +12,7 @@ import numpy.typing as npt
 from ...core import Array, ColumnError, ParameterError, check_field_types
 from ...physics.muscle.characteristic.base import Characteristic, ForceLaw
 from ...recording import Recording
-from ..segment import estimate_sensors
+from ..segment import estimate_sensors, remembered
 
 ROBUST_LIMIT = 6.0
 """Limit of the residuals in the errors of a robust fit, in robust standard deviations (chosen)."""
@@ -23,6 +22,14 @@ class Loss(abc.ABC):
     """A function rho of the squared scaled residuals; a fit minimises the sum of scale^2 rho((residual/scale)^2)."""
 
     scale: float
+
+    def __post_init__(self) -> None:
+        check_field_types(self)
+        if not 0 < self.scale < np.inf:
+            raise ParameterError(
+                f"{type(self).__name__}.scale is {self.scale!r}; it must be positive and finite, in the unit of the "
+                "fitted quantity. Use about three times the standard deviation of the noise."
+            )
 
     def limit(self, residuals: Array) -> float:
         """The magnitude to which residuals (N,) are limited in errors of a robust fit; infinite for least squares.
@@ -42,9 +49,6 @@ class LeastSquares(Loss):
 
     scale: float = 1.0
 
-    def __post_init__(self) -> None:
-        check_field_types(self)
-
     def limit(self, residuals: Array) -> float:
         return np.inf
 
@@ -62,10 +66,6 @@ class Huber(Loss):
 
     scale: float
 
-    def __post_init__(self) -> None:
-        check_field_types(self)
-        _check_scale(self)
-
     def rho(self, z: Array) -> Array:
         root = np.sqrt(np.maximum(z, 1.0))
         inside = z <= 1.0
@@ -78,21 +78,9 @@ class SoftL1(Loss):
 
     scale: float
 
-    def __post_init__(self) -> None:
-        check_field_types(self)
-        _check_scale(self)
-
     def rho(self, z: Array) -> Array:
         root = np.sqrt(1.0 + z)
         return np.stack([2 * (root - 1), 1 / root, -0.5 / root**3])
-
-
-def _check_scale(loss: Loss) -> None:
-    if not 0 < loss.scale < np.inf:
-        raise ParameterError(
-            f"{type(loss).__name__}.scale is {loss.scale!r}; it must be positive and finite, in the unit of the fitted "
-            "quantity. Use about three times the standard deviation of the noise."
-        )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -152,10 +140,9 @@ def force_limits(runs: Sequence[Recording]) -> Censoring:
 MIN_SENSOR_RATIO = 2.0
 """Minimum ratio of neighbouring standard deviations of two different sensors (chosen: estimates of the standard
 deviation of one sensor differ less)."""
-_known: weakref.WeakKeyDictionary[Recording, dict[str, tuple[float, float]]] = weakref.WeakKeyDictionary()
-"""Noise and quantisation by recording and column: cross-validation asks for the same recordings in every fold."""
 
 
+@remembered
 def sensor_deviations(runs: Sequence[Recording], quantity: str) -> Array | None:
     """The standard deviation of one observation in each recording [SI], shape (recordings,).
 
@@ -163,42 +150,31 @@ def sensor_deviations(runs: Sequence[Recording], quantity: str) -> Array | None:
     the rows are then in no known order. Recordings with similar standard deviations are attributed to one test rig and
     share their median. None where all recordings are of one rig, or a sensor shows neither noise nor resolution.
     """
-    timed = all("time" in run.columns for run in runs)
-    estimates = []
-    for run in runs:
-        try:
-            estimates.append(_sensor_deviation(run, quantity, timed))
-        except ColumnError:
-            return None
-        if not estimates[-1] > 0:
-            return None
-    single = np.array(estimates)
-    if not single.size:
+    try:
+        deviations, quantisation = np.array([_sensor_deviation(run, quantity) for run in runs]).reshape(-1, 2).T
+    except ColumnError:
         return None
-    coarse = np.array([_coarse_deviation(run, quantity, timed) for run in runs])
+    timed = all("time" in run.columns for run in runs)
+    single = deviations if timed else quantisation
+    if not single.size or not (single > 0).all():
+        return None
+    # With the whole resolution, because the noise of readings that change by few steps of the resolution is estimated
+    # as none or as a whole step.
+    coarse = np.hypot(deviations, quantisation * np.sqrt(12.0)) if timed else quantisation
     order = np.argsort(coarse)
     rigs = np.split(order, np.flatnonzero(coarse[order][1:] > MIN_SENSOR_RATIO * coarse[order][:-1]) + 1)
     if len(rigs) < 2:
         return None
-    deviations = np.empty(single.size)
+    result = np.empty(single.size)
     for rig in rigs:
-        deviations[rig] = np.median(single[rig])
-    return deviations
+        result[rig] = np.median(single[rig])
+    return result
 
 
-def _coarse_deviation(run: Recording, quantity: str, timed: bool) -> float:
-    """The standard deviation with the whole resolution, by which rigs are told apart: the noise of readings that change
-    by few steps of the resolution is estimated as none or as a whole step."""
-    deviation, quantisation = _known[run][quantity]
-    return float(np.hypot(deviation, quantisation * np.sqrt(12.0))) if timed else quantisation
-
-
-def _sensor_deviation(run: Recording, quantity: str, timed: bool) -> float:
-    """The standard deviation of the sensor of one recording; 0 where it cannot be estimated."""
-    stored = _known.setdefault(run, {})
-    if quantity not in stored:
-        values = run[quantity][np.isfinite(run[quantity])]
-        sensors = estimate_sensors(Recording({quantity: values}, run.origin)) if values.size else {}
-        sensor = sensors.get(quantity)
-        stored[quantity] = (0.0, 0.0) if sensor is None else (sensor.std, float(sensor.resolution / np.sqrt(12.0)))
-    return stored[quantity][0 if timed else 1]
+@remembered
+def _sensor_deviation(run: Recording, quantity: str) -> tuple[float, float]:
+    """Standard deviations of noise and quantisation, and of quantisation alone; 0 where they cannot be estimated."""
+    values = run[quantity][np.isfinite(run[quantity])]
+    sensors = estimate_sensors(Recording({quantity: values}, run.origin)) if values.size else {}
+    sensor = sensors.get(quantity)
+    return (0.0, 0.0) if sensor is None else (sensor.std, float(sensor.resolution / np.sqrt(12.0)))

@@ -91,45 +91,22 @@ def merge_channels(
     channels = [c for c in channels if np.ndim(c.values) == 1 and len(c.values)]
     if not channels:
         raise ColumnError(f"{origin}: no channel contains a vector of numbers.")
-    timed = [c for c in channels if c.time is not None]
-    if not timed or all(_same_time(c, timed[0]) for c in channels):
-        _check_equal_lengths(origin, channels)
-        return _make_table(origin, channels, timed[0].time if timed else None, (), constants, row_label)
-    _check_timed(origin, channels)
-    _check_ordered(origin, channels)
+    times = [c.time for c in channels if c.time is not None]
+    if len({len(c.values) for c in channels}) == 1 and all(np.array_equal(each, times[0]) for each in times):
+        return _make_table(origin, channels, next(iter(times), None), (), constants, row_label)
+    _check_times(origin, channels)
     return _resample(origin, channels, constants, row_label)
 
 
-def _same_time(channel: Channel, reference: Channel) -> bool:
-    assert reference.time is not None
-    if len(channel.values) != len(reference.values):
-        return False
-    return channel.time is None or bool(np.array_equal(channel.time, reference.time))
-
-
-def _check_equal_lengths(origin: str, channels: Sequence[Channel]) -> None:
-    if len({len(c.values) for c in channels}) > 1:
-        sizes = ", ".join(f"{c.name} {len(c.values)}" for c in channels)
-        raise ColumnError(
-            f"{origin}: the channels have different numbers of rows ({sizes}) and no time to align them. "
-            "Select a group whose channels have equal lengths, or export the channels with their time."
-        )
-
-
-def _check_timed(origin: str, channels: Sequence[Channel]) -> None:
-    untimed = [c.name for c in channels if c.time is None]
-    if untimed:
-        raise ColumnError(
-            f"{origin}: the channels have different rows, and no time is stated for {', '.join(untimed)}. "
-            "Select a group whose channels have equal lengths, or export the channels with their time."
-        )
-
-
-def _check_ordered(origin: str, channels: Sequence[Channel]) -> None:
-    """Raise ColumnError where the time of a channel decreases, so that no interpolation is defined."""
+def _check_times(origin: str, channels: Sequence[Channel]) -> None:
+    """Raise ColumnError where a channel has no time, or one that decreases, so that no interpolation is defined."""
     for channel in channels:
         if channel.time is None:
-            continue
+            sizes = ", ".join(f"{c.name} {len(c.values)}" for c in channels)
+            raise ColumnError(
+                f"{origin}: the channels have different rows ({sizes}), and no time is stated for {channel.name}. "
+                "Select a group whose channels have equal lengths, or export the channels with their time."
+            )
         decreasing = np.flatnonzero(np.diff(channel.time) < 0.0)
         if decreasing.size:
             raise ColumnError(
@@ -141,19 +118,16 @@ def _check_ordered(origin: str, channels: Sequence[Channel]) -> None:
 def _resample(
     origin: str, channels: Sequence[Channel], constants: Mapping[str, float | str], row_label: str
 ) -> RawTable:
-    leader = max(channels, key=lambda c: len(c.values))
-    low = max(float(c.time[0]) for c in channels if c.time is not None)
-    high = min(float(c.time[-1]) for c in channels if c.time is not None)
+    leader, times = max(channels, key=lambda c: len(c.values)), [c.time for c in channels if c.time is not None]
     assert leader.time is not None
-    rounding = _rounding(leader.time)
+    low, high, rounding = max(each[0] for each in times), min(each[-1] for each in times), _rounding(leader.time)
     time = leader.time[(leader.time >= low - rounding) & (leader.time <= high + rounding)]
     if not len(time):
         raise ColumnError(f"{origin}: the time ranges of the channels do not overlap. Select one group of channels.")
     resampled, notes = [], []
     for channel in channels:
-        same = channel.time is not None and np.array_equal(channel.time, leader.time)
         resampled.append(dataclasses.replace(channel, values=_interpolate(channel, time), time=time))
-        if not same:
+        if channel.time is None or not np.array_equal(channel.time, leader.time):
             rows = f"its {len(channel.values)} rows are interpolated to the {len(time)} rows of '{leader.name}'"
             notes.append(f"Channel '{channel.name}' has its own time vector: {rows}.")
     return _make_table(origin, resampled, time, tuple(notes), constants, row_label)

@@ -191,11 +191,8 @@ def _parse_entry(where: str, column: str, value: Any) -> str:
     """`pressure [bara]`, from this text or from `{quantity = "pressure", unit = "bara"}`."""
     if isinstance(value, str):
         return value
-    if (
-        isinstance(value, dict)
-        and set(value) <= {"quantity", "unit"}
-        and all(isinstance(v, str) for v in value.values())
-    ):
+    texts = isinstance(value, dict) and all(isinstance(each, str) for each in value.values())
+    if texts and set(value) <= {"quantity", "unit"}:
         return f"{value.get('quantity', '')} [{value['unit']}]" if value.get("unit") else value["quantity"]
     raise ParameterError(
         f"{where}: column '{column}' is mapped to {abridged(value)}; write 'pressure [bara]' or "
@@ -224,8 +221,7 @@ def apply_mapping(table: RawTable, mapping: ColumnMapping) -> RawTable:
 
 def _column_index(table: RawTable, column: str) -> int:
     """The index of a column, by its heading, by its heading without unit, or by its number from 1."""
-    bare = list(map(bare_heading, table.headings))
-    for names in (list(table.headings), bare):
+    for names in (table.headings, tuple(map(bare_heading, table.headings))):
         if names.count(column) == 1:
             return names.index(column)
     if column.isdecimal() and 1 <= int(column) <= len(table.headings):

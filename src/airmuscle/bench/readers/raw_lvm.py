@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...core import ColumnError, FileError, abridged, alternatives
+from ...core import ColumnError, FileError, abridged, check_known
 from .channels import Cells, Channel, RawTable, merge_channels
 from .raw_csv import parse_columns, read_csv_table, read_text
 from .text_format import NumberedLines, TextFormat, TextHeader, check_cell_sizes, has_content
@@ -30,7 +30,10 @@ def is_lvm(path: Path) -> bool:
 
 
 def read_lvm_tables(path: Path, group: str | None, text_format: TextFormat) -> tuple[RawTable, ...]:
-    """Read one table from each segment, or from that of the number `group`. Raises FileError or ColumnError."""
+    """Read one table from each segment, or from that of the number `group`; the table of any other text file.
+
+    Raises FileError or ColumnError.
+    """
     if not is_lvm(path):
         return (read_csv_table(path, text_format),)
     text = _SPECIAL.sub(lambda block: "\n" * block[0].count("\n"), read_text(path))
@@ -43,8 +46,7 @@ def read_lvm_tables(path: Path, group: str | None, text_format: TextFormat) -> t
     starts = [next(k for k in range(end - 1, -1, -1) if k in ends or _is_data(lines[k][1])) + 1 for end in ends[1:]]
     places = zip(starts, ends[1:], [*starts[1:], len(lines)], strict=True)
     segments = {str(i): (lines[a : b + 1], lines[b + 1 : c]) for i, (a, b, c) in enumerate(places, 1)}
-    if group is not None and group not in segments:
-        raise FileError(f"{path.name}: no segment '{group}'{alternatives(group, segments, 'it has')}")
+    check_known(f"{path.name}: no segment", [] if group is None else group, segments, "it has", FileError)
     file_tags = _tags(lines[: ends[0]], delimiter)
     decimal = next(iter(file_tags.get("Decimal_Separator", [])[1:]), None) or None
     form = dataclasses.replace(text_format, delimiter=delimiter, decimal=text_format.decimal or decimal)

@@ -53,17 +53,15 @@ def _nonempty_rows(sheet: Any) -> Rows:
 
 def _parse_table(origin: str, rows: Rows, text_format: TextFormat) -> RawTable:
     """The table of a worksheet; rows above the headings may state constants."""
-    texts = ((i, [_text(cell) for cell in row]) for i, row in rows)
+    texts = ((i, _texts(row)) for i, row in rows)
     stated = header.stated_heading_row(texts, text_format.named, text_format.skip_rows)
     if text_format.skip_rows is not None and stated is None:
         raise FileError(f"{origin}: there is no table below the {text_format.skip_rows} rows of skip_rows.")
     start = _find_heading_row(rows) if stated is None else stated
-    constants = dict(
-        constant for _, row in rows[:start] if (constant := header.parse_constant_cells([_text(cell) for cell in row]))
-    )
+    constants = dict(filter(None, (header.parse_constant_cells(_texts(row)) for _, row in rows[:start])))
     first, cells = rows[start]
     used = [j for j, cell in enumerate(cells) if cell not in (None, "")]
-    if header.are_headings([_text(c) for c in cells]):
+    if header.are_headings(_texts(cells)):
         headings, body = [_text(cells[j]) for j in used], rows[start + 1 :]
     elif text_format.headerless:
         headings, body = [str(n) for n in range(1, len(used) + 1)], rows[start:]
@@ -86,18 +84,16 @@ def _find_heading_row(rows: Rows) -> int:
     if not above:
         return numeric
     adjacent = len(above) > 1 and above[-2] == above[-1] - 1
-    last = [_text(c) for c in rows[above[-1]][1]]
-    return above[-2] if adjacent and header.parse_unit_row([_text(c) for c in rows[above[-2]][1]], last) else above[-1]
+    is_unit_row = adjacent and header.parse_unit_row(*(_texts(rows[i][1]) for i in above[-2:]))
+    return above[-2] if is_unit_row else above[-1]
 
 
 def _is_numeric(row: list[Any]) -> bool:
     """Whether more than half of the cells of a row are numbers or times, also as texts; the others may be names."""
     cells = [c for c in row if c not in (None, "")]
-    numbers = sum(
-        header.is_number(c) or seconds_from_clock((c,)) is not None if isinstance(c, str) else isinstance(c, _NUMBERS)
-        for c in cells
-    )
-    return 2 * numbers > len(cells)
+    texts = [c for c in cells if isinstance(c, str)]
+    numbers = sum(header.is_number(c) or seconds_from_clock((c,)) is not None for c in texts)
+    return 2 * (numbers + sum(isinstance(c, _NUMBERS) for c in cells)) > len(cells)
 
 
 def _check_headings_cover(origin: str, headings: list[str], used: list[int], body: Rows) -> None:
@@ -118,11 +114,15 @@ def _text(cell: Any) -> str:
     return "" if cell is None else str(cell).strip()
 
 
+def _texts(cells: list[Any]) -> list[str]:
+    return [_text(cell) for cell in cells]
+
+
 def _column(cells: list[Any]) -> Cells:
     """A column of numbers, also of numbers that are stored as texts with one decimal sign; otherwise of texts."""
     if all(isinstance(cell, float | int) and not isinstance(cell, bool) for cell in cells):
         return np.array(cells, dtype=float)
-    texts = [_text(cell) for cell in cells]
+    texts = _texts(cells)
     stored = [cell for cell in cells if isinstance(cell, str)]
     if not any(header.POINT_NUMBER.fullmatch(text.strip()) for text in stored):
         texts = [text.replace(",", ".") if header.COMMA_NUMBER.fullmatch(text) else text for text in texts]

@@ -34,15 +34,11 @@ TEXT_EXTENSIONS = (".csv", ".txt", ".tsv", ".dat", ".asc", ".prn", ".lvm")
 _BINARY_READERS: Mapping[str, Callable[[Path, ColumnMapping, Downsampling], Tables]] = {
     **dict.fromkeys(WORKBOOKS, lambda path, m, d: read_workbook_tables(path, m.sheet, m.text_format)),
     ".parquet": lambda path, m, d: read_parquet_tables(path, m.group),
-    ".h5": lambda path, m, d: read_hdf5_tables(path, m.group, d),
-    ".hdf5": lambda path, m, d: read_hdf5_tables(path, m.group, d),
+    **dict.fromkeys((".h5", ".hdf5"), lambda path, m, d: read_hdf5_tables(path, m.group, d)),
     ".mat": lambda path, m, d: read_mat_tables(path, m.group, tuple(map(str, m.columns)), d),
     ".tdms": lambda path, m, d: read_tdms_tables(path, m.group),
-    ".mf4": lambda path, m, d: read_mdf_tables(path, m.group, d),
-    ".mdf": lambda path, m, d: read_mdf_tables(path, m.group, d),
-    ".bag": lambda path, m, d: read_rosbag_tables(path, m.group),
-    ".db3": lambda path, m, d: read_rosbag_tables(path, m.group),
-    ".mcap": lambda path, m, d: read_rosbag_tables(path, m.group),
+    **dict.fromkeys((".mf4", ".mdf"), lambda path, m, d: read_mdf_tables(path, m.group, d)),
+    **dict.fromkeys((".bag", ".db3", ".mcap"), lambda path, m, d: read_rosbag_tables(path, m.group)),
 }
 EXTENSIONS = (*TEXT_EXTENSIONS, *_BINARY_READERS)
 """Extensions of the supported files."""
@@ -151,10 +147,6 @@ def read_tables(
     if suffix in _BINARY_READERS:
         return tuple(downsample(table, downsampling) for table in _BINARY_READERS[suffix](path, mapping, downsampling))
     check_text_file(path)
-    if is_lvm(path):
-        return tuple(
-            downsample(each, downsampling) for each in read_lvm_tables(path, mapping.group, mapping.text_format)
-        )
-    if is_large_file(path):
+    if is_large_file(path) and not is_lvm(path):
         return (read_large_csv(path, mapping.text_format, downsampling, progress),)
-    return (downsample(read_csv_table(path, mapping.text_format), downsampling),)
+    return tuple(downsample(each, downsampling) for each in read_lvm_tables(path, mapping.group, mapping.text_format))

@@ -141,11 +141,11 @@ def parse_header(origin: str, lines: NumberedLines, text_format: TextFormat) -> 
     count += 1 if units else 0
     if len(body) <= count:
         raise FileError(f"{origin}: no rows of numbers below the headings ({listed(headings)}).")
-    cells = [header.parse_constant_cells(split_cells(line, delimiter)) for _, line in preamble]
-    constants = dict(
-        constant for constant in (*cells, *(header.parse_constant_comment(line) for _, line in comments)) if constant
-    )
-    return TextHeader(tuple(headings), units, constants, delimiter, above + count)
+    constants = [
+        *(header.parse_constant_cells(split_cells(line, delimiter)) for _, line in preamble),
+        *(header.parse_constant_comment(line) for _, line in comments),
+    ]
+    return TextHeader(tuple(headings), units, dict(filter(None, constants)), delimiter, above + count)
 
 
 def _lines_above_headings(body: NumberedLines, text_format: TextFormat) -> int:

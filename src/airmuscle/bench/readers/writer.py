@@ -1,8 +1,9 @@
 """Writer of recordings as CSV, Parquet and HDF5, by the extension, and conversion to and from pandas and xarray."""
 
 import csv
+import dataclasses
 import json
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ import numpy as np
 from ...core import AirmuscleError, FileError, ParameterError, abridged, atomic_file, one_line
 from ...recording.columns import split_unit
 from ...recording.recording import Recording, column_heading
-from .channels import Cells, RawTable, to_cells
+from .channels import Channel, merge_channels
 from .constants import CONSTANT_UNITS
 from .header import is_number
 from .interpret import interpret
@@ -72,11 +73,8 @@ def _one_line(text: str) -> str:
 
 def _columns(recording: Recording) -> list[tuple[str, str, Any]]:
     """Name, unit and values of every column."""
-    columns = []
-    for name in recording:
-        plain, unit = split_unit(column_heading(name))
-        columns.append((plain if unit else name, unit or "", np.asarray(recording[name])))
-    return columns
+    headings = {name: split_unit(column_heading(name)) for name in recording}
+    return [(plain if unit else name, unit or "", recording[name]) for name, (plain, unit) in headings.items()]
 
 
 def _write_parquet(recording: Recording, temporary: Path, path: Path, comments: bool) -> None:
@@ -126,27 +124,20 @@ def from_pandas(frame: Any, mapping: ColumnMapping = ColumnMapping(), *, origin:
     if not len(frame.columns) or not len(frame):
         raise ParameterError(f"from_pandas: {origin} has no columns or no rows.")
     series = [frame.iloc[:, i] for i in range(len(frame.columns))]
-    dates = [each.dtype.kind in "Mm" for each in series]
-    headings = tuple(
-        split_unit(str(name))[0] if dated else str(name) for name, dated in zip(frame.columns, dates, strict=True)
-    )  # dates become seconds whatever unit the heading states
-    row = tuple("s" if each else "" for each in dates) if any(dates) else None
-    columns = tuple(map(_cells, series))
-    table = RawTable(origin, headings, row, columns, np.arange(len(frame)), "row", {}, _notes_on_dates(series))
+    notes = tuple(
+        f"Column '{each.name}' contains dates; time is counted from the first, {each.iloc[0]}."
+        for each in series
+        if each.dtype.kind == "M"
+    )
+    table = merge_channels(origin, [Channel(str(each.name), _values(each)) for each in series], {})
+    table = dataclasses.replace(table, rows=np.arange(len(frame)), notes=notes)
     return interpret(apply_mapping(table, mapping), mapping)
 
 
-def _notes_on_dates(columns: Sequence[Any]) -> tuple[str, ...]:
-    dates = [each for each in columns if each.dtype.kind == "M"]
-    return tuple(
-        f"Column '{each.name}' contains dates; time is counted from the first, {each.iloc[0]}." for each in dates
-    )
-
-
-def _cells(series: Any) -> Cells:
-    """Numbers where the column has a numeric type or contains dates or durations, otherwise texts."""
+def _values(series: Any) -> Any:
+    """Numbers, dates or durations where the column has such a type, otherwise texts."""
     if series.dtype.kind in "Mm":
-        return to_cells(series.to_numpy(dtype=f"{'datetime' if series.dtype.kind == 'M' else 'timedelta'}64[ns]"))
+        return series.to_numpy(dtype=f"{'datetime' if series.dtype.kind == 'M' else 'timedelta'}64[ns]")
     if series.dtype.kind in "biuf":
         return np.asarray(series.to_numpy(), dtype=float)
     return [str(value) for value in series]

@@ -120,7 +120,10 @@ def _run_findings(recording: Recording, runs: tuple[Run, ...]) -> Iterator[Findi
 
 def _motion_findings(recording: Recording) -> Iterator[Finding]:
     """A recording of pressure and force without a length: the kind of the run and the contraction remain open."""
-    if moved_column(recording) is None and "pressure" in recording and "force" in recording:
+    moved = moved_column(recording)
+    if "pressure" not in recording or "force" not in recording:
+        return
+    if moved is None:
         yield Finding(
             HintedText(
                 "no length or contraction was recorded, so the kind of the run is open and no characteristic can be "
@@ -131,16 +134,11 @@ def _motion_findings(recording: Recording) -> Iterator[Finding]:
                 Hint("To state its place in the names of the files", "file_name", "held{length [mm]}", "ColumnMapping"),
             )
         )
-    elif "pressure" in recording and "force" in recording and "contraction" not in recording:
-        yield Finding(_contraction_missing(str(moved_column(recording))))
-
-
-def _contraction_missing(moved: str) -> HintedText:
-    """The reason why a static fit will refuse a recording with this column of the motion, and the remedy."""
-    refused = "a static fit needs the contraction and will refuse this recording."
-    if moved == "position":
-        return HintedText(f"{refused} ", ZERO_NOT_STATED)
-    return HintedText(f"{refused}", Hint(f"To convert the {moved}", "resting_length", "300 mm", "ColumnMapping"))
+    elif "contraction" not in recording:
+        converted = Hint(f"To convert the {moved}", "resting_length", "300 mm", "ColumnMapping")
+        remedy = (" ", ZERO_NOT_STATED) if moved == "position" else (converted,)
+        refused = "a static fit needs the contraction and will refuse this recording."
+        yield Finding(HintedText(refused, *remedy))
 
 
 def _pressure_range(recording: Recording) -> str:

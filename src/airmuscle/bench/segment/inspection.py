@@ -39,7 +39,36 @@ class Inspection(ShortRepr):
 
     def plot(self) -> Any:
         """Pressure, force and length over time with branches, plateaus, outliers and limits; a Matplotlib figure."""
-        return plot_segments(self.recording, self.sensors, self.branches, self.plateaus, self.outliers)
+        recording = self.recording
+        names = [n for n in _PLOTTED if n in recording] or [n for n in recording if n != "time"]
+        if "contraction" in names and "length" in names:
+            names.remove("length")
+        abscissa: Array = recording["time"] if "time" in recording else np.arange(1.0, len(recording) + 1)
+        figure, axes = new_figure(len(names), 1, height=1.1 + 1.5 * len(names), sharex=True, squeeze=False)
+        for axis, name in zip(axes[:, 0], names, strict=True):
+            factor, unit = display_scale(name)
+            self._draw(axis, name, abscissa, factor)
+            axis.set_ylabel(f"{name}\n[{unit}]")
+        axes[-1, 0].set_xlabel("time [s]" if "time" in recording else "row")
+        figure.align_ylabels()
+        figure.suptitle(recording.origin, fontsize=9)
+        legend_below(figure, axes[0, 0], columns=4)
+        return figure
+
+    def _draw(self, axis: Any, name: str, abscissa: Array, factor: float) -> None:
+        """One column: readings coloured by branch, plateaus as bars, outliers as crosses, limits of the sensor."""
+        values = self.recording[name] * factor
+        _draw_readings(axis, self.branches, abscissa, values)
+        for i, plateau in enumerate(self.plateaus):
+            ends = abscissa[[plateau.interval.start, plateau.interval.stop - 1]]
+            level = [plateau.values.get(name, np.nan) * factor] * 2
+            axis.plot(ends, level, color=GREEN, linewidth=1.2, label="plateau" if i == 0 else None)
+        if self.outliers:  # also in axes without outliers, because the legend is that of the first axis
+            rows = [outlier.row for outlier in self.outliers if outlier.column == name]
+            style = {"linestyle": "none", "marker": "x", "markersize": 6, "color": PURPLE}
+            axis.plot(abscissa[rows], values[rows], label="suspected outlier", **style)
+        if name in self.sensors and values.size:
+            _draw_limits(axis, self.sensors[name], factor)
 
 
 def inspect(recording: Recording, shared_sensors: Mapping[str, Sensor] | None = None) -> Inspection:
@@ -85,34 +114,7 @@ _PLOTTED = ("pressure", "force", "contraction", "length", "shortening", "positio
 _COLOURS = {1: BLUE, -1: RED}
 
 
-def plot_segments(
-    recording: Recording, sensors: Mapping[str, Sensor], branches: Sequence[Branch], plateaus: Sequence[Plateau],
-    outliers: Sequence[Outlier],
-) -> Any:  # fmt: skip
-    """A Matplotlib figure, one axis per column: readings coloured by branch, plateaus as bars, outliers as crosses."""
-    names = [n for n in _PLOTTED if n in recording] or [n for n in recording if n != "time"]
-    if "contraction" in names and "length" in names:
-        names.remove("length")
-    abscissa: Array = recording["time"] if "time" in recording else np.arange(1.0, len(recording) + 1)
-    figure, axes = new_figure(len(names), 1, height=1.1 + 1.5 * len(names), sharex=True, squeeze=False)
-    for axis, name in zip(axes[:, 0], names, strict=True):
-        factor, unit = display_scale(name)
-        values = recording[name] * factor
-        _draw_branches(axis, branches, abscissa, values)
-        _draw_plateaus(axis, plateaus, name, abscissa, factor)
-        if outliers:  # also in axes without outliers, because the legend is that of the first axis
-            _draw_outliers(axis, [outlier.row for outlier in outliers if outlier.column == name], abscissa, values)
-        if name in sensors:
-            _draw_limits(axis, sensors[name], values, factor)
-        axis.set_ylabel(f"{name}\n[{unit}]")
-    axes[-1, 0].set_xlabel("time [s]" if "time" in recording else "row")
-    figure.align_ylabels()
-    figure.suptitle(recording.origin, fontsize=9)
-    legend_below(figure, axes[0, 0], columns=4)
-    return figure
-
-
-def _draw_branches(axis: Any, branches: Sequence[Branch], abscissa: Array, values: Array) -> None:
+def _draw_readings(axis: Any, branches: Sequence[Branch], abscissa: Array, values: Array) -> None:
     dots = {"linestyle": "none", "marker": ".", "markersize": 2.5}
     if not branches:
         axis.plot(abscissa, values, color=BLUE, label="measured", **dots)
@@ -123,21 +125,9 @@ def _draw_branches(axis: Any, branches: Sequence[Branch], abscissa: Array, value
         axis.plot(abscissa[rows], values[rows], color=colour, label=None if label in labels else label, **dots)
 
 
-def _draw_plateaus(axis: Any, plateaus: Sequence[Plateau], name: str, abscissa: Array, factor: float) -> None:
-    for i, plateau in enumerate(plateaus):
-        ends = abscissa[[plateau.interval.start, plateau.interval.stop - 1]]
-        level = [plateau.values.get(name, np.nan) * factor] * 2
-        axis.plot(ends, level, color=GREEN, linewidth=1.2, label="plateau" if i == 0 else None)
-
-
-def _draw_outliers(axis: Any, rows: list[int], abscissa: Array, values: Array) -> None:
-    style = {"linestyle": "none", "marker": "x", "markersize": 6, "color": PURPLE}
-    axis.plot(abscissa[rows], values[rows], label="suspected outlier", **style)
-
-
-def _draw_limits(axis: Any, sensor: Sensor, values: Array, factor: float) -> None:
+def _draw_limits(axis: Any, sensor: Sensor, factor: float) -> None:
     for limit in (sensor.lower_limit, sensor.upper_limit):
-        if np.isfinite(limit) and values.size:
+        if np.isfinite(limit):
             axis.axhline(limit * factor, color=ORANGE, linestyle="--", linewidth=1.0)
             axis.annotate("sensor limit", (0.995, limit * factor), xycoords=("axes fraction", "data"), ha="right",
                           va="bottom", fontsize=7, color=ORANGE)  # fmt: skip

@@ -51,11 +51,7 @@ def _values(inspection: Inspection) -> Iterator[NamedValue]:
     yield NamedValue("recording", inspection.recording.origin, brief=False)
     yield NamedValue("rows", len(inspection.recording), brief=False)
     for name, value in inspection.recording.constants.items():
-        quantity = quantity_of(CONSTANT_QUANTITIES.get(name, name))
-        shown = display_scale(CONSTANT_QUANTITIES.get(name, name))[1]
-        known = quantity is not None and isinstance(value, float)
-        unit = quantity.unit if quantity and known else ""
-        yield NamedValue(name.replace("_", " "), value, unit, shown if known else "")
+        yield NamedValue(name.replace("_", " "), value, *_units(name, value))
     if sampling is not None:
         yield NamedValue("rows per second", sampling.rate, "1/s", brief=False)
         yield NamedValue("duration", sampling.duration, "s", brief=False)
@@ -70,6 +66,16 @@ def _values(inspection: Inspection) -> Iterator[NamedValue]:
         yield NamedValue("agreement with the branch column", inspection.branch_agreement, "1", "%", 3)
     yield NamedValue(
         "suspected outliers", len(inspection.outliers), remark="not removed" if inspection.outliers else ""
+    )
+
+
+def _units(name: str, value: Any) -> tuple[str, str]:
+    """The SI unit and the displayed unit of a constant; empty for one that is no known quantity."""
+    quantity = quantity_of(CONSTANT_QUANTITIES.get(name, name))
+    return (
+        (quantity.unit, display_scale(CONSTANT_QUANTITIES.get(name, name))[1])
+        if quantity and isinstance(value, float)
+        else ("", "")
     )
 
 
@@ -159,23 +165,20 @@ def _describe_sampling(sampling: Sampling) -> str:
 
 def _overview(inspections: Sequence[Inspection]) -> Chapter:
     """Return the chapter of several files: one row each, and each note once with the files that it concerns."""
+    names = [", ".join(name for name in each.recording if name != "time") for each in inspections]
+    rates = [each.sampling and each.sampling.rate for each in inspections]
     columns: dict[str, Any] = {
         "file": [each.recording.origin for each in inspections],
         "rows": [len(each.recording) for each in inspections],
-        "rows per second": TableColumn(
-            [each.sampling and each.sampling.rate for each in inspections], short="per second"
-        ),
+        "rows per second": TableColumn(rates, short="per second"),
         "outliers": [len(each.outliers) for each in inspections],
-        "quantities": TableColumn(
-            [", ".join(name for name in each.recording if name != "time") for each in inspections], brief=False
-        ),
+        "quantities": TableColumn(names, brief=False),
         "runs": [_describe_runs(each.runs) for each in inspections],
-    }  # fmt: skip
-    names = dict.fromkeys(", ".join(name for name in each.recording if name != "time") for each in inspections)
+    }
     return Chapter(
         name="overview",
         title=f"{len(inspections)} recordings",
-        summary=f"Columns: {'; '.join(list(names)[:MAX_LISTED])}.",
+        summary=f"Columns: {'; '.join(list(dict.fromkeys(names))[:MAX_LISTED])}.",
         values=tuple(_common_constants(inspections)),
         tables=(Table("files", "Recordings", columns, brief=MAX_FILES),),
         problems=_common([[f.text for f in each.findings if f.serious] for each in inspections], inspections),
@@ -201,10 +204,8 @@ def _common_constants(inspections: Sequence[Inspection]) -> Iterator[NamedValue]
     constants: dict[str, dict[str, None]] = {}
     for each in inspections:
         for name, value in each.recording.constants.items():
-            quantity = quantity_of(CONSTANT_QUANTITIES.get(name, name))
-            is_known = quantity is not None and isinstance(value, float)
-            shown = display_scale(CONSTANT_QUANTITIES.get(name, name))[1]
-            text = quantity_text(value, quantity.unit, shown) if quantity and is_known else str(value)
+            unit, shown = _units(name, value)
+            text = quantity_text(value, unit, shown) if unit else str(value)
             constants.setdefault(name, {})[text] = None
     for name, texts in constants.items():
         some = [*list(texts)[:MAX_LISTED], *(["..."] if len(texts) > MAX_LISTED else [])]
@@ -222,10 +223,5 @@ def _common(texts: Sequence[Sequence[str]], inspections: Sequence[Inspection]) -
         same = len({other for other, _ in others} | {text}) == 1
         rest = f" and {len(others)} more" if others else ""
         which = f"{origin}{rest}" if same else f"{origin}; others with other numbers: {len(others)}"
-        lines.append(text if same and len(others) + 1 == len(inspections) else _with_files(text, which))
+        lines.append(text if same and len(others) + 1 == len(inspections) else HintedText(text, f" ({which})"))
     return tuple(lines)
-
-
-def _with_files(text: str, which: str) -> str:
-    """A text with the files that it concerns; its hints remain."""
-    return HintedText(text, f" ({which})") if isinstance(text, HintedText) else f"{text} ({which})"

@@ -13,28 +13,25 @@ from ...core import Array
 from ...recording.recording import Recording
 
 Analysis = TypeVar("Analysis", bound=Callable[..., Any])
-_Known = dict[tuple[int, ...], tuple[tuple[weakref.ref[Recording], ...], Any]]
+_Known = dict[tuple[int | str, ...], tuple[tuple[weakref.ref[Recording], ...], Any]]
 
 
 def remembered(analyse: Analysis) -> Analysis:
     """The function of a recording, or of several, whose result is remembered as long as the first of them.
 
-    Calls with further arguments are not remembered.
+    Calls with further arguments that are no texts are not remembered.
     """
     results: weakref.WeakKeyDictionary[Recording, _Known] = weakref.WeakKeyDictionary()
 
     @functools.wraps(analyse)
-    def remembering(*arguments: Any, **options: Any) -> Any:
-        if options or len(arguments) != 1:
-            return analyse(*arguments, **options)
-        (recordings,) = arguments
+    def remembering(recordings: Any, *texts: Any, **options: Any) -> Any:
         several = (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
-        if not several:
-            return analyse(recordings)
-        known, key = results.setdefault(several[0], {}), tuple(map(id, several))
+        if options or not several or not all(isinstance(text, str) for text in texts):
+            return analyse(recordings, *texts, **options)
+        known, key = results.setdefault(several[0], {}), (*map(id, several), *texts)
         stored = known.get(key)
         if stored is None or any(ref() is not each for ref, each in zip(stored[0], several, strict=True)):
-            stored = known[key] = tuple(map(weakref.ref, several)), analyse(recordings)
+            stored = known[key] = tuple(map(weakref.ref, several)), analyse(recordings, *texts)
         return stored[1]
 
     return remembering  # type: ignore[return-value]
@@ -60,6 +57,12 @@ class Interval:
     def rows(self) -> slice:
         """The rows as a slice, to index columns or for Recording.rows."""
         return slice(self.start, self.stop)
+
+
+def spread(values: Array) -> float:
+    """The width of the band that contains 98 % of the values, so that a single outlier does not count."""
+    low, high = np.quantile(values, [0.01, 0.99])
+    return float(high - low)
 
 
 def true_intervals(mask: Mask) -> list[Interval]:

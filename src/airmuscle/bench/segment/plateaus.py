@@ -157,8 +157,7 @@ def _drifts(values: Array, band: float) -> bool:
 def _make_plateau(recording: Recording, interval: Interval) -> Plateau:
     rows = {name: recording[name][interval.rows] for name in recording}
     medians = {name: float(np.median(values)) for name, values in rows.items()}
-    root_count = np.sqrt(len(interval))
-    errors = {name: float(np.std(values, ddof=1) / root_count) for name, values in rows.items()}
+    errors = {name: float(np.std(values, ddof=1) / np.sqrt(len(interval))) for name, values in rows.items()}
     return Plateau(interval, medians, errors)
 
 

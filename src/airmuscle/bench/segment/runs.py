@@ -18,7 +18,7 @@ import numpy as np
 from ...core import Array
 from ...recording.columns import MOVED
 from ...recording.recording import Recording
-from .interval import Interval, level_intervals, remembered
+from .interval import Interval, level_intervals, remembered, spread
 from .sensor import Sensor, estimate_sensors
 from .static_points import StaticPoints, find_static_points
 
@@ -108,33 +108,25 @@ def _column(recording: Recording, kind: RunKind) -> str | None:
 
 def _constant_bands(recording: Recording, sensors: Mapping[str, Sensor]) -> dict[str, float]:
     """The width of the band within which each measured quantity counts as constant [SI]."""
-    stds = {name: sensor.std for name, sensor in sensors.items()}
-    return {
-        name: max(_min_band(recording, name), 8.0 * stds.get(name, 0.0))
-        for kind in KINDS
-        if (name := _column(recording, kind))
-    }
-
-
-def _min_band(recording: Recording, name: str) -> float:
-    if name == "contraction":
-        return CONTRACTION_BAND
-    maximum = float(np.max(np.abs(recording[name])))
-    return maximum * (CONTRACTION_BAND if name == "length" else RELATIVE_BAND)
+    bands = {}
+    for name in filter(None, (_column(recording, kind) for kind in KINDS)):
+        maximum = 1.0 if name == "contraction" else float(np.max(np.abs(recording[name])))
+        least = maximum * (CONTRACTION_BAND if name in ("contraction", "length") else RELATIVE_BAND)
+        bands[name] = max(least, 8.0 * sensors[name].std if name in sensors else 0.0)
+    return bands
 
 
 def _classify(recording: Recording, interval: Interval, bands: dict[str, float]) -> Run:
     """The run in an interval. Of several constant quantities, pressure takes precedence, then length, then force."""
     names = {kind: name for kind in KINDS if (name := _column(recording, kind))}
-    possible = _kinds_of(recording)
     constant = [
         kind
         for kind, name in names.items()
-        if _spread(recording[name][interval.rows]) <= bands[name]
+        if spread(recording[name][interval.rows]) <= bands[name]
         or (kind == ISOBARIC and _has_ripple(recording, interval, bands))
     ]
     swept = tuple(name for kind, name in names.items() if kind not in constant)
-    isotonic_only = constant == [ISOTONIC] and ISOTONIC not in possible
+    isotonic_only = constant == [ISOTONIC] and ISOTONIC not in _kinds_of(recording)
     if not constant or (len(names) == 1 and swept) or (isotonic_only and swept):
         return Run(interval, FREE, None, None, swept)
     if not swept:
@@ -146,12 +138,6 @@ def _constant_run(recording: Recording, interval: Interval, kind: RunKind, name:
     return Run(interval, kind, name, float(np.median(recording[name][interval.rows])), swept)
 
 
-def _spread(values: Array) -> float:
-    """The width of the band that contains 98 % of the values, so that a single outlier does not end a run."""
-    low, high = np.quantile(values, [0.01, 0.99])
-    return float(high - low)
-
-
 def _runs_at_levels(recording: Recording, kind: RunKind, bands: dict[str, float]) -> tuple[Run, ...]:
     """The runs in which the quantity of one kind stays at a level while another quantity is swept."""
     name = _column(recording, kind)
@@ -161,7 +147,7 @@ def _runs_at_levels(recording: Recording, kind: RunKind, bands: dict[str, float]
     intervals = list(level_intervals(recording[name], bands[name]))
     for interval in _join_ripple(recording, intervals, bands) if kind == ISOBARIC else intervals:
         ranges = {other: SWEEP_FRACTION * float(np.ptp(recording[other])) for other in bands if other != name}
-        swept = tuple(n for n, part in ranges.items() if _spread(recording[n][interval.rows]) > max(bands[n], part))
+        swept = tuple(n for n, part in ranges.items() if spread(recording[n][interval.rows]) > max(bands[n], part))
         if len(interval) >= MIN_ROWS and swept:
             runs.append(_constant_run(recording, interval, kind, name, swept))
     return tuple(runs)
@@ -175,9 +161,9 @@ def moved_column(recording: Recording) -> str | None:
 def _has_ripple(recording: Recording, interval: Interval, bands: dict[str, float]) -> bool:
     """Whether the pressure of an interval only oscillates within the band of a ripple while the muscle is moved."""
     moved, pressure = moved_column(recording), recording["pressure"][interval.rows]
-    if moved is None or _spread(pressure) > RIPPLE_BAND * float(np.max(np.abs(recording["pressure"]))):
+    if moved is None or spread(pressure) > RIPPLE_BAND * float(np.max(np.abs(recording["pressure"]))):
         return False
-    is_moved = _spread(recording[moved][interval.rows]) > MOVED_BANDS * bands[moved]
+    is_moved = spread(recording[moved][interval.rows]) > MOVED_BANDS * bands[moved]
     return is_moved and _count_crossings(pressure) >= MIN_RIPPLE_REVERSALS
 
 

@@ -149,13 +149,10 @@ def estimate_sensors(recordings: Recording | Sequence[Recording]) -> Mapping[str
     given = (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
     several = [recording for recording in given if len(recording)]
     names = dict.fromkeys(n for r in several for n in r.columns if n.rpartition(".")[2] not in _IGNORED)
-    ordered = [recording for recording in several if find_static_points(recording) is None]
+    parts = several, [recording for recording in several if find_static_points(recording) is None]
     return {
-        name: _estimate_sensor(
-            name, *([r.columns[name] for r in part if name in r.columns] for part in (several, ordered))
-        )
-        for name in names
-        if quantity_of(name)
+        name: _estimate_sensor(name, *([r.columns[name] for r in part if name in r.columns] for part in parts))
+        for name in filter(quantity_of, names)
     }
 
 
@@ -212,12 +209,9 @@ def _refine_step(step: float, differences: Array) -> float:
 def _are_multiples(steps: Array, step: float) -> bool:
     """Whether nearly all small differences are integer multiples of a step, and enough of them are single steps."""
     small = steps[steps < 8.5 * step] / step
-    count = len(small)
-    if count < 10:
-        return False
-    multiples = np.round(small)
+    count, multiples = len(small), np.round(small)
     offset = small - multiples
-    if math.sqrt(float(offset @ offset) / count) >= MAX_RMS_OFFSET:
+    if count < 10 or math.sqrt(float(offset @ offset) / count) >= MAX_RMS_OFFSET:
         return False
     return bool(np.count_nonzero(multiples == 1) >= 3 and np.count_nonzero(multiples > 0) > 0.98 * count)
 
@@ -232,18 +226,15 @@ def _upper_limit(runs: list[Array], resolution: float) -> tuple[float, int]:
     top, tolerance = float(combined.max()), 0.25 * resolution
     at_top = [values >= top - tolerance for values in runs]
     below = combined[combined < top - tolerance]
-    if not len(below):
-        return math.inf, 0
-    count = len(combined) - len(below)
     rows_at_top = max(_longest_interval(mask) for mask in at_top)
-    if rows_at_top < MIN_SATURATED_ROWS:
+    if not len(below) or rows_at_top < MIN_SATURATED_ROWS:
         return math.inf, 0
     between = [values[(values < top - tolerance) & (values > combined.min() + tolerance)] for values in runs]
     rows_elsewhere = 1 + max(_longest_interval(np.abs(np.diff(values)) <= tolerance) for values in between)
     noise = max(estimate_noise(values) for values in between)
     is_noisy = noise > max(MIN_NOISE * resolution, 1e-6 * float(np.ptp(combined)))
     saturated = is_noisy and rows_at_top > 2 * rows_elsewhere
-    return (top, count) if saturated else (math.inf, 0)
+    return (top, len(combined) - len(below)) if saturated else (math.inf, 0)
 
 
 def _longest_interval(mask: Mask) -> int:

@@ -11,7 +11,7 @@ from ....physics.muscle import CreepElements
 from ....physics.muscle.friction import Friction
 from ....recording import Recording
 from ..compared_points import FORCE_MARGIN, force_residuals
-from ..data_checks import DataChecks
+from ..data_checks import check_data
 from ..fit_points import FitPoints
 from ..model_selection import Comparison, compare
 from ..result import Fit
@@ -224,7 +224,7 @@ def fit_static_stage(
         return LeftOutStage(NAME, str(error.message), "measure at more levels of pressure and contraction")
     progress(1.0)
     odd = odd_specimen_notes(ranked_specimen_errors(comparison.recommended, [comparison], points))
-    notes = (*DataChecks.of([record.recording for record in used]).notes, *odd)
+    notes = (*check_data([record.recording for record in used]).notes, *odd)
     return StaticStage(comparison, points, bands, notes, held)
 
 
