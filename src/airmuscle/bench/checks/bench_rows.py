@@ -52,11 +52,6 @@ class BenchRows(NamedTuple):
     contraction: Array
     force: Array
 
-    @classmethod
-    def of(cls, recordings: Sequence[Recording]) -> "BenchRows":
-        """The rows of the recordings that have all three quantities."""
-        return _rows_of(recordings)
-
     def at(self, rows: npt.NDArray[np.bool_]) -> "BenchRows":
         """The rows of a mask (N,)."""
         return BenchRows(*(column[rows] for column in self))
@@ -84,7 +79,8 @@ class BenchRows(NamedTuple):
 
 
 @remembered
-def _rows_of(recordings: Sequence[Recording]) -> BenchRows:
+def bench_rows(recordings: Sequence[Recording]) -> BenchRows:
+    """The complete rows of the recordings that have all three quantities."""
     given = recordings_with(recordings, *BenchRows._fields)
     columns = [np.concatenate([[], *(run[name] for run in given)]) for name in BenchRows._fields]
     complete = np.isfinite(np.sum(columns, axis=0)) & _not_saturated(given)
@@ -103,7 +99,7 @@ def _not_saturated(recordings: Sequence[Recording]) -> npt.NDArray[np.bool_]:
 def slack_plateaus(recordings: Sequence[Recording]) -> BenchRows:
     """The rows of isobars at which the muscle is slack: the force does not change with the contraction, up to the
     shortest length. Drift and friction of a run, which returns, are in the mean of each step of the contraction."""
-    rows = [_plateau(BenchRows.of([run])) for run in recordings_with(recordings, *BenchRows._fields)]
+    rows = [_plateau(bench_rows([run])) for run in recordings_with(recordings, *BenchRows._fields)]
     return BenchRows(*(np.concatenate([np.zeros(0), *columns]) for columns in zip(*rows, strict=True)))
 
 

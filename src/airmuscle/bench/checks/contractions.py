@@ -11,7 +11,7 @@ from ...recording.columns import quantity_of
 from ...recording.recording import Recording
 from ..readers.missing_values import DropMissing
 from ..segment.sensor import estimate_noise
-from .bench_rows import BenchRows, file_list, limits, recordings_with
+from .bench_rows import BenchRows, bench_rows, file_list, limits, recordings_with
 from .pressures import REVERSED
 
 MAX_STRETCH = 0.05
@@ -62,13 +62,14 @@ def check_contraction_signs(recordings: Sequence[Recording]) -> Iterator[str]:
 def check_contraction_limit(recordings: Sequence[Recording]) -> Iterator[str]:
     """A muscle that pulls beyond `MAX_CONTRACTION`. Raises ColumnError where it pulls nowhere else."""
     given = recordings_with(recordings, *BenchRows._fields)
-    rows = BenchRows.of(given)
+    rows = bench_rows(given)
     beyond = rows.contraction[(rows.contraction > MAX_CONTRACTION) & (rows.force > PULLING * rows.greatest)]
     if not beyond.size or not rows.greatest > 0:
         return
     low, high = limits(beyond)
+    files = file_list([each.origin for each in given if limits(each["contraction"])[1] > MAX_CONTRACTION])
     text = (
-        f"{_files_beyond(given)}: the muscle pulls at a contraction of {100 * low:.3g} to {100 * high:.3g} %, but no "
+        f"{files}: the muscle pulls at a contraction of {100 * low:.3g} to {100 * high:.3g} %, but no "
         f"pneumatic muscle pulls beyond {100 * MAX_CONTRACTION:.3g} %. Check the units of the length and of the "
         "resting length (a length in cm under a heading in mm?)."
     )
@@ -76,10 +77,6 @@ def check_contraction_limit(recordings: Sequence[Recording]) -> Iterator[str]:
     if limits(inside)[0] > MAX_CONTRACTION:
         raise ColumnError(text)
     yield text
-
-
-def _files_beyond(recordings: Sequence[Recording]) -> str:
-    return file_list([each.origin for each in recordings if limits(each["contraction"])[1] > MAX_CONTRACTION])
 
 
 def check_length_and_contraction(recordings: Sequence[Recording]) -> Iterator[str]:
@@ -101,7 +98,7 @@ def check_length_and_contraction(recordings: Sequence[Recording]) -> Iterator[st
 
 def check_elongation(recordings: Sequence[Recording]) -> Iterator[str]:
     """A force that rises with the contraction at nearly every pressure: the column counts the elongation."""
-    rows = BenchRows.of(recordings).shortened
+    rows = bench_rows(recordings).shortened
     if rows.force.size < MIN_LEVEL_ROWS or not rows.greatest > 0:
         return
     edges = np.quantile(rows.pressure, np.linspace(0.0, 1.0, PRESSURE_LEVELS + 1))[1:-1]
@@ -141,11 +138,6 @@ class MissingCode(NamedTuple):
 
     value: float
     rows: Array
-
-
-def is_missing_code(value: float) -> bool:
-    """Whether a number is one that loggers write for a missing value."""
-    return any(abs(abs(value) - code) <= 1e-6 * code for code in CODES)
 
 
 def code_of(value: float) -> float | None:
@@ -192,12 +184,11 @@ def find_missing_code(recording: Recording, name: str) -> MissingCode | None:
     for extreme in (float(np.min(values)), float(np.max(values))):
         written = _as_written(recording, name, extreme)
         rows = values == extreme
-        if not is_missing_code(written) or np.mean(rows) > MAX_SHARE:
-            continue
-        others = values[~rows]
-        distance = float(np.min(np.abs(others - extreme)))
-        if distance > MIN_DISTANCE * float(np.ptp(others)) and distance > 0:
-            return MissingCode(written, rows)
+        if np.mean(rows) <= MAX_SHARE and any(abs(abs(written) - code) <= 1e-6 * code for code in CODES):
+            others = values[~rows]
+            distance = float(np.min(np.abs(others - extreme)))
+            if distance > max(MIN_DISTANCE * float(np.ptp(others)), 0.0):
+                return MissingCode(written, rows)
     return None
 
 

@@ -6,7 +6,16 @@ import numpy as np
 
 from ...core import AMBIENT_PRESSURE, Hint, HintedText, UnitError, conversion
 from ...recording.recording import Recording
-from .bench_rows import BenchRows, PressureLine, file_list, limits, pressure_lines, recordings_with, slack_plateaus
+from .bench_rows import (
+    BenchRows,
+    PressureLine,
+    bench_rows,
+    file_list,
+    limits,
+    pressure_lines,
+    recordings_with,
+    slack_plateaus,
+)
 
 ATMOSPHERE = (95e3, 106e3)
 """Range of the lowest pressure that may be the atmosphere [Pa] (chosen)."""
@@ -70,7 +79,7 @@ def check_mixed_pressures(recordings: Sequence[Recording]) -> Iterator[HintedTex
 def check_absolute_isobars(recordings: Sequence[Recording]) -> Iterator[HintedText]:
     """Forces that extrapolate to zero near the atmosphere at every contraction, without a row near zero pressure."""
     unstated = [each for each in recordings_with(recordings, *BenchRows._fields) if not _states_reference(each)]
-    rows = BenchRows.of(unstated)
+    rows = bench_rows(unstated)
     if not rows.force.size or float(np.min(rows.pressure)) < ATMOSPHERE[0]:
         return
     lines = pressure_lines(rows)
@@ -172,23 +181,19 @@ def check_force_signs(recordings: Sequence[Recording]) -> Iterator[str]:
             )
             return
     origin, (low, _) = min(forces.items(), key=lambda item: item[1][0], default=("", (0.0, 0.0)))
-    if low < -MAX_OFFSET * greatest and not _is_compressed(recordings, low):
+    slack = bench_rows(recordings).slack.force
+    compressed = slack.size and np.ptp(slack) > COMPRESSED * -low  # the forces vary with the length at zero pressure
+    if low < -MAX_OFFSET * greatest and not compressed:
         yield (
             f"{origin}: the force is down to {low:.4g} N, but a muscle cannot push. The sensor has an offset, or "
             "carries a weight: all forces are then wrong by the same amount. Subtract the reading of the slack muscle."
         )
 
 
-def _is_compressed(recordings: Sequence[Recording], low: float) -> bool:
-    """Whether the forces at zero pressure vary with the length, as those of a muscle that is pushed together do."""
-    slack = BenchRows.of(recordings_with(recordings, *BenchRows._fields)).slack.force
-    return bool(slack.size and np.ptp(slack) > COMPRESSED * -low)
-
-
 def check_force_area(recordings: Sequence[Recording]) -> Iterator[str]:
     """A maximum force that is too great or too small for the highest pressure."""
     given = recordings_with(recordings, "pressure", "force")
-    greatest = max((limits(each["force"])[1] for each in given), default=0.0)
+    greatest = _greatest_force(given)
     highest = max((float(np.nanmax(each["pressure"])) for each in recordings_with(recordings, "pressure")), default=0.0)
     varied = any(float(np.ptp(each["pressure"])) > 0.1 * highest for each in given)
     if greatest <= 0 or highest <= 0 or (highest < 1e3 and not varied):
@@ -217,7 +222,7 @@ def check_force_zero(recordings: Sequence[Recording]) -> Iterator[str]:
     (Chou and Hannaford, IEEE Trans. Robot. Autom. 12 (1996), with elastic wall: Tondu and Lopez 2000).
     """
     given = recordings_with(recordings, *BenchRows._fields)
-    rows = BenchRows.of(given)
+    rows = bench_rows(given)
     if not rows.force.size or not rows.greatest > 0:
         return
     places = (
@@ -230,8 +235,7 @@ def check_force_zero(recordings: Sequence[Recording]) -> Iterator[str]:
         if reading > MAX_ZERO * rows.greatest or low:
             yield (
                 f"{file_list([each.origin for each in given])}: the force is {reading:.3g} N {place}, where a muscle "
-                "is slack: the zero of the force sensor is wrong, and all forces by the same amount. "
-                f"{_REMEDY}"
+                f"is slack: the zero of the force sensor is wrong, and all forces by the same amount. {_REMEDY}"
             )
             return
     if rows.slack.force.size >= MIN_ROWS:

@@ -94,11 +94,10 @@ def bootstrap(
     runs = [recordings] if isinstance(recordings, Recording) else list(recordings)
     group, count = _assign_groups(fit, runs, by or default_split(runs, MIN_GROUPS))
     draws = np.random.default_rng(seed).multinomial(count, np.full(count, 1.0 / count), size=refits).astype(float)
-    problem = fit.problem
-    linear = is_linear(problem) and isinstance(fit.loss, LeastSquares)
-    if linear:
-        return Bootstrap(fit, _refit_linear(problem, fit.values, group, draws), count, seed)
-    values = _refit_in_blocks(fit, group, draws, progress or (lambda fraction: None), workers)
+    if is_linear(fit.problem) and isinstance(fit.loss, LeastSquares):
+        values = _refit_linear(fit.problem, fit.values, group, draws)
+    else:
+        values = _refit_in_blocks(fit, group, draws, progress or (lambda fraction: None), workers)
     return Bootstrap(fit, values, count, seed)
 
 

@@ -169,18 +169,15 @@ def optimal_design(
     selected = _exchange(information, _select_greedily(information, runs))
     selected.sort(key=lambda i: (candidates[i].constant != "pressure", candidates[i].level))
     even = np.unique(np.linspace(0, len(candidates) - 1, runs).astype(int))
-    difference = (
-        _log_determinant(information, selected)
-        - _log_determinant(information, even)
-        + values.size * np.log(even.size / runs)
-    )
+    chosen, evenly = (_log_determinant(information, each) for each in (selected, even))
+    difference = chosen - evenly + values.size * np.log(even.size / runs)
     scales = np.where(values == 0, 1.0, np.abs(values))
     scaled = np.vstack([jacobians[i] for i in selected]) / scales / sigma
     analysis = analyse_identifiability(scaled, names, scales, tolerance=EXACT_RANK_TOLERANCE)
     standard_errors = np.sqrt(np.diag(analysis.inverse())) * scales
     efficiency = float(np.exp(difference / values.size))
-    chosen_runs = tuple(candidates[i] for i in selected)
-    return ExperimentPlan(chosen_runs, names, values, standard_errors, efficiency, analysis.undetermined)
+    planned = tuple(candidates[i] for i in selected)
+    return ExperimentPlan(planned, names, values, standard_errors, efficiency, analysis.undetermined)
 
 
 def candidate_runs(characteristic: Characteristic, bench: BenchLimits, points: int) -> list[PlannedRun]:

@@ -1,7 +1,7 @@
 """Notes of a static fit: rows, weights, bounds, losses and misfit that affect its interpretation, as sentences."""
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -38,21 +38,16 @@ class Examination:
     own: tuple[str, ...]
 
     def __call__(self, fit: Fit) -> Remarks:
-        checks, quantity = self.points.checks, self.problem.fitted_quantity
-        distance = self._branch_distance()
-        scatter = dataclasses.replace(checks.scatter, branches=distance) if quantity == FORCE else None
-        branches = branch_notes(self.points.recordings, distance, quantity.name, delayed=checks.delay is not None)
-        notes = (*checks.notes, *map(str, self.points.repeated), *self.own, *branches, *_level_notes(fit.data_ranges))
-        return Remarks((*notes, *_effect_notes(fit.effects), *_misfit_notes(fit, scatter, self.points)), scatter)
-
-    def _branch_distance(self) -> float:
-        """The distance of the residuals of opposite directions of motion [SI]; 0 where they do not differ."""
-        points, quantity = self.points, self.problem.fitted_quantity.name
+        points, checks, quantity = self.points, self.points.checks, self.problem.fitted_quantity
         residuals = np.full(len(points.joined), np.nan)
-        differences = self.modelled - self.problem.data[quantity]
+        differences = self.modelled - self.problem.data[quantity.name]
         residuals[~points.missing] = np.where(self.problem.censoring == 0, differences, np.nan)
         ends = np.cumsum([len(run) for run in points.recordings])
-        return branch_distance(points.recordings, np.split(residuals, ends[:-1]), quantity)
+        distance = branch_distance(points.recordings, np.split(residuals, ends[:-1]), quantity.name)
+        scatter = dataclasses.replace(checks.scatter, branches=distance) if quantity == FORCE else None
+        branches = branch_notes(points.recordings, distance, quantity.name, delayed=checks.delay is not None)
+        notes = (*checks.notes, *map(str, points.repeated), *self.own, *branches, *_level_notes(fit.data_ranges))
+        return Remarks((*notes, *_effect_notes(fit.effects), *_misfit_notes(fit, scatter, points)), scatter)
 
 
 def level_text(name: str, value: float) -> str:
@@ -90,9 +85,8 @@ def _misfit_notes(result: Fit, scatter: Scatter | None, points: FitPoints) -> li
     """A remark where the residuals in force exceed the scatter of the data."""
     if scatter is None:
         return []
-    knows_length = hasattr(result.model, "with_resting_length")
     lengths = {run.constants.get("resting_length") for run in points.recordings} - {None}
-    count = 1 if knows_length else len(lengths)
+    count = 1 if hasattr(result.model, "with_resting_length") else len(lengths)
     return scatter.misfit_notes(result.rmse, result.data_ranges["force"][1], count)
 
 
@@ -110,64 +104,46 @@ def weighting_notes(by_recording: Array | None, problem: FitProblem) -> list[str
     ]
 
 
-def _row_notes(problem: FitProblem, statistics: FitStatistics, dropped: int) -> list[str]:
-    """Remarks on rows that are dropped, censored, or at zero force without being censored."""
-    notes: list[str] = []
-    censored = int(np.count_nonzero(problem.censoring))
-    at_zero = int(np.count_nonzero((problem.data["force"] <= 0) & (problem.censoring == 0)))
+def _row_notes(problem: FitProblem, statistics: FitStatistics, dropped: int) -> Iterator[str]:
+    """Remarks on rows that are dropped, censored, above the limit of the law, or at zero force and not censored."""
+    force, usual = problem.data["force"], default_censoring(problem.law)
     if dropped:
-        notes.append(f"{dropped} rows with a missing value (NaN) were dropped.")
-    if censored:
-        notes.append(
-            HintedText(
-                f"{censored} {'row is' if censored == 1 else 'rows are'} censored (at zero force, or at the limit of "
-                "the force range): counted only where the law violates the bound.",
-                Hint("To treat them as measured values", "censoring", UNCENSORED, constant="UNCENSORED"),
-            )
+        yield f"{dropped} rows with a missing value (NaN) were dropped."
+    if censored := int(np.count_nonzero(problem.censoring)):
+        yield HintedText(
+            f"{censored} {'row is' if censored == 1 else 'rows are'} censored (at zero force, or at the limit of "
+            "the force range): counted only where the law violates the bound.",
+            Hint("To treat them as measured values", "censoring", UNCENSORED, constant="UNCENSORED"),
         )
-    notes += _clamp_notes(problem)
+    if above := int(np.count_nonzero((force > usual.max_force) & (problem.censoring == -1))):
+        yield (
+            f"{above} rows are above the upper limit of the force of the law, max_force {usual.max_force:.4g} N, which "
+            "the fit does not change: the law gives no greater force. Give a law with a greater max_force."
+        )
     if statistics.uncensored_rank < statistics.rank:
-        notes.append(
+        yield (
             f"The uncensored rows determine {statistics.uncensored_rank} of {statistics.rank} parameters; the others "
             "are limited only by the bounds of the censored rows, and the law is as close to these as possible."
         )
-    if at_zero:
+    if at_zero := int(np.count_nonzero((force <= 0) & (problem.censoring == 0))):
         slack = Hint("To treat them as censored, if the muscle was slack there", "censoring", Censoring())
-        can_be_slack = default_censoring(problem.law) != UNCENSORED
         text = f"{at_zero} rows at zero force or below are treated as measured values."
-        notes.append(HintedText(text, *([slack] if can_be_slack else [])))
-    return notes
+        yield HintedText(text, *([slack] if usual != UNCENSORED else []))
 
 
-def _clamp_notes(problem: FitProblem) -> list[str]:
-    """A remark on rows above the upper limit of the law, which a fit does not change."""
-    limit = default_censoring(problem.law).max_force
-    above = int(np.count_nonzero((problem.data["force"] > limit) & (problem.censoring == -1)))
-    if not above:
-        return []
-    return [
-        f"{above} rows are above the upper limit of the force of the law, max_force {limit:.4g} N, which the fit does "
-        "not change: the law gives no greater force. Give a law with a greater max_force."
-    ]
-
-
-def collect_notes(problem: FitProblem, statistics: FitStatistics, loss: Loss, dropped: int) -> tuple[str, ...]:
+def collect_notes(problem: FitProblem, statistics: FitStatistics, loss: Loss, dropped: int) -> Iterator[str]:
     """Remarks on the data and the fit that affect its interpretation, as sentences."""
-    notes = _row_notes(problem, statistics, dropped)
-    notes += _length_notes(problem)
-    notes += [
-        f"{problem.leaves[i].path} is on its bound; its value is not determined by the data."
-        for i, on_bound in zip(problem.free, statistics.on_bound, strict=True)
-        if on_bound
-    ]
+    yield from _row_notes(problem, statistics, dropped)
+    yield from _length_notes(problem)
+    for i in np.flatnonzero(statistics.on_bound):
+        yield f"{problem.leaves[problem.free[i]].path} is on its bound; its value is not determined by the data."
     if not np.isfinite(statistics.sigma):
-        notes.append("There are as many rows as parameters, so the standard errors are unknown.")
+        yield "There are as many rows as parameters, so the standard errors are unknown."
     if statistics.condition > ILL_CONDITIONED:
-        notes.append(f"The problem is ill-conditioned (condition number {statistics.condition:.2g}).")
+        yield f"The problem is ill-conditioned (condition number {statistics.condition:.2g})."
     if not isinstance(loss, LeastSquares):
         unit = problem.fitted_quantity.unit
-        notes.append(f"Robust loss: {loss}{'' if unit == '1' else f', in {unit}'}.")
-    return tuple(notes)
+        yield f"Robust loss: {loss}{'' if unit == '1' else f', in {unit}'}."
 
 
 def loss_scale_notes(problem: FitProblem, solution: LeastSquaresSolution, loss: Loss) -> tuple[str, ...]:

@@ -135,7 +135,7 @@ def _in_basis(matrix: Array, point: _Point, free: BoolArray, basis: StepBasis | 
         if current is None:
             return None
         columns = matrix @ current.directions
-        normal, gradient = normal_equations(columns, point.residuals)
+        normal, gradient = columns.T @ columns, columns.T @ point.residuals
         if np.linalg.eigvalsh(normal)[0] >= MIN_EIGENVALUE:
             return _Linearisation(current, columns, normal, gradient)
     return None
@@ -210,11 +210,6 @@ def orthonormal_basis(matrix: Array, free: BoolArray) -> StepBasis | None:
     directions = np.zeros((free.size, norms.size))
     directions[free] = np.linalg.inv(triangle) / norms[:, None]
     return StepBasis(free, directions)
-
-
-def normal_equations(matrix: Array, residuals: Array) -> tuple[Array, Array]:
-    """Normal matrix (F, F) and gradient (F,)."""
-    return matrix.T @ matrix, matrix.T @ residuals
 
 
 def normal_step(normal: Array, gradient: Array) -> Array | None:

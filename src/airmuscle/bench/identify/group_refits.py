@@ -168,7 +168,8 @@ class GroupRefits:
         sums = _Sums(*(np.zeros(shape) for shape in ((count, size, size),) * 2 + ((count, size), (count,))))
         for i in range(count):
             rows = self._group == i
-            sums.normal[i], sums.gradient[i] = steps.normal_equations(masked[rows], residuals[rows])
+            own = masked[rows]
+            sums.normal[i], sums.gradient[i] = own.T @ own, own.T @ residuals[rows]
             sums.squares[i] = float(residuals[rows] @ residuals[rows])
             measured = self._rows[rows & uncensored]
             sums.uncensored[i] = measured.T @ measured

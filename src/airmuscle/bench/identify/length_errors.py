@@ -156,8 +156,8 @@ def find_length_errors(law: Characteristic, recordings: Sequence[Recording]) -> 
     if len(names) < 3 or not complete or not hasattr(model, "with_resting_length"):
         return ()
     try:
-        separate = _separate_rmse(recordings, names)
-        rmse = _rmse(model, recordings)
+        separate, problem = _separate_rmse(recordings, names), FitPoints.from_recordings(recordings).problem(model)
+        rmse = float(np.sqrt(np.mean(problem.residuals(problem.predict(problem.initial_values)) ** 2)))
         if rmse <= MIN_MISFIT * separate:
             return ()
         least = MIN_EXPLAINED * (rmse**2 - separate**2)
@@ -165,12 +165,6 @@ def find_length_errors(law: Characteristic, recordings: Sequence[Recording]) -> 
     except IdentificationError:
         return ()
     return tuple(sorted((e for e in estimates if e.explains(separate)), key=lambda e: abs(e.offset)))
-
-
-def _rmse(model: Characteristic, recordings: Sequence[Recording]) -> float:
-    """Root mean square residual of a fitted law, in the fitted quantity."""
-    problem = FitPoints.from_recordings(recordings).problem(model)
-    return float(np.sqrt(np.mean(problem.residuals(problem.predict(problem.initial_values)) ** 2)))
 
 
 def _separate_rmse(recordings: Sequence[Recording], names: Sequence[str]) -> float:

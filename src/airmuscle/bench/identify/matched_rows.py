@@ -116,15 +116,6 @@ def match_rows(recordings: Sequence[Recording], *, by_branch: bool = False) -> M
     return Matches(tuple(matched), greatest)
 
 
-def label_columns(recording: Recording) -> list[str]:
-    """The unknown columns of a recording with few different values, which may tell specimens apart."""
-    return [
-        name
-        for name, values in recording.columns.items()
-        if quantity_of(name) is None and 2 <= np.unique(values).size <= MAX_VALUES
-    ]
-
-
 def _blocks(recordings: Sequence[Recording], greatest: float, by_branch: bool) -> list[Block]:
     step, least = -(-sum(map(len, recordings)) // MAX_ROWS), MIN_FORCE * greatest
     blocks = [block for run in recordings for block in _blocks_of(run, least, step, by_branch)]
@@ -144,12 +135,13 @@ def _blocks_of(recording: Recording, least: float, step: int, by_branch: bool) -
         keys[1][run.interval.rows] = i
     for i, branch in enumerate(branches if by_branch else ()):
         keys[1][branch.interval.rows] += 1e3 * (i + 1)
-    names = label_columns(recording)
-    keys += [recording.columns[name] for name in names]
+    unknown = {name: values for name, values in recording.columns.items() if quantity_of(name) is None}
+    labelling = {name: values for name, values in unknown.items() if 2 <= np.unique(values).size <= MAX_VALUES}
+    keys += labelling.values()
     values, member = np.unique(np.stack(keys), axis=1, return_inverse=True)
     for i, key in enumerate(values.T):
         rows = np.flatnonzero((member.ravel() == i) & pulls)[::step]
-        labels = tuple(zip(names, key[2:].tolist(), strict=True))
+        labels = tuple(zip(labelling, key[2:].tolist(), strict=True))
         yield Block(recording, rows, int(key[0]), labels, np.zeros(0), np.zeros(0))
 
 

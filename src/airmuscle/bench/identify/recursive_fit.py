@@ -120,9 +120,7 @@ class RecursiveFit(ShortRepr):
     @property
     def model(self) -> ContractileSurface:
         """The surface. Raises IdentificationError while the samples do not determine it within the limits."""
-        variance = self._variance(self._grid_terms)
-        share = float(np.mean(variance < DETERMINED))
-        if share < 1.0:
+        if (share := self.determined) < 1.0:
             raise IdentificationError(
                 f"the samples determine the force on {100 * share:.0f} % of the range of the test rig. Measure more "
                 "points, reduce the range, or choose a smaller degree."

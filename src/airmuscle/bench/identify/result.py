@@ -17,7 +17,7 @@ from ..reported import Reported
 from .data_checks import Remarks, Scatter
 from .parameter_covariance import ParameterCovariance
 from .plot import plot_fit
-from .problem import CONTRACTION, FORCE, FitProblem, FittedQuantity, evaluate
+from .problem import FitProblem, FittedQuantity, evaluate
 from .specimen_effects import SpecimenEffects
 from .statistics import CorrelationIndex, WorstPoint
 from .weighting import Loss
@@ -205,6 +205,8 @@ class Fit(Reported):
 
     def chapter(self) -> Chapter:
         """The description of the fit: goodness of fit, estimates, residuals, remarks on the data."""
+        columns = {name: self.correlations[:, i] for i, name in enumerate(self.names)}
+        correlations = {"parameter": list(self.names), **columns}
         return Chapter(
             name="fit",
             title=self._title,
@@ -212,21 +214,17 @@ class Fit(Reported):
             values=self.goodness(),
             tables=(
                 estimate_table(self.estimates, "parameters", "Parameters", brief=MAX_ROWS),
-                self._correlation_table,
+                Table("correlations", "Correlations", correlations, shown=False),
             ),
             plots=(Plot("errors", "Modelled against measured values, and residuals.", self.plot),),
             notes=self.notes,
         )
 
-    @property
-    def _correlation_table(self) -> Table:
-        columns = {name: self.correlations[:, i] for i, name in enumerate(self.names)}
-        return Table("correlations", "Correlations", {"parameter": list(self.names), **columns}, shown=False)
-
     def goodness(self) -> tuple[NamedValue, ...]:
         """The goodness of fit."""
         worst, index = self.max_error, self.correlation_index
-        point = f"at {_point_text(worst.pressure, worst.contraction, worst.force)}"
+        texts = quantity_text(worst.pressure, "Pa", "kPa"), contraction_text(worst.contraction)
+        point = f"at {', '.join(texts)}, {quantity_text(worst.force, 'N', 'N')}"
         undefined = "undefined, because the measured values do not vary"
         ranges = self.data_ranges
         return (
@@ -266,13 +264,6 @@ class Fit(Reported):
 
     def format_residual(self, residual: float) -> str:
         """A residual [SI] as text in the usual unit of the fitted quantity."""
-        if self.fitted_quantity == FORCE:
-            return quantity_text(residual, "N", "N")
-        if self.fitted_quantity == CONTRACTION:
-            return contraction_text(residual, 4)
-        return quantity_text(residual, "Pa", "kPa")
-
-
-def _point_text(pressure: float, contraction: float, force: float) -> str:
-    texts = (quantity_text(pressure, "Pa", "kPa"), contraction_text(contraction), quantity_text(force, "N", "N"))
-    return ", ".join(texts)
+        unit = self.fitted_quantity.unit
+        shown = {"Pa": "kPa"}.get(unit, unit)
+        return contraction_text(residual, 4) if unit == "1" else quantity_text(residual, unit, shown)

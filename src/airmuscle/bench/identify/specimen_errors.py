@@ -112,8 +112,7 @@ def specimen_errors(fit: Fit, recordings: Sequence[Recording], fixed: tuple[str,
         parts = [p for p in points.left_out_residuals(Candidate("", fit.model, fixed), fit, fit.loss) if p[1].size]
     except AirmuscleError:  # the others do not determine the law, so that no error is known
         return None
-    scores = [FoldScore.of(*part) for part in parts]
-    return _checked([each.fold for each in scores], [each.rmse for each in scores], fit.model, recordings)
+    return _checked([FoldScore.of(*part) for part in parts], fit.model, recordings)
 
 
 def ranked_specimen_errors(
@@ -122,16 +121,15 @@ def ranked_specimen_errors(
     """As `specimen_errors`, for a law of comparisons; from that which left the specimens out, if there is one."""
     for comparison in comparisons:
         if isinstance(comparison.leave_out, SpecimenSplit) and specimens_of(recordings):
-            scores = comparison[model.candidate.name].fold_scores
-            names, rms = [each.fold for each in scores], [each.rmse for each in scores]
-            return _checked(names, rms, model.fit.model, recordings)
+            return _checked(comparison[model.candidate.name].fold_scores, model.fit.model, recordings)
     return specimen_errors(model.fit, recordings, model.candidate.fixed)
 
 
 def _checked(
-    names: Sequence[str], rms: Sequence[float], law: Characteristic, recordings: Sequence[Recording]
+    scores: Sequence[FoldScore], law: Characteristic, recordings: Sequence[Recording]
 ) -> SpecimenErrors | None:
+    names, rms = tuple(each.fold for each in scores), tuple(each.rmse for each in scores)
     if len(rms) < MIN_MEMBERS or not np.isfinite(rms).all() or max(rms) == 0.0:
         return None
     lengths = resting_lengths_of(recordings) if hasattr(law, "with_resting_length") else {}
-    return SpecimenErrors(tuple(names), tuple(rms), tuple(lengths[name] for name in names if name in lengths))
+    return SpecimenErrors(names, rms, tuple(lengths[name] for name in names if name in lengths))

@@ -161,13 +161,15 @@ def fit_chapter(
     chapter, (equations, symbols) = fit.chapter(), equation_section(fit)
     plots = (ramp_plot(fit), _isobars(fit, entry), *chapter.plots, band_plot(fit))
     parameters, correlations = chapter.tables
+    violations, title = shape_violations_of_fit(fit), "Monotonicity violations of the fitted law"
+    broken = (violation_table(violations, "shape", title),) if violations else ()
     return dataclasses.replace(
         chapter,
         title=entry.title,
         summary=(*chapter.paragraphs, entry.note, *of_recordings),
         values=(*chapter.values, *(dataclasses.replace(each, brief=False) for each in _energy_consistency(fit, entry))),
         equations=equations,
-        tables=(*symbols, parameters, *_violations(fit), correlations, _rows(fit)),
+        tables=(*symbols, parameters, *broken, correlations, _rows(fit)),
         plots=tuple(plot for plot in plots if plot is not None),
         notes=(*chapter.notes, *notes),
         references=tuple(cite(entry)),
@@ -213,12 +215,6 @@ def _isobars(fit: Fit, entry: MuscleDescription) -> Plot:
     )
 
 
-def _violations(fit: Fit) -> list[Table]:
-    """Return a table of the regions in which the fitted law is not monotonic, if there are any."""
-    broken = shape_violations_of_fit(fit)
-    return [violation_table(broken, "shape", "Monotonicity violations of the fitted law")] if broken else []
-
-
 def equation_section(fit: Fit) -> tuple[tuple[DisplayedEquation, ...], tuple[Table, ...]]:
     """Return the equations of a fitted law within the range of its data, and the table of their symbols.
 
@@ -243,9 +239,8 @@ def _specimen_effects(fit: Fit, validity: str) -> tuple[list[DisplayedEquation],
     shown, quantity = [], fit.fitted_quantity
     for i, (name, effect) in enumerate(zip(law.specimens, law.effects, strict=True), 1):
         equations = law_equation(effect, quantity.name, quantity.arguments, fit.data_ranges)
-        titled = dataclasses.replace(
-            equations[-1], title=f"Effect of specimen {name}, added to the law of the population {_share(law)}".rstrip()
-        )
+        title = f"Effect of specimen {name}, added to the law of the population {_share(law)}".rstrip()
+        titled = dataclasses.replace(equations[-1], title=title)
         shown.append(_displayed(titled, f"effect-{i}", validity))
     surface: Any = law.effects[0]
     columns: dict[str, Any] = {"term": list(surface.term_labels)}

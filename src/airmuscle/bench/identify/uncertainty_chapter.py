@@ -70,18 +70,16 @@ def uncertainty_chapter(uncertainty: Uncertainty) -> Chapter:
             "A profile fixes one parameter and estimates all others again; an interval is unbounded where the data do "
             "not limit the parameter."
         )
+    caption = "95 % intervals in units of the standard error; an arrow marks an interval beyond the axis."
     return Chapter(
         name="uncertainty",
         title="Uncertainty of the parameters",
         summary=tuple(sentences),
         values=values,
         tables=(_table(uncertainty),),
-        plots=(Plot("intervals", _CAPTION, partial(_figure, uncertainty)),),
+        plots=(Plot("intervals", caption, partial(_figure, uncertainty)),),
         notes=("no parameter is weakly determined; the standard errors are valid",) if uncertainty.none_weak else (),
     )
-
-
-_CAPTION = "95 % intervals in units of the standard error; an arrow marks an interval beyond the axis."
 
 
 def _table(uncertainty: Uncertainty) -> Table:
@@ -168,12 +166,8 @@ POINTS = 161
 def shape_chapter(shaped: ShapeConstrainedFit, unconstrained: Fit, free: int) -> Chapter:
     """Return the chapter of a constrained fit and its cost; `free` is the number of points of free contraction."""
     zero = f", and it is zero at {free} points of free contraction" if free else ""
-    verdict = (
-        "satisfies these constraints too"
-        if not shaped.unconstrained_violations
-        else "violates them in the regions of the table"
-    )
     violations = shaped.unconstrained_violations
+    verdict = "violates them in the regions of the table" if violations else "satisfies these constraints too"
     title = "Monotonicity violations of the unconstrained surface"
     return Chapter(
         name="shape",

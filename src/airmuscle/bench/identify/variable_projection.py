@@ -119,7 +119,9 @@ def find_initial_values(problem: FitProblem, multi_start: bool = True) -> Array:
     linear = is_linear_parameter(problem)
     if linear.all() or not linear.any():
         return problem.initial_values
-    projection, thinned = _Projection(problem, linear), _thinned(problem)
+    projection, thinned, count = _Projection(problem, linear), problem, len(problem.data)
+    if count > _MAX_ROWS:  # drawn, as a regular choice could miss levels
+        thinned = problem.rows(np.sort(np.random.default_rng(1).permutation(count)[:_MAX_ROWS]))
     best = problem.initial_values[~linear]
     if multi_start:
         preview = projection if thinned is problem else _Projection(thinned, linear)
@@ -131,14 +133,6 @@ def find_initial_values(problem: FitProblem, multi_start: bool = True) -> Array:
     values = np.clip(projection.complete(best), low, high)
     after, before = (_sum_of_squares(problem.residuals(problem.predict(v))) for v in (values, problem.initial_values))
     return values if after < before else problem.initial_values
-
-
-def _thinned(problem: FitProblem) -> FitProblem:
-    """The problem with at most `_MAX_ROWS` rows, drawn with a constant seed, as a regular choice could miss levels."""
-    count = len(problem.data)
-    if count <= _MAX_ROWS:
-        return problem
-    return problem.rows(np.sort(np.random.default_rng(1).permutation(count)[:_MAX_ROWS]))
 
 
 class _Projection:

@@ -15,7 +15,7 @@ from ...core import Array, ColumnError, IdentificationError, ParameterError
 from ...physics.muscle.geometry import Braid, ChebyshevGeometry, Geometry
 from ...physics.pneumatics.gas import GAS_CONSTANT
 from ...recording import Recording
-from .model_evidence import EQUIVALENT
+from .model_evidence import EQUIVALENT, aicc
 
 HELD = 0.005
 """Range of the contraction within which it is held during a fill (chosen)."""
@@ -139,14 +139,13 @@ def fit_volume(points: VolumePoints, resting_length: float) -> VolumeFit:
     degrees = range(1, min(MAX_DEGREE, levels - 2, points.volume.size - 3) + 1)
     candidates += [_polynomial(points, resting_length, degree) for degree in degrees]
     laws = [law for law in candidates if law is not None]
-    aicc = {_name(law): _aicc(law, points) for law in laws}
-    lowest = min(aicc.values())
-    best = min((law for law in laws if aicc[_name(law)] <= lowest + EQUIVALENT), key=_size)
+    criteria = {_name(law): _aicc(law, points) for law in laws}
+    best = min((law for law in laws if criteria[_name(law)] <= min(criteria.values()) + EQUIVALENT), key=_size)
     residuals = np.asarray(best.volume(points.contraction)) - points.volume
     design = _design(best, points.contraction)
     variance = float(residuals @ residuals) / max(points.volume.size - design.shape[1], 1)
     covariance = variance * np.linalg.pinv(design.T @ design)
-    return VolumeFit(best, points, float(np.sqrt(np.mean(residuals**2))), aicc, covariance)
+    return VolumeFit(best, points, float(np.sqrt(np.mean(residuals**2))), criteria, covariance)
 
 
 def _name(law: Geometry) -> str:
@@ -197,10 +196,8 @@ def _chebyshev_terms(contraction: Array, low: float, high: float, degree: int) -
 
 
 def _aicc(law: Geometry, points: VolumePoints) -> float:
-    """Akaike's criterion with correction for small samples."""
+    """Akaike's criterion; residuals below the resolution of the volumes do not distinguish laws."""
     size = points.volume.size
-    count = _design(law, points.contraction).shape[1] + 1
     squares = float(np.sum((np.asarray(law.volume(points.contraction)) - points.volume) ** 2))
     floor = size * (RESOLUTION * float(np.abs(points.volume).max())) ** 2
-    correction = 2 * count * (count + 1) / (size - count - 1) if size > count + 1 else np.inf
-    return float(size * np.log(max(squares, floor) / size) + 2 * count + correction)
+    return aicc(max(squares, floor) / size, size, _design(law, points.contraction).shape[1])

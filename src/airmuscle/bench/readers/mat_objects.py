@@ -118,7 +118,7 @@ def _columns(frame: Any) -> dict[str, Any]:
     units = [str(unit) for unit in frame.attrs.get("VariableUnits") or frame.attrs.get("varUnits") or []]
     fields: dict[str, Any] = {}
     if frame.index.dtype.kind in "mM":
-        fields["time"] = _seconds(frame.index.to_numpy())
+        fields["time"] = _numbers(frame.index.to_numpy())
     fields |= {str(name): _numbers(frame[name].to_numpy()) for name in frame.columns}
     stated = dict(zip(map(str, frame.columns), units, strict=False))
     dated = {str(name) for name in frame.columns if frame[name].dtype.kind in "mM"}
@@ -127,13 +127,8 @@ def _columns(frame: Any) -> dict[str, Any]:
 
 
 def _numbers(values: Any) -> Array | None:
-    """The values of a column as numbers; None for texts."""
+    """The values of a column as numbers, durations in seconds, instants in seconds from the first; None for texts."""
     if values.dtype.kind in "mM":
-        return _seconds(values)
+        origin = values[0] if values.dtype.kind == "M" else np.timedelta64(0, "ns")
+        return np.asarray((values - origin) / np.timedelta64(1, "ns"), dtype=float) * 1e-9
     return np.asarray(values, dtype=float) if values.dtype.kind in "biuf" else None
-
-
-def _seconds(values: Any) -> Array:
-    """Durations [s], or instants in seconds from the first."""
-    origin = values[0] if values.dtype.kind == "M" else np.timedelta64(0, "ns")
-    return np.asarray((values - origin) / np.timedelta64(1, "ns"), dtype=float) * 1e-9
