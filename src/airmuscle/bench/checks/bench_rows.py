@@ -23,6 +23,8 @@ CONSTANT_PRESSURE = 0.06
 STEP, MIN_STEPS, FLAT = 0.01, 3, 0.1
 """Steps of the contraction in which the force of an isobar is averaged, the minimum number of successive ones without a
 change of the force, and the change that counts as none, as a fraction of the mean one of a step (chosen)."""
+MIN_LEVELS, MIN_RANGE = 3, 0.05
+"""Minimum number of contractions whose lines of force over pressure show a zero, and their minimum range (chosen)."""
 LEVELS = 8
 """Number of intervals of the contraction, with equal numbers of rows, in which force is taken as linear in pressure."""
 
@@ -83,17 +85,11 @@ def bench_rows(recordings: Sequence[Recording]) -> BenchRows:
     """The complete rows of the recordings that have all three quantities."""
     given = recordings_with(recordings, *BenchRows._fields)
     columns = [np.concatenate([[], *(run[name] for run in given)]) for name in BenchRows._fields]
-    complete = np.isfinite(np.sum(columns, axis=0)) & _not_saturated(given)
+    complete = np.isfinite(np.sum(columns, axis=0))
+    if given:  # at its upper limit, the force sensor states a bound only
+        sensor = estimate_sensors([Recording({"force": each["force"]}, each.origin) for each in given])["force"]
+        complete &= columns[2] < sensor.upper_limit - 0.25 * sensor.resolution
     return BenchRows(*(column[complete] for column in columns))
-
-
-def _not_saturated(recordings: Sequence[Recording]) -> npt.NDArray[np.bool_]:
-    """Mask (N,) of the rows at which the force sensor is not at its upper limit."""
-    if not recordings:
-        return np.zeros(0, dtype=bool)
-    sensor = estimate_sensors([Recording({"force": each["force"]}, each.origin) for each in recordings])["force"]
-    limit = sensor.upper_limit - 0.25 * sensor.resolution
-    return np.concatenate([each["force"] < limit for each in recordings])
 
 
 def slack_plateaus(recordings: Sequence[Recording]) -> BenchRows:
@@ -135,15 +131,17 @@ class PressureLine(NamedTuple):
 def pressure_lines(rows: BenchRows) -> list[PressureLine]:
     """The lines of force over pressure at levels of the contraction; those with too few rows or pressures are omitted.
 
-    Within a level the force is taken as bilinear in pressure and contraction, at the middle of the level.
+    Empty unless there are `MIN_LEVELS` of them over a range of `MIN_RANGE`. Within a level the force is taken as
+    bilinear in pressure and contraction, at the middle of the level.
     """
     pull = rows.shortened.pulling
     if pull.force.size < MIN_ROWS:
         return []
     edges = np.unique(np.quantile(pull.contraction, np.linspace(0.0, 1.0, LEVELS + 1)))
     level = np.clip(np.searchsorted(edges, pull.contraction, side="right"), 1, max(edges.size - 1, 1))
-    lines = (_line(pull.at(level == i)) for i in range(1, max(edges.size, 2)))
-    return [line for line in lines if line is not None]
+    lines = [line for i in range(1, max(edges.size, 2)) if (line := _line(pull.at(level == i))) is not None]
+    spread = len(lines) >= MIN_LEVELS and lines[-1].contraction - lines[0].contraction >= MIN_RANGE
+    return lines if spread else []
 
 
 def _line(rows: BenchRows) -> PressureLine | None:
@@ -161,6 +159,5 @@ def _line(rows: BenchRows) -> PressureLine | None:
         return None
     residual = rows.force - matrix @ (values / scale)
     variance = float(residual @ residual) / max(offset.size - rank, 1)
-    inverse = np.linalg.inv((matrix / scale).T @ (matrix / scale))
-    error = float(np.sqrt(variance * inverse[0, 0])) / float(scale[0])
+    error = float(np.sqrt(variance * np.linalg.inv((matrix / scale).T @ (matrix / scale))[0, 0])) / float(scale[0])
     return PressureLine(middle, float(values[0] / scale[0]), float(values[1] / scale[1]), error)

@@ -73,8 +73,7 @@ def check_contraction_limit(recordings: Sequence[Recording]) -> Iterator[str]:
         f"pneumatic muscle pulls beyond {100 * MAX_CONTRACTION:.3g} %. Check the units of the length and of the "
         "resting length (a length in cm under a heading in mm?)."
     )
-    inside = rows.contraction[rows.force > PULLING * rows.greatest]
-    if limits(inside)[0] > MAX_CONTRACTION:
+    if limits(rows.contraction[rows.force > PULLING * rows.greatest])[0] > MAX_CONTRACTION:
         raise ColumnError(text)
     yield text
 
@@ -101,8 +100,7 @@ def check_elongation(recordings: Sequence[Recording]) -> Iterator[str]:
     rows = bench_rows(recordings).shortened
     if rows.force.size < MIN_LEVEL_ROWS or not rows.greatest > 0:
         return
-    edges = np.quantile(rows.pressure, np.linspace(0.0, 1.0, PRESSURE_LEVELS + 1))[1:-1]
-    level = np.digitize(rows.pressure, edges)
+    level = np.digitize(rows.pressure, np.quantile(rows.pressure, np.linspace(0.0, 1.0, PRESSURE_LEVELS + 1))[1:-1])
     slopes = [_slope(rows.at(level == i)) for i in range(PRESSURE_LEVELS)]
     known = np.array([slope for slope in slopes if slope is not None])
     if known.size and np.mean(known > 0) >= MIN_RISING:

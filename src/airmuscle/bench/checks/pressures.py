@@ -7,8 +7,8 @@ import numpy as np
 from ...core import AMBIENT_PRESSURE, Hint, HintedText, UnitError, conversion
 from ...recording.recording import Recording
 from .bench_rows import (
+    MIN_RANGE,
     BenchRows,
-    PressureLine,
     bench_rows,
     file_list,
     limits,
@@ -31,8 +31,6 @@ NEAR_REST = 0.02
 """Contraction near the resting length, at which a muscle under pressure pulls (chosen)."""
 MAX_PRESSURE = 1e6
 """Highest pressure of pneumatic muscles [Pa] (chosen: makers permit 0.6 to 0.8 MPa)."""
-MIN_LEVELS, MIN_RANGE = 3, 0.05
-"""Minimum number of contractions whose lines of force over pressure show a zero, and their minimum range (chosen)."""
 ZERO_FORCE_PRESSURES, SMALL_CONTRACTIONS = (93e3, 130e3), 0.4
 """Range of the pressures of zero force of isobars that are absolute [Pa], at contractions below this fraction of the
 greatest (chosen): from the atmosphere to what the wall adds. Gauge pressures of zero force begin near 0 and rise."""
@@ -83,7 +81,7 @@ def check_absolute_isobars(recordings: Sequence[Recording]) -> Iterator[HintedTe
     if not rows.force.size or float(np.min(rows.pressure)) < ATMOSPHERE[0]:
         return
     lines = pressure_lines(rows)
-    if len(lines) < MIN_LEVELS or lines[-1].contraction - lines[0].contraction < MIN_RANGE:
+    if not lines:
         return
     limit = SMALL_CONTRACTIONS * lines[-1].contraction
     small = [line.zero_force_pressure for line in lines if line.contraction < limit]
@@ -240,7 +238,8 @@ def check_force_zero(recordings: Sequence[Recording]) -> Iterator[str]:
             return
     if rows.slack.force.size >= MIN_ROWS:
         return
-    offset = extrapolated_offset(pressure_lines(rows))
+    positive = (line.intercept for line in pressure_lines(rows) if line.intercept > 3.0 * line.error)
+    offset = max(positive, default=0.0)
     if offset > MAX_EXTRAPOLATED * rows.greatest:
         yield (
             f"{file_list([each.origin for each in given])}: the force extrapolates to {offset:.3g} N at zero pressure, "
@@ -254,11 +253,3 @@ def _is_constant(slack: BenchRows) -> bool:
     low, high = limits(slack.force)
     at_limit = float(np.mean(slack.force == np.min(slack.force))) > 0.5
     return not at_limit and high - low < COMPRESSED * -low and float(np.ptp(slack.contraction)) > MIN_RANGE
-
-
-def extrapolated_offset(lines: Sequence[PressureLine]) -> float:
-    """The greatest force [N] at zero pressure of the lines at several contractions; 0 where none is positive by three
-    standard errors."""
-    if len(lines) < MIN_LEVELS or lines[-1].contraction - lines[0].contraction < MIN_RANGE:
-        return 0.0
-    return max(line.intercept if line.intercept > 3.0 * line.error else 0.0 for line in lines)

@@ -133,5 +133,4 @@ def sample_on_grid(law: Characteristic, validity_range: ValidityRange, count: in
             f"{type(law).__name__} gives no positive force on the validity range, so it cannot be converted. Choose "
             "another validity range."
         )
-    columns = {"pressure": p[pulls], "contraction": c[pulls], "force": force[pulls]}
-    return Recording(columns, type(law).__name__)
+    return Recording({"pressure": p[pulls], "contraction": c[pulls], "force": force[pulls]}, type(law).__name__)

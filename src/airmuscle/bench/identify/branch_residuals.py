@@ -46,13 +46,6 @@ class SensorDelay:
     loops: int
 
 
-class _Turn(NamedTuple):
-    loop: float
-    turning_point: float
-    width: float
-    sample_time: float
-
-
 def find_delay(recordings: Sequence[Recording]) -> SensorDelay | None:
     """The delay that explains the loops of isometric ramps; None where they show none."""
     turns = [turn for run in recordings for turn in _turns(run)]
@@ -79,8 +72,8 @@ def delay_notes(delay: SensorDelay | None) -> list[str]:
     ]
 
 
-def _turns(recording: Recording) -> list[_Turn]:
-    """The delays at each maximum of the pressure of a recording with time."""
+def _turns(recording: Recording) -> list[tuple[float, ...]]:
+    """At each maximum of the pressure of a recording with time, what `_turn` returns."""
     if any(name not in recording for name in ("time", "pressure", "force")) or len(recording) < 2 * MIN_LOOP_ROWS:
         return []
     if not np.isfinite(recording["pressure"] + recording["force"]).all():
@@ -90,8 +83,9 @@ def _turns(recording: Recording) -> list[_Turn]:
     return [turn for a, b in pairs if (turn := _turn(recording, a, b)) is not None]
 
 
-def _turn(recording: Recording, up: Branch, down: Branch) -> _Turn | None:
-    """The delays of the loop of two branches; None where the pressure dwells at its maximum or the force is flat."""
+def _turn(recording: Recording, up: Branch, down: Branch) -> tuple[float, ...] | None:
+    """Delays of the loop of two branches and of its turning point [s], width of the loop [N], and sample time [s]; None
+    where the pressure dwells at its maximum or the force is flat."""
     if min(len(up.interval), len(down.interval)) < MIN_LOOP_ROWS:
         return None
     rows = slice(up.interval.start, down.interval.stop)
@@ -103,7 +97,7 @@ def _turn(recording: Recording, up: Branch, down: Branch) -> _Turn | None:
     if step <= 0 or dwell > DWELL_ROWS + 0.06 * time.size:
         return None
     loop, late = _loop_delay(time, pressure, force, top), float(time[int(np.argmax(force))] - time[top])
-    return None if loop is None else _Turn(loop[0], late, loop[1], step)
+    return None if loop is None else (loop[0], late, loop[1], step)
 
 
 def _loop_delay(time: Array, pressure: Array, force: Array, top: int) -> tuple[float, float] | None:

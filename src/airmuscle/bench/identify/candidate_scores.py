@@ -102,7 +102,7 @@ def score_candidate(
     try:
         own_loss = in_fitted_quantity(loss, candidate.law, splits[0].points)
         fit = fit_to_points(candidate.law, splits[0].points, loss=own_loss, fixed=candidate.fixed)
-        notes = _slack_notes(fit.model, splits[0])
+        notes = splits[0].slack_notes(fit.model)
         residuals = residuals_of_rows(fit.model, splits[0].rows, splits[0].max_force)
     except AirmuscleError as error:
         return (ExcludedModel(candidate.name, error.message, cause_of(error)),) * len(splits)
@@ -150,21 +150,7 @@ def _excess_error(name: str, rmse: float, limit: float, where: str) -> ExcludedM
     error = f"error {where}, {rmse:.4g} N, is above {limit:.4g} N, so that it cannot be recommended"
     cause = f"its cross-validation takes long and was not completed: its {error}"
     omitted = "its cross-validation takes long and was not completed. To complete it, give the law as a candidate."
-    reason = f"Its {error}; {omitted}"
-    return ExcludedModel(name, reason, cause, rmse)
-
-
-def _slack_notes(model: Characteristic, points: ComparedPoints) -> tuple[str, ...]:
-    """A remark where the law is slack at points with a positive force.
-
-    Raises IdentificationError where it gives no force although it is not slack.
-    """
-    slack, count = points.slack_count(model)
-    text = (
-        f"it is slack at {slack} of {count} points with a positive force and is ranked with zero force there; its "
-        "method force raises SolveError at these points."
-    )
-    return (text,) if slack else ()
+    return ExcludedModel(name, f"Its {error}; {omitted}", cause, rmse)
 
 
 def in_fitted_quantity(loss: Loss, law: Characteristic, points: FitPoints) -> Loss:

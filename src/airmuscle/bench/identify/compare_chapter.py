@@ -186,8 +186,7 @@ def _fold_figure(comparison: Comparison) -> Any:
 
 def _natural_order(name: str) -> list[str | float]:
     """A key that sorts names by the numbers in them: contraction 3 % before contraction 12 %."""
-    parts = re.split(r"(\d+(?:\.\d+)?)", name)
-    return [float(part) if i % 2 else part for i, part in enumerate(parts)]
+    return [float(part) if i % 2 else part for i, part in enumerate(re.split(r"(\d+(?:\.\d+)?)", name))]
 
 
 def _common_word(names: Sequence[str]) -> str:

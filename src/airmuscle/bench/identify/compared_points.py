@@ -169,16 +169,21 @@ class ComparedPoints:
         modelled = residuals + np.maximum(rows["force"], 0.0)
         return slack_pull(rows["pressure"], rows["contraction"], rows["force"], modelled, limit, rows["specimen"])
 
-    def slack_count(self, model: Characteristic) -> tuple[int, int]:
-        """The number of rows with a positive force at which a law is slack, and the number of all of them.
+    def slack_notes(self, model: Characteristic) -> tuple[str, ...]:
+        """A remark where the law is slack at points with a positive force.
 
-        Raises IdentificationError where the law gives no force although it is not slack.
+        Raises IdentificationError where it gives no force although it is not slack.
         """
         masks = [
             slack_rows(law_of_length(model, r.resting_length), r.pressure[r.measured], r.contraction[r.measured])
             for r in self.rows
         ]
-        return sum(int(np.count_nonzero(mask)) for mask in masks), sum(mask.size for mask in masks)
+        slack, count = sum(int(np.count_nonzero(mask)) for mask in masks), sum(mask.size for mask in masks)
+        text = (
+            f"it is slack at {slack} of {count} points with a positive force and is ranked with zero force there; its "
+            "method force raises SolveError at these points."
+        )
+        return (text,) if slack else ()
 
     def left_out_residuals(self, candidate: Candidate, fit: Fit, loss: Loss) -> Iterator[tuple[str, Array, int]]:
         """The name of each fold, the residuals in force [N] on its rows of the law fitted to all other rows, and the

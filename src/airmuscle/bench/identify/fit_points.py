@@ -150,8 +150,7 @@ def _columns_at_levels(recording: Recording) -> tuple[dict[str, Array], dict[str
     """Pressure and contraction of the rows; that which is constant in a run is replaced by its level, in these rows."""
     columns = {name: np.array(recording[name], dtype=float) for name in ("pressure", "contraction")}
     held = {name: np.zeros(len(recording), dtype=bool) for name in columns}
-    finite = np.isfinite(recording["pressure"] + recording["contraction"] + recording["force"]).all()
-    if not finite:
+    if not np.isfinite(recording["pressure"] + recording["contraction"] + recording["force"]).all():
         return columns, held
     bands = {"pressure": LEVEL_BAND * float(np.max(np.abs(columns["pressure"]), initial=0.0)), "contraction": 0.01}
     if not any(_may_be_constant(columns[name], band) for name, band in bands.items()):

@@ -102,8 +102,7 @@ def corrected_length(run: Recording, offset: float) -> Recording:
     columns["contraction"] = run["contraction"] * float(length) / corrected
     if "time" in run.columns:
         columns["time"] = run["time"]
-    constants = {**run.constants, "resting_length": corrected}
-    return Recording(columns, run.origin, constants, references=run.references)
+    return Recording(columns, run.origin, {**run.constants, "resting_length": corrected}, references=run.references)
 
 
 def estimate_length_error(

@@ -89,8 +89,7 @@ class MatchedRuns:
     @property
     def pressure_shift(self) -> float:
         """The error of the pressure of the first block [Pa] that would explain the difference."""
-        slopes = self.first.slopes[self.pairs[:, 0]]
-        return -float(np.median(self.differences / np.maximum(slopes, 1e-12)))
+        return -float(np.median(self.differences / np.maximum(self.first.slopes[self.pairs[:, 0]], 1e-12)))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

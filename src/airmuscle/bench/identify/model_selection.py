@@ -43,8 +43,7 @@ def recommend(ranking: Sequence[RankedModel], split: GroupSplit) -> tuple[Ranked
     best = eligible[0]
     limit = (1 + MAX_RECOMMENDED_EXCESS) * best.cross_validated_rmse
     equivalent = [m for m in eligible if m.cross_validated_rmse <= limit and excess_error(m, best) <= 0]
-    supported = [m for m in equivalent if not is_contradicted(m, best)]
-    recommended = min(supported, key=_simplicity)
+    recommended = min([m for m in equivalent if not is_contradicted(m, best)], key=_simplicity)
     text = (
         f"Recommended for {split.purpose}: {recommended.candidate.name} with {recommended.parameter_count} parameters, "
         f"rms error {recommended.cross_validated_rmse:.4g} N in leave-one-{split.group_name}-out cross-validation"
@@ -104,8 +103,7 @@ def is_contradicted(model: RankedModel, best: RankedModel) -> bool:
 
 def excess_error(model: RankedModel, best: RankedModel) -> float:
     """Difference of the mean square errors [N^2], minus one standard error of it over the folds."""
-    pairs = zip(model.fold_scores, best.fold_scores, strict=True)
-    difference = np.array([a.rmse**2 - b.rmse**2 for a, b in pairs])
+    difference = np.array([a.rmse**2 - b.rmse**2 for a, b in zip(model.fold_scores, best.fold_scores, strict=True)])
     rows = np.array([score.rows for score in best.fold_scores], dtype=float)
     mean = float(np.average(difference, weights=rows))
     spread = float(np.sqrt(np.average((difference - mean) ** 2, weights=rows) / max(difference.size - 1, 1)))

@@ -212,7 +212,6 @@ def pool(law: PooledLengthLaw, population: Fit, points: FitPoints) -> Fit:
     modelled = evaluate(model, "force", population.fitted_quantity.arguments, data)
     errors, measured = row_errors(population.problem, modelled), population.censoring == 0
     estimates = zip(population.estimates, effects.population_errors.tolist(), strict=True)
-    target = data["force"]
     return dataclasses.replace(
         population,
         model=model,
@@ -221,7 +220,7 @@ def pool(law: PooledLengthLaw, population: Fit, points: FitPoints) -> Fit:
         sigma=effects.sigma,
         rmse=rms_of_rows(errors, measured),
         max_error=WorstPoint.of(errors, data),
-        correlation_index=correlation_index(target[measured], modelled[measured]),
+        correlation_index=correlation_index(data["force"][measured], modelled[measured]),
         recording=data,
         effects=effects,
     )

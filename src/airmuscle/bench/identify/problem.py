@@ -56,8 +56,7 @@ def of_length(law: Any, length: float | None) -> Any:
     """As `law.with_resting_length`, but without validation, because a search may pass through invalid parameters."""
     if length is None:
         return law
-    leaves = tree.leaves(law)
-    return tree.unflatten(law, [length if leaf.path == RESTING_LENGTH else leaf.value for leaf in leaves])
+    return tree.unflatten(law, [length if leaf.path == RESTING_LENGTH else leaf.value for leaf in tree.leaves(law)])
 
 
 def evaluate(law: Any, method: str, arguments: tuple[str, str], data: Recording) -> Array:

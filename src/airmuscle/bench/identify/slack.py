@@ -171,14 +171,13 @@ def with_slack_bounds(problem: FitProblem, points: FitPoints) -> BoundedProblem:
     source = columns.pop("source").astype(np.intp)
     shares = columns.pop("share")
     data = Recording({n: np.concatenate([problem.data[n], columns[n]]) for n in columns}, problem.data.origin)
-    mean_square = float(np.mean(problem.weights**2))
     return BoundedProblem(
         dataclasses.replace(
             problem,
             data=data,
             target=np.concatenate([problem.target, np.zeros(source.size)]),
             censoring=np.concatenate([problem.censoring, np.ones(source.size)]),
-            weights=np.concatenate([problem.weights, np.sqrt(mean_square * shares)]),
+            weights=np.concatenate([problem.weights, np.sqrt(float(np.mean(problem.weights**2)) * shares)]),
         ),
         source,
     )

@@ -72,11 +72,9 @@ def odd_specimen_notes(errors: SpecimenErrors | None) -> list[HintedText]:
     if errors is None or found is None:
         return []
     name, error, others = found
-    extrapolated = ""
-    if errors.lengths and len(errors.lengths) == len(errors.names):
-        own = errors.lengths[errors.names.index(name)]
-        if own in (min(errors.lengths), max(errors.lengths)):
-            extrapolated = " Its length is outside those of the others, so that the law is extrapolated to it."
+    lengths, extrapolated = errors.lengths, ""
+    if len(lengths) == len(errors.names) and lengths[errors.names.index(name)] in (min(lengths), max(lengths)):
+        extrapolated = " Its length is outside those of the others, so that the law is extrapolated to it."
     return [
         HintedText(
             f"Specimen {name} does not follow the others: left out, its rms error is {error:.3g} N, that of the others "

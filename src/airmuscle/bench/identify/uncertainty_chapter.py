@@ -199,8 +199,7 @@ def violation_table(violations: Sequence[MonotonicityViolation], name: str, titl
         "worst at pressure": TableColumn([each.worst_point[0] for each in violations], "Pa", "kPa"),
         f"worst at {second}": TableColumn([each.worst_point[1] for each in violations], *units),
     }
-    note = "`airmuscle fit --shape` fits a surface without such regions."
-    return Table(name, title, columns, note)
+    return Table(name, title, columns, "`airmuscle fit --shape` fits a surface without such regions.")
 
 
 def _surface_figure(shaped: ShapeConstrainedFit, unconstrained: Fit) -> Any:

@@ -57,8 +57,7 @@ def solve_censored_least_squares(
         rows, right = weights[counted, None] * matrix[counted], weights[counted] * target[counted]
         step = np.linalg.lstsq(rows, right, rcond=_RCOND)[0] - x
         if iteration:
-            current = sum_of_squares(x)
-            step = shortened_step(sum_of_squares, x, step, current)
+            step = shortened_step(sum_of_squares, x, step, sum_of_squares(x))
         x, previous = x + step, weights
         weights = row_weights(x)
         if np.array_equal(weights, previous):

@@ -180,8 +180,7 @@ def _polynomial(points: VolumePoints, resting_length: float, degree: int) -> Che
 def _design(law: Geometry, contraction: Array) -> Array:
     """Terms of the law, in whose coefficients the volume is linear, shape (N, P)."""
     if isinstance(law, ChebyshevGeometry):
-        limits = (law.min_contraction, law.max_contraction)
-        return _chebyshev_terms(contraction, *limits, len(law.coefficients) - 1)
+        return _chebyshev_terms(contraction, law.min_contraction, law.max_contraction, len(law.coefficients) - 1)
     return _braid_terms(contraction)
 
 

@@ -63,8 +63,7 @@ class RowReader:
         if len(self._head) > MAX_HEADER_LINES:
             raise FileError(f"{self.origin}: no row of numbers in the first {MAX_HEADER_LINES} lines.")
         text_format = TextFormat(headerless=bool(self._names))
-        delimiter = text_format.detect_delimiter(line)
-        cells = split_cells(line, delimiter)
+        cells = split_cells(line, text_format.detect_delimiter(line))
         while cells and not cells[-1]:
             cells.pop()  # a delimiter at the end of the line
         if is_comment(line) or not cells or not all(is_number(cell) for cell in cells):

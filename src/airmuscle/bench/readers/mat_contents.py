@@ -103,8 +103,7 @@ def _read_hdf5(path: Path, downsampling: Downsampling) -> MatContents:
     with h5py.File(path, "r") as file:
         check_own_values(h5py, file, path)
         check_no_external_links(h5py, file, path)
-        fields = _fields(h5py, file, file, "", notes)
-        variables = _reduced(path.name, "", fields, downsampling, reductions)
+        variables = _reduced(path.name, "", _fields(h5py, file, file, "", notes), downsampling, reductions)
     return MatContents(variables, reductions, tuple(notes))
 
 

@@ -90,9 +90,8 @@ def _hdf5_objects(path: Path) -> Iterator[MatlabObject]:
     """The opaque variables of a file of version 7.3."""
     if not is_installed("h5py"):
         return
-    h5py = import_lab_package("h5py", path)
     try:
-        with h5py.File(path, "r") as file:
+        with import_lab_package("h5py", path).File(path, "r") as file:
             for name, item in file.items():
                 class_name = item.attrs.get("MATLAB_class", b"").decode()
                 is_opaque = item.attrs.get("MATLAB_object_decode", 0) == 3

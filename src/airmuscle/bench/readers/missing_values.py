@@ -126,8 +126,7 @@ class RefuseMissing(MissingValues):
     """Missing values are an error, which lists them."""
 
     def treat(self, table: RawTable, headings: Sequence[Heading]) -> RawTable:
-        cells = examine(table, headings, self.codes)
-        _refuse(table, cells, missing=True)
+        _refuse(table, examine(table, headings, self.codes), missing=True)
         return table
 
 

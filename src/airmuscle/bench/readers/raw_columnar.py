@@ -162,10 +162,9 @@ def _unit(attributes: Mapping[str, Any]) -> str:
 
 def _constants(attributes: Mapping[str, Any]) -> dict[str, float | str]:
     """Attributes that are single numbers or texts."""
-    scalars = {name: value for name, value in attributes.items() if np.ndim(value) == 0}
     return {
         name: float(value) if isinstance(value, np.number | int | float) else _text(value)
-        for name, value in scalars.items()
+        for name, value in attributes.items()
         if isinstance(value, np.number | int | float | str | bytes) and name.isidentifier()
     }
 

@@ -170,8 +170,7 @@ def read_large_csv(
         rows += [line for line, _ in chunk][:: step // stride]
         if progress:
             progress(path.name, min(1.0, (rows[-1] - first + 1) / total))
-    notes = (downsampling.note(total, step),) if step > 1 else ()
-    return header.table(path.name, _joined(columns), rows, notes)
+    return header.table(path.name, _joined(columns), rows, (downsampling.note(total, step),) if step > 1 else ())
 
 
 def read_text_stream(

@@ -76,8 +76,7 @@ def _table(origin: str, tags: Tags, lines: NumberedLines, form: TextFormat) -> R
     width = max(i for i, name in enumerate(headings[:commented]) if name) + 1
     comment = rows[0][1][commented : commented + 1]
     body = [(i, form.delimiter.join([*cells[:width], *[""] * (width - len(cells))])) for i, cells in rows]
-    header = TextHeader(tuple(headings[:width]), None, {}, form.delimiter, 0)
-    columns = parse_columns(origin, header, body, form)
+    columns = parse_columns(origin, TextHeader(tuple(headings[:width]), None, {}, form.delimiter, 0), body, form)
     channels = list(_channels(origin, tags, headings[:width], columns))
     table = merge_channels(origin, channels, {"comment": comment[0]} if any(comment) else {})
     if len(table.rows) == len(body):

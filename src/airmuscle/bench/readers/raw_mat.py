@@ -176,8 +176,7 @@ def _of_one_length(
     if len(lengths) < 2:
         return channels, ()
     mapped = [c for c in channels if c.name in columns or c.name.partition("[")[0].strip() in columns]
-    selecting = mapped or [c for c in channels if parse_heading(c.name).known]
-    selected = {len(channel.values) for channel in selecting}
+    selected = {len(channel.values) for channel in mapped or [c for c in channels if parse_heading(c.name).known]}
     if len(selected) != 1:
         sizes = "; ".join(
             f"{length} rows: {', '.join(c.name for c in channels if len(c.values) == length)}" for length in lengths

@@ -25,8 +25,7 @@ def read_mdf_tables_here(
     A channel group with more than `downsampling.max_rows` rows is read by pieces and reduced. The package for this
     format is native code, therefore a separate process reads the file.
     """
-    asammdf = import_lab_package("asammdf", path)
-    with reading(path, "MDF"), asammdf.MDF(path) as file:
+    with reading(path, "MDF"), import_lab_package("asammdf", path).MDF(path) as file:
         names = [str(getattr(g.channel_group, "acq_name", "") or f"group {i}") for i, g in enumerate(file.groups, 1)]
         check_known(f"{path.name}: no group", [] if group is None else group, names, "the groups are", FileError)
         reductions = {
@@ -88,10 +87,9 @@ def read_tdms_tables(path: Path, group: str | None = None) -> tuple[RawTable, ..
 
 
 def _make_table(path: Path, group: Any, properties: dict[str, Any], several: bool) -> RawTable:
-    merged = {**properties, **group.properties}
     constants = {
         name: value
-        for name, value in merged.items()
+        for name, value in {**properties, **group.properties}.items()
         if isinstance(value, float | int | str) and name not in ("name", "description", "title", "author")
     }
     origin = f"{path.name}, group '{group.name}'" if several else path.name

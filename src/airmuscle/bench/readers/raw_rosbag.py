@@ -81,8 +81,7 @@ def _messages(bag: Any, group: str | None) -> dict[str, list[tuple[float, dict[_
     chosen = [c for c in bag.connections if group is None or c.topic.strip("/") == group.strip("/")]
     messages: dict[str, list[tuple[float, dict[_Field, float]]]] = {}
     for connection, stamp, raw in bag.messages(connections=chosen) if chosen else ():
-        message = bag.deserialize(raw, connection.msgtype)
-        numbers = dict(_numbers(message, ""))
+        numbers = dict(_numbers(bag.deserialize(raw, connection.msgtype), ""))
         if numbers:
             topic = connection.topic.strip("/").replace("/", ".")
             messages.setdefault(topic, []).append(((stamp - bag.start_time) * 1e-9, numbers))

@@ -84,8 +84,8 @@ def _find_heading_row(rows: Rows) -> int:
     if not above:
         return numeric
     adjacent = len(above) > 1 and above[-2] == above[-1] - 1
-    is_unit_row = adjacent and header.parse_unit_row(*(_texts(rows[i][1]) for i in above[-2:]))
-    return above[-2] if is_unit_row else above[-1]
+    unit_row = adjacent and header.parse_unit_row(*(_texts(rows[i][1]) for i in above[-2:]))
+    return above[-2] if unit_row else above[-1]
 
 
 def _is_numeric(row: list[Any]) -> bool:

@@ -136,8 +136,7 @@ def parse_header(origin: str, lines: NumberedLines, text_format: TextFormat) -> 
     preamble, body = body[:above], body[above:]
     delimiter = text_format.detect_delimiter(body[0][1])
     headings, count = _find_headings(origin, comments, body, delimiter, text_format.headerless)
-    below = split_cells(body[count][1], delimiter) if len(body) > count else []
-    units = header.parse_unit_row(headings, below)
+    units = header.parse_unit_row(headings, split_cells(body[count][1], delimiter) if len(body) > count else [])
     count += 1 if units else 0
     if len(body) <= count:
         raise FileError(f"{origin}: no rows of numbers below the headings ({listed(headings)}).")

@@ -81,8 +81,7 @@ def _write_parquet(recording: Recording, temporary: Path, path: Path, comments: 
     arrow, parquet = import_lab_package("pyarrow", path), import_lab_package("pyarrow.parquet", path)
     columns = _columns(recording)
     fields = [arrow.field(name, arrow.float64(), metadata={"unit": unit}) for name, unit, _ in columns]
-    metadata = {name: _constant_text(value) for name, value in recording.constants.items()}
-    schema = arrow.schema(fields, metadata=metadata)
+    schema = arrow.schema(fields, metadata={name: _constant_text(value) for name, value in recording.constants.items()})
     table = arrow.Table.from_arrays([arrow.array(values) for _, _, values in columns], schema=schema)
     parquet.write_table(table, str(temporary))
 
@@ -94,8 +93,7 @@ def _constant_text(value: float | str) -> str:
 
 
 def _write_hdf5(recording: Recording, temporary: Path, path: Path, comments: bool) -> None:
-    h5py = import_lab_package("h5py", path)
-    with h5py.File(temporary, "w", track_order=True) as file:
+    with import_lab_package("h5py", path).File(temporary, "w", track_order=True) as file:
         file.attrs.update(dict(recording.constants))
         for name, unit, values in _columns(recording):
             file.create_dataset(name.replace("/", "_"), data=values).attrs["unit"] = unit
@@ -156,8 +154,7 @@ def to_xarray(recording: Recording) -> Any:
     along = "time" if timed else "row"
     data = {name: (along, recording[name], _unit(name)) for name in recording if name != "time"}
     rows = ("time", recording["time"], {"units": "s"}) if timed else ("row", np.arange(len(recording)))
-    attributes = {"origin": recording.origin, **recording.constants}
-    return xarray.Dataset(data, coords={along: rows}, attrs=attributes)
+    return xarray.Dataset(data, coords={along: rows}, attrs={"origin": recording.origin, **recording.constants})
 
 
 def _unit(name: str) -> dict[str, str]:

@@ -183,5 +183,4 @@ def branch_column_agreement(recording: Recording, branches: tuple[Branch, ...]) 
     """
     if "branch" not in recording or any(branch.column != "pressure" for branch in branches):
         return None
-    stated = np.where(recording["branch"] == 1, 1.0, -1.0)
-    return float(np.mean(stated == branch_directions(recording, branches)))
+    return float(np.mean(np.where(recording["branch"] == 1, 1.0, -1.0) == branch_directions(recording, branches)))

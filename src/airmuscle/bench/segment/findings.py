@@ -137,8 +137,7 @@ def _motion_findings(recording: Recording) -> Iterator[Finding]:
     elif "contraction" not in recording:
         converted = Hint(f"To convert the {moved}", "resting_length", "300 mm", "ColumnMapping")
         remedy = (" ", ZERO_NOT_STATED) if moved == "position" else (converted,)
-        refused = "a static fit needs the contraction and will refuse this recording."
-        yield Finding(HintedText(refused, *remedy))
+        yield Finding(HintedText("a static fit needs the contraction and will refuse this recording.", *remedy))
 
 
 def _pressure_range(recording: Recording) -> str:

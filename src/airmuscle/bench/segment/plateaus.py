@@ -32,8 +32,7 @@ def quasi_static_rows(
     quasi_static = np.ones(len(recording), dtype=bool)
     if "time" not in recording or len(recording) < 3:
         return quasi_static
-    time = recording["time"]
-    width = count_rows(settling_time, time, 1)
+    width = count_rows(settling_time, recording["time"], 1)
     sensors = sensors or estimate_sensors(recording)
     for name in recording:
         if name.rpartition(".")[2] in _MONITORED and name in sensors:

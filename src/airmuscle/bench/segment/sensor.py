@@ -63,8 +63,7 @@ def analyse_sampling(recording: Recording) -> Sampling | None:
     forward = steps[steps > 0]
     step = float(np.median(forward)) if forward.size else 0.0
     jitter = 1.4826 * float(np.median(np.abs(forward - step))) / step if step else 0.0
-    gap_rows = np.flatnonzero(steps > GAP_FACTOR * step)
-    gaps = tuple(Gap(int(i), float(time[i]), float(steps[i])) for i in gap_rows)
+    gaps = tuple(Gap(int(i), float(time[i]), float(steps[i])) for i in np.flatnonzero(steps > GAP_FACTOR * step))
     return Sampling(
         len(recording), float(time.max() - time.min()), _sample_time(steps), jitter, gaps if step else (),
         _rows(steps == 0), _rows(steps < 0),
@@ -185,8 +184,7 @@ def estimate_resolution(values: Array) -> float:
     if len(distinct) < MIN_DISTINCT_VALUES:
         return 0.0
     gaps = np.diff(distinct)
-    candidates = sorted({float(q) for q in np.quantile(gaps, [0.02, 0.1, 0.25, 0.5])}, reverse=True)
-    for candidate in candidates:
+    for candidate in sorted({float(q) for q in np.quantile(gaps, [0.02, 0.1, 0.25, 0.5])}, reverse=True):
         # One reading may be written in two ways, 71.70 and 71.71; both count as one.
         steps = np.diff(distinct[np.concatenate(([True], gaps > SAME_READING * candidate))])
         step = _refine_step(candidate, steps[steps < 8.5 * candidate])
@@ -233,8 +231,7 @@ def _upper_limit(runs: list[Array], resolution: float) -> tuple[float, int]:
     rows_elsewhere = 1 + max(_longest_interval(np.abs(np.diff(values)) <= tolerance) for values in between)
     noise = max(estimate_noise(values) for values in between)
     is_noisy = noise > max(MIN_NOISE * resolution, 1e-6 * float(np.ptp(combined)))
-    saturated = is_noisy and rows_at_top > 2 * rows_elsewhere
-    return (top, len(combined) - len(below)) if saturated else (math.inf, 0)
+    return (top, len(combined) - len(below)) if is_noisy and rows_at_top > 2 * rows_elsewhere else (math.inf, 0)
 
 
 def _longest_interval(mask: Mask) -> int:
