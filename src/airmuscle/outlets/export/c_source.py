@@ -3,7 +3,7 @@
 import csv
 import dataclasses
 import io
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,7 @@ from ...engine.compile.kernel_text import CKernels
 from ...engine.compile.text.programs import CLanguage
 from ...engine.run.integrators import Integrator
 from ...recording.recording import column_heading
-from .exported_run import BETWEEN, SHAPES, STEP, TABLEAU, ExportedLoop, RunData, SolverText
+from .exported_run import BETWEEN, SHAPES, STEP, TABLEAU, ExportedLoop, ExportedRun, SolverText
 from .identifiers import block_comment, c_array, c_integers, c_number, c_string, c_strings, filled, make_identifiers
 from .printed_system import ExportedSystem
 
@@ -41,59 +41,30 @@ class CSource:
         solver = self._solver()
         constants = solver.constants
         functions, sizes = self.system.printed(language, implicit=solver.implicit, extend=self.extend)
-        common = {"provenance": block_comment(self.provenance), "file": self.name}
-        steps = {key.lower(): c_number(constants[key]) for key in ("FIRST_STEP", "CLOSE")}
-        header = {**common, **self._sizes(sizes), **steps, "enumerations": self._enumerations()}
-        text = self._solver_constants(sizes, constants) + filled("solver.c", solver.places, self.name)
-        source = {**common, "constants": self._constants(), "functions": functions, "solver": text}
-        return {
-            f"{self.name}.h": filled("model.h", header, self.name),
-            f"{self.name}.c": filled("model.c", source, self.name),
-        }
+        numbers = {
+            "states": sizes.states, "inputs": sizes.inputs, "parameters": len(self.system.tunable), "held": sizes.held,
+            "outputs": sizes.outputs,
+        }  # fmt: skip
+        places = {
+            "provenance": block_comment(self.provenance), "file": self.name, "enumerations": self._enumerations(),
+            **{key: str(number) for key, number in numbers.items()},
+            **{key.lower(): c_number(constants[key]) for key in ("FIRST_STEP", "CLOSE")},
+            "constants": self._constants(), "functions": functions,
+            "solver": self._solver_constants(sizes, constants) + filled("solver.c", solver.places, self.name),
+        }  # fmt: skip
+        return {f"{self.name}.{end}": filled(f"model.{end}", places, self.name) for end in "hc"}
 
     @property
     def upper(self) -> str:
         """Beginning of the macros."""
         return self.name.upper()
 
-    def main(self, run: RunData, columns: Sequence[str]) -> str:
-        """A main program that runs a scenario and writes these columns, after time, as CSV."""
-        every, segments = list(self.system.columns), run.segments
-        row = f"[{self.upper}_INPUTS + 1]"
-        constants = [
-            f"static const char header[] = {c_string(csv_header(columns))};\n",
-            f"static const int columns[COLUMNS] = {{{', '.join(str(every.index(name)) for name in columns)}}};\n",
-            f"static const double start = {c_number(run.start)};\n",
-            c_array(f"static const double initial[{self.upper}_STATES]", run.initial),
-            c_array("static const double times[ROWS]", run.times),
-            c_array("static const double ends[SEGMENTS]", segments.ends),
-            c_array(f"static const double values[SEGMENTS]{row}", segments.values, 1),
-            c_array(f"static const double slopes[SEGMENTS]{row}", segments.slopes, 1),
-        ]
-        places = {
-            "provenance": block_comment(self.provenance),
-            "file": self.name,
-            "rows": str(run.times.size),
-            "segments": str(segments.ends.size),
-            "columns": str(len(columns)),
-            "constants": "".join(constants),
-            "valid": filled("valid.c", {}, self.name),
-            "program": filled("program.c", {"failures": ""}, self.name),
-        }
-        return filled("main.c", places, self.name)
-
-    def _sizes(self, sizes: ArraySizes) -> dict[str, str]:
-        return {
-            "states": str(sizes.states), "inputs": str(sizes.inputs), "parameters": str(len(self.system.tunable)),
-            "held": str(sizes.held), "outputs": str(sizes.outputs),
-        }  # fmt: skip
-
     def _enumerations(self) -> str:
+        known, text = self.system.known, ""
         kinds: Mapping[str, Sequence[str]] = {
-            "STATE": self.system.state_names, "INPUT": self.system.input_names, "OUTPUT": self.system.output_names,
+            "STATE": known.state_names, "INPUT": known.input_names, "OUTPUT": known.output_names,
             "PARAMETER": [leaf.path for leaf in self.system.tunable],
         }  # fmt: skip
-        text = ""
         for kind, names in kinds.items():
             words = [f"{self.upper}_{kind}_{word.upper()}" for word in make_identifiers(names)]
             rows = "".join(f"  {word} = {i},\n" for i, word in enumerate(words)).removesuffix(",\n")
@@ -101,20 +72,18 @@ class CSource:
         return text
 
     def _constants(self) -> str:
-        known, units, system = self.system.compiled.description, self.system.units, self.system
-        texts: dict[str, tuple[Any, Sequence[str]]] = {
-            "state": (system.state_names, [units[n] for n in system.state_names]),
-            "input": (system.input_names, [units[n] for n in system.input_names]),
-            "output": (system.output_names, [units[n] for n in system.output_names]),
-            "parameter": ([p.path for p in system.tunable], [p.declared.unit for p in system.tunable]),
-        }
-        text, m, upper = "", self.name, self.upper
-        for kind, (names, of) in texts.items():
+        known, system, text, m, upper = self.system.known, self.system, "", self.name, self.upper
+        units = system.units | {leaf.path: leaf.declared.unit for leaf in system.tunable}
+        kinds: Mapping[str, Sequence[str]] = {
+            "state": known.state_names, "input": known.input_names, "output": known.output_names,
+            "parameter": [leaf.path for leaf in system.tunable],
+        }  # fmt: skip
+        for kind, names in kinds.items():
             size = f"{upper}_{kind.upper()}S + 1"
             text += c_strings(f"const char *const {m}_{kind}_names[{size}]", names)
-            text += c_strings(f"const char *const {m}_{kind}_units[{size}]", of)
+            text += c_strings(f"const char *const {m}_{kind}_units[{size}]", [units[name] for name in names])
         text += c_array(f"const double {m}_defaults[{upper}_PARAMETERS + 1]", system.defaults, 1)
-        text += c_array(f"const double {m}_nominal[{upper}_STATES]", system.nominal)
+        text += c_array(f"const double {m}_nominal[{upper}_STATES]", system.compiled.nominal)
         text += c_array(f"const double {m}_state_minimum[{upper}_STATES]", known.lower_bounds)
         text += c_array(f"const double {m}_input_minimum[{upper}_INPUTS + 1]", known.input_minimum, 1)
         return text + c_array(f"const double {m}_input_maximum[{upper}_INPUTS + 1]", known.input_maximum, 1)
@@ -159,22 +128,37 @@ APPLY_DRIVERS = """  apply_drivers(driver_kinds, driver_settings, driver_states,
 """The lines that pass commands through their drivers."""
 
 
-def loop_main(
-    name: str, system: ExportedSystem, run: RunData, loop: ExportedLoop, columns: Sequence[str],
-    provenance: Sequence[str],
-) -> str:  # fmt: skip
-    """A main program that runs a control loop and writes these columns, after time, as CSV."""
-    drivers = len(loop.drivers.kinds)
-    places = {
-        "provenance": block_comment(provenance), "file": name, "rows": str(run.times.size),
-        "samples": str(loop.samples), "segments": str(loop.others.ends.size),
-        "pieces": str(loop.prepared.setpoint_signal.ends.size), "columns": str(len(columns)), "drivers": str(drivers),
-        "capacity": str(loop.capacity), "apply_drivers": APPLY_DRIVERS if drivers else "",
-        "kernels": CKernels(_shapes(f"{name.upper()}_INPUTS")).text("driven_inputs", loop.kernels),
-        "valid": filled("valid.c", {}, name), "program": filled("program.c", {"failures": NOT_COMMANDED}, name),
-        "constants": _constants(name, system, run, loop, columns),
-    }  # fmt: skip
-    return filled("loop.c", places, name)
+def main_program(program: ExportedRun) -> str:
+    """A main program that runs a scenario, with its control loop if it has one, and writes columns as CSV."""
+    name, loop = program.name, program.loop
+    numbers: dict[str, float] = {
+        "rows": program.times.size,
+        "segments": program.segments.ends.size,
+        "columns": len(program.columns),
+    }
+    places = {"provenance": block_comment(program.provenance), "file": name, "valid": filled("valid.c", {}, name)}
+    if loop is None:
+        every, start = program.system.known.column_names, program.problem.start_time
+        columns_at = ", ".join(str(every.index(each)) for each in program.columns)
+        places["constants"] = "".join((
+            f"static const char header[] = {c_string(csv_header(program.columns))};\n",
+            f"static const int columns[COLUMNS] = {{{columns_at}}};\n",
+            f"static const double start = {c_number(start)};\n",
+            *_run_arrays(program),
+        ))  # fmt: skip
+    else:
+        drivers = len(loop.drivers.kinds)
+        numbers |= {
+            "samples": loop.numbers["samples"], "pieces": loop.prepared.setpoint_signal.ends.size, "drivers": drivers,
+            "capacity": loop.capacity,
+        }  # fmt: skip
+        places |= {
+            "apply_drivers": APPLY_DRIVERS if drivers else "", "constants": _loop_constants(program, loop),
+            "kernels": CKernels(_shapes(f"{name.upper()}_INPUTS")).text("driven_inputs", loop.kernels),
+        }  # fmt: skip
+    places |= {key: str(number) for key, number in numbers.items()}
+    places["program"] = filled("program.c", {"failures": NOT_COMMANDED if loop else ""}, name)
+    return filled("loop.c" if loop else "main.c", places, name)
 
 
 def _shapes(inputs: str) -> dict[str, tuple[str, ...]]:
@@ -190,25 +174,33 @@ def _shapes(inputs: str) -> dict[str, tuple[str, ...]]:
     }  # fmt: skip
 
 
-def _constants(name: str, system: ExportedSystem, run: RunData, loop: ExportedLoop, columns: Sequence[str]) -> str:
-    upper, others, setpoints = name.upper(), loop.others, loop.prepared.setpoint_signal
-    numbers = (
-        ("SAMPLE_TIME", loop.sample_time), ("NEAR", loop.near), ("start", run.start),
-        ("finish", float(loop.prepared.instants[-1])),
-    )  # fmt: skip
-    text = "".join(f"static const double {key} = {c_number(value)};\n" for key, value in numbers)
-    text += f"static const char header[] = {c_string(csv_header(columns))};\n"
+def _run_arrays(program: ExportedRun) -> Iterator[str]:
+    """The arrays of a run; those of a loop, which its kernels are given, are not const."""
+    upper, loop = program.name.upper(), program.loop
+    yield c_array(f"static const double initial[{upper}_STATES]", program.problem.initial_vector)
+    yield c_array("static const double times[ROWS]", program.times)
+    signals = [("", program.segments, "SEGMENTS", f"{upper}_INPUTS")]
+    if loop is not None:
+        signals.append(("setpoint_", loop.prepared.setpoint_signal, "PIECES", "SETPOINTS"))
+    for kind, signal, count, width in signals:
+        yield c_array(f"static const double {kind}ends[{count}]", signal.ends)
+        for name, table in (("values", signal.values), ("slopes", signal.slopes)):
+            yield c_array(f"static {'' if loop else 'const '}double {kind}{name}[{count}][{width} + 1]", table, 1)
+
+
+def _loop_constants(program: ExportedRun, loop: ExportedLoop) -> str:
+    known, numbers = program.system.known, loop.numbers
+    stated = {
+        "SAMPLE_TIME": numbers["sample_time"], "NEAR": numbers["near"], "start": program.problem.start_time,
+        "finish": numbers["finish"],
+    }  # fmt: skip
+    text = "".join(f"static const double {key} = {c_number(value)};\n" for key, value in stated.items())
+    text += f"static const char header[] = {c_string(csv_header(program.columns))};\n"
     text += "/* Kind of each column (state, input, output, set point, measurement, command), and its number there. */\n"
-    text += c_integers("static const int columns[COLUMNS][2]", loop.column_at(system, columns))
-    text += c_integers("static const int measured_at[MEASUREMENTS][2]", loop.measured_at(system))
+    text += c_integers("static const int columns[COLUMNS][2]", loop.column_at(known, program.columns))
+    text += c_integers("static const int measured_at[MEASUREMENTS][2]", loop.measured_at(known))
     text += c_integers("static const int commanded[COMMANDS]", loop.prepared.commanded)
-    text += c_array(f"static const double initial[{upper}_STATES]", run.initial)
-    text += c_array("static const double times[ROWS]", run.times)
-    for kind, signal, width in (("", others, f"{upper}_INPUTS"), ("setpoint_", setpoints, "SETPOINTS")):
-        count = "PIECES" if kind else "SEGMENTS"
-        text += c_array(f"static const double {kind}ends[{count}]", signal.ends)
-        text += c_array(f"static double {kind}values[{count}][{width} + 1]", signal.values, 1)
-        text += c_array(f"static double {kind}slopes[{count}][{width} + 1]", signal.slopes, 1)
+    text += "".join(_run_arrays(program))
     if len(loop.drivers.kinds):
         text += c_integers(
             "static int driver_kinds[DRIVERS][2]", [(int(i), int(kind)) for i, kind in loop.drivers.kinds]

@@ -2,7 +2,7 @@
 
 import dataclasses
 import functools
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,8 @@ import numpy as np
 from ...core import Array, ParameterError
 from ...engine.compile.kernel_text.printer import KernelPrinter
 from ...engine.compile.kernel_text.types import TypedKernel
-from ...engine.loop import COMMAND, MEASURED, SETPOINT, ControlLoop, PiecewiseLinear, WithDrivers
+from ...engine.compile.program import Description
+from ...engine.loop import COMMAND, MEASURED, SETPOINT, PiecewiseLinear, WithDrivers
 from ...engine.run import Problem
 from ...engine.run.driver_table import KINDS, MAX_CAPACITY, DriverTable, greatest_capacity
 from ...engine.run.integrators import ExplicitRungeKutta, Integrator, Rodas4
@@ -19,80 +20,18 @@ from .printed_controller import PrintedController, check_control_law, print_cont
 from .printed_system import ExportedSystem
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class RunData:
-    """A run: `initial` (n,), the segments of the inputs, in a control loop of those that are not commanded, and `times`
-    (N,) of the rows, from `start` [s] on."""
-
-    initial: Array
-    segments: PiecewiseLinear
-    times: Array
-    start: float
-    integrator: Integrator
-
-
-def run_data(problem: Problem, segments: PiecewiseLinear | None = None, times: Array | None = None) -> RunData:
-    """The run of a problem with input signals, whose drivers are resolved into segments; with a control loop, the
-    segments of the inputs that are not commanded, and the output times, are given."""
-    assert problem.integrator is not None
-    return RunData(
-        problem.initial_vector, problem.segments if segments is None else segments,
-        problem.times if times is None else times, problem.start_time, check_integrator(problem.integrator),
-    )  # fmt: skip
-
-
-def program_data(system: ExportedSystem, run: RunData) -> dict[str, Any]:
-    """What a program states of its system and run: names in tuples, numbers in arrays."""
-    known, segments = system.compiled.description, run.segments
-    return {
-        "states": tuple(system.state_names), "inputs": tuple(system.input_names), "outputs": tuple(system.output_names),
-        "units": system.units, "parameters": tuple(leaf.path for leaf in system.tunable),
-        "defaults": system.defaults, "nominal": system.nominal,
-        "input_minimum": known.input_minimum, "input_maximum": known.input_maximum,
-        "run": {
-            "initial": run.initial, "start": run.start, "times": run.times,
-            "segments": {"ends": segments.ends, "values": segments.values, "slopes": segments.slopes},
-        },
-    }  # fmt: skip
-
-
-def check_integrator(integrator: Integrator) -> Integrator:
-    """The integrator. Raises ParameterError for one that has no printed form."""
-    if not integrator.printed_step:
-        raise ParameterError(
-            f"the integrator {type(integrator).__name__} has no printed form; choose Rodas4, RungeKutta4 or "
-            "DormandPrince8."
-        )
-    return integrator
-
-
-def check_open_loop(problem: Problem) -> None:
-    """Raise ParameterError for a problem with a controller."""
-    if isinstance(problem.input, ControlLoop):
-        raise ParameterError(
-            f"the controller {type(problem.input.controller).__name__} cannot be exported to this target; export the "
-            "plant with input signals, or the loop to C, JavaScript, Octave, or as FMUs of an SSP package."
-        )
-
-
 def tableau_arrays(integrator: ExplicitRungeKutta) -> tuple[Array, Array, Array]:
     """Rows (s, s), weights (s,) and nodes (s,) of an explicit method."""
     rows, weights = integrator.tableau()
-    count = len(weights)
-    table = np.zeros((count, count))
+    table = np.zeros((len(weights), len(weights)))
     for i, row in enumerate(rows, 1):
         table[i, : len(row)] = row
-    return table, np.array(weights), np.array([0.0, *(sum(row) for row in rows)])
+    return table, np.array(weights), np.array([0.0, *map(sum, rows)])
 
 
 SHAPES: dict[str, tuple[str, ...]] = {
-    **dict.fromkeys(
-        (
-            "y", "yn", "x", "g", "f0", "ft", "k1", "k2", "k3", "k4", "k5", "k6", "d2", "d3", "absolute", "nominal",
-            "between",
-        ),
-        ("STATES",),
-    ),
+    **dict.fromkeys(("y", "yn", "x", "g", "f0", "ft", "k1", "k2", "k3", "k4", "k5", "k6", "d2", "d3"), ("STATES",)),
+    **dict.fromkeys(("absolute", "nominal", "between"), ("STATES",)),
     **dict.fromkeys(("u", "w", "base"), ("INPUTS",)), **dict.fromkeys(("nodes", "weights"), ("STAGES",)),
     "k": ("STAGES", "STATES"), "table": ("STAGES", "STAGES"), "jacobian": ("JACOBIAN",), "factors": ("FACTORS",),
 }  # fmt: skip
@@ -180,64 +119,42 @@ class ExportedLoop:
     capacity: int
 
     @property
-    def samples(self) -> int:
-        """Number of samples."""
-        return len(self.prepared.instants) - 1
-
-    @property
-    def sample_time(self) -> float:
-        """Time between two samples [s]."""
-        return float(self.prepared.loop.sample_time)
-
-    @property
-    def near(self) -> float:
-        """The distance [s] within which a row is replaced by one at an instant of a driver."""
-        return CLOSE * self.sample_time
-
-    @property
-    def added_columns(self) -> tuple[str, ...]:
-        """The columns of set points, measurements and commands."""
+    def added_columns(self) -> tuple[tuple[str, ...], ...]:
+        """The columns of set points, of measurements, and of commands."""
         law = self.controller.law
         kinds = zip((SETPOINT, MEASURED, COMMAND), (law.setpoints, law.measured_columns, law.inputs), strict=True)
-        return tuple(f"{kind}{name}" for kind, names in kinds for name in names)
+        return tuple(tuple(f"{kind}{name}" for name in names) for kind, names in kinds)
 
-    def measured_at(self, system: ExportedSystem) -> list[tuple[int, int]]:
+    def measured_at(self, known: Description) -> list[tuple[int, int]]:
         """Of each measured column: 0 for a state and 1 for an output, and its number among these."""
-        names = system.state_names, system.output_names
-        return [
-            next((k, of.index(n)) for k, of in enumerate(names) if n in of)
-            for n in self.controller.law.measured_columns
-        ]
+        return _places(self.controller.law.measured_columns, (known.state_names, known.output_names))
 
-    def column_at(self, system: ExportedSystem, columns: Sequence[str]) -> list[tuple[int, int]]:
+    def column_at(self, known: Description, columns: Sequence[str]) -> list[tuple[int, int]]:
         """Of each column: its kind (state, input, output, set point, measurement, command), and its number."""
-        law = self.controller.law
-        groups = (
-            system.state_names, system.input_names, system.output_names,
-            [f"{SETPOINT}{n}" for n in law.setpoints], [f"{MEASURED}{n}" for n in law.measured_columns],
-            [f"{COMMAND}{n}" for n in law.inputs],
-        )  # fmt: skip
-        return [next((k, list(of).index(n)) for k, of in enumerate(groups) if n in of) for n in columns]
+        return _places(columns, (known.state_names, known.input_names, known.output_names, *self.added_columns))
 
     @property
     def kernels(self) -> list[str]:
         """The kernels of `driven_inputs` that the program calls."""
-        return [
-            "setpoints_at",
-            "cut_segments",
-            "merge_columns",
-            *(["apply_drivers"] if len(self.drivers.kinds) else []),
-        ]
+        driven = ["apply_drivers"] if len(self.drivers.kinds) else []
+        return ["setpoints_at", "cut_segments", "merge_columns", *driven]
 
-    def data(self, system: ExportedSystem) -> dict[str, Any]:
-        """What a program states of its loop: names in tuples, numbers in arrays; states of the drivers at rest."""
-        law, signal, table, tunable = (
-            self.controller.law, self.prepared.setpoint_signal, self.drivers, self.controller.tunable
-        )  # fmt: skip
+    @property
+    def numbers(self) -> dict[str, float]:
+        """Sample time and end of the run [s], number of samples, and the distance [s] within which a row is replaced by
+        one at an instant of a driver."""
+        step, instants = float(self.prepared.loop.sample_time), self.prepared.instants
         return {
-            "sample_time": self.sample_time, "samples": self.samples, "finish": float(self.prepared.instants[-1]),
-            "near": self.near, "columns": self.added_columns, "setpoints": tuple(law.setpoints),
-            "measured_at": np.array(self.measured_at(system), dtype=int).reshape(-1, 2),
+            "sample_time": step, "samples": len(instants) - 1, "finish": float(instants[-1]), "near": CLOSE * step,
+        }  # fmt: skip
+
+    def data(self, known: Description) -> dict[str, Any]:
+        """What a program states of its loop: names in tuples, numbers in arrays; states of the drivers at rest."""
+        law, tunable = self.controller.law, self.controller.tunable
+        signal, table = self.prepared.setpoint_signal, self.drivers
+        return {
+            **self.numbers, "columns": sum(self.added_columns, ()), "setpoints": tuple(law.setpoints),
+            "measured_at": np.array(self.measured_at(known), dtype=int).reshape(-1, 2),
             "commanded": self.prepared.commanded,
             "initial_memory": np.array([float(value) for value in law.initial_memory.values()]),
             "parameters": tuple(leaf.path for leaf in tunable),
@@ -245,6 +162,11 @@ class ExportedLoop:
             "setpoint": {"ends": signal.ends, "values": signal.values, "slopes": signal.slopes},
             "drivers": {"kinds": table.kinds, "settings": table.settings, "states": table.kept},
         }  # fmt: skip
+
+
+def _places(names: Iterable[str], groups: Sequence[Sequence[str]]) -> list[tuple[int, int]]:
+    """Of each name: the number of the first group that has it, and its number there."""
+    return [next((k, list(of).index(name)) for k, of in enumerate(groups) if name in of) for name in names]
 
 
 def export_loop(problem: Problem, name: str, title: str, tunable: Sequence[str] | None) -> ExportedLoop:
@@ -261,7 +183,14 @@ def export_loop(problem: Problem, name: str, title: str, tunable: Sequence[str] 
             "a run that continues another cannot be exported, because the program begins with the first sample of the "
             "loop; leave control_state out."
         )
-    check_drivers(loop)
+    for command, chain in WithDrivers(loop.other_inputs, loop.drivers).chains.items():
+        for driver in chain:
+            if type(driver) not in KINDS:
+                raise ParameterError(
+                    f"the driver {type(driver).__name__} of '{command}' has no printed form; there are "
+                    f"{', '.join(kind.__name__ for kind in KINDS)}. Export the controller alone, or the plant with "
+                    "input signals."
+                )
     prepared = prepare_loop(problem, loop.init(problem.start_time))
     capacity = greatest_capacity(prepared)
     if capacity > MAX_CAPACITY:
@@ -273,18 +202,58 @@ def export_loop(problem: Problem, name: str, title: str, tunable: Sequence[str] 
     others = snapped(loop.other_inputs, prepared.input_names, edges, CLOSE * loop.sample_time).as_floats()
     others.values[:, prepared.commanded] = others.slopes[:, prepared.commanded] = 0.0
     printed = print_controller(prepared, name, title, tunable)
-    return ExportedLoop(
-        printed, prepared, others, DriverTable(prepared, loop.init(problem.start_time), capacity), capacity
-    )
+    drivers = DriverTable(prepared, loop.init(problem.start_time), capacity)
+    return ExportedLoop(printed, prepared, others, drivers, capacity)
 
 
-def check_drivers(loop: ControlLoop) -> None:
-    """Raise ParameterError for a driver that has no printed form, by its name."""
-    for name, chain in WithDrivers(loop.other_inputs, loop.drivers).chains.items():
-        for driver in chain:
-            if type(driver) not in KINDS:
-                raise ParameterError(
-                    f"the driver {type(driver).__name__} of '{name}' has no printed form; there are "
-                    f"{', '.join(kind.__name__ for kind in KINDS)}. Export the controller alone, or the plant with "
-                    "input signals."
-                )
+@dataclasses.dataclass(frozen=True, eq=False)
+class ExportedRun:
+    """A problem ready for a target, with its control loop if it has one; `columns` are written after time."""
+
+    name: str
+    system: ExportedSystem
+    problem: Problem
+    provenance: Sequence[str]
+    columns: Sequence[str]
+    loop: ExportedLoop | None = None
+
+    @property
+    def integrator(self) -> Integrator:
+        """The integrator."""
+        assert self.problem.integrator is not None
+        return self.problem.integrator
+
+    @property
+    def tolerance(self) -> float | None:
+        """Relative tolerance of the integrator; None for one without."""
+        return self.integrator.rtol if isinstance(self.integrator, Rodas4) else None
+
+    @property
+    def segments(self) -> PiecewiseLinear:
+        """The segments of the inputs, whose drivers are resolved; in a loop, of those that are not commanded."""
+        return self.problem.segments if self.loop is None else self.loop.others
+
+    @property
+    def first_inputs(self) -> list[float]:
+        """The inputs at the beginning of the run."""
+        values: list[float] = self.segments.values[0].tolist()
+        return values
+
+    @property
+    def times(self) -> Array:
+        """The times (N,) of the rows [s]."""
+        return self.problem.times if self.loop is None else self.loop.prepared.times
+
+    def data(self) -> dict[str, Any]:
+        """What a program states of its system and run: names in tuples, numbers in arrays."""
+        system, known, problem, segments = self.system, self.system.known, self.problem, self.segments
+        return {
+            "states": known.state_names, "inputs": known.input_names, "outputs": known.output_names,
+            "units": system.units, "parameters": tuple(leaf.path for leaf in system.tunable),
+            "defaults": system.defaults, "nominal": system.compiled.nominal,
+            "input_minimum": known.input_minimum, "input_maximum": known.input_maximum,
+            "run": {
+                "initial": problem.initial_vector, "start": problem.start_time, "times": self.times,
+                "segments": {"ends": segments.ends, "values": segments.values, "slopes": segments.slopes},
+            },
+        }  # fmt: skip

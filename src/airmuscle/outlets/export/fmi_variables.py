@@ -7,15 +7,16 @@ The value references follow each other in this order, as in the template `instan
 import dataclasses
 import math
 import re
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 from xml.etree.ElementTree import Element, SubElement
 
 from ...core import Leaf, ParameterError, printable
 from ...engine.compile.function import Place
-from ...engine.run.integrators import Rodas4
-from ...recording.columns import quantity_of
-from .exported_run import RunData
-from .printed_system import ExportedSystem, per_second
+from ...engine.compile.program import Description
+from .exported_run import ExportedRun
+from .printed_system import meaning_of, per_second
 
 PARAMETERS, TOLERANCE, START = "parameters", "relative_tolerance", "start"
 """Beginning of the names of parameters, name of the tolerance, and beginning of the names of pressures at the start."""
@@ -41,59 +42,66 @@ class Variable:
     is_indicator: bool = False
 
 
-def make_variables(
-    system: ExportedSystem, run: RunData, indicators: int = 0, starts: Mapping[str, float] | None = None
-) -> list[Variable]:
+class Variables(list[Variable]):
+    """Variables by increasing value reference, from time on."""
+
+    def __init__(self) -> None:
+        super().__init__([Variable("time", 0, "independent", unit="s", description="time")])
+
+    def add(self, name: str, causality: str, description: str, **attributes: Any) -> None:
+        """Append a variable with the next value reference."""
+        self.append(Variable(name, len(self), causality, description=description, **attributes))
+
+    def add_parameters(self, tunable: Sequence[Leaf]) -> None:
+        """Append parameters as tunable variables."""
+        for leaf in tunable:
+            self.append(Variable(
+                f"{PARAMETERS}.{leaf.path}", len(self), "parameter", "tunable", "exact", float(leaf.value),
+                leaf.declared.unit, f"{leaf.declared.symbol}: {leaf.declared.meaning}", *leaf.declared.bounds,
+            ))  # fmt: skip
+
+    def checked(self) -> list[Variable]:
+        """The variables with stated units. Raises ParameterError for two of one name."""
+        for name, count in Counter(variable.name for variable in self).items():
+            if count > 1:
+                raise ParameterError(
+                    f"the FMU would have two variables '{name}'; rename the muscle or signal of this name."
+                )
+        return list(map(_stated, self))
+
+
+def make_variables(program: ExportedRun, indicators: int, starts: Mapping[str, float]) -> list[Variable]:
     """The variables of an FMU, by increasing value reference, with so many event indicators at the end.
 
     starts  pressures of muscles [Pa] at the start by their columns
 
     Raises ParameterError for two variables of one name.
     """
-    variables = [Variable("time", 0, "independent", unit="s", description="time")]
-    units, known = system.units, system.compiled.system
-
-    def add(name: str, causality: str, **attributes: object) -> None:
-        variables.append(Variable(name, len(variables), causality, **attributes))  # type: ignore[arg-type]
-
-    for state, start in zip(known.states, run.initial.tolist(), strict=True):
-        texts = {"unit": state.unit, "description": state.meaning}
-        add(state.name, "output", initial="exact", start=start, nominal=state.nominal, **texts)
+    variables, units, known = Variables(), program.system.units, program.system.compiled.system
+    for state, start in zip(known.states, program.problem.initial_vector.tolist(), strict=True):
+        given = {"unit": state.unit, "nominal": state.nominal}
+        variables.add(state.name, "output", state.meaning, initial="exact", start=start, **given)
     for i, state in enumerate(known.states, 1):
-        unit = per_second(state.unit)
-        about = f"derivative of {state.name}"
-        add(f"der({state.name})", "local", initial="calculated", unit=unit, derivative_of=i, description=about)
-    for given, start in zip(known.input_variables, first_inputs(run), strict=True):
-        limits = {"minimum": given.minimum, "maximum": given.maximum}
-        add(given.name, "input", start=start, unit=given.unit, description=given.meaning, **limits)
-    for name in system.output_names:
-        known_quantity = quantity_of(name)
-        about = known_quantity.meaning if known_quantity else ""
-        add(name, "output", initial="calculated", unit=units[name], description=about)
-    variables += parameter_variables(system.tunable, len(variables))
-    if isinstance(run.integrator, Rodas4):
+        name, about, unit = f"der({state.name})", f"derivative of {state.name}", per_second(state.unit)
+        variables.add(name, "local", about, initial="calculated", unit=unit, derivative_of=i)
+    for each, start in zip(known.input_variables, program.first_inputs, strict=True):
+        limits = {"minimum": each.minimum, "maximum": each.maximum}
+        variables.add(each.name, "input", each.meaning, start=start, unit=each.unit, **limits)
+    for name in program.system.known.output_names:
+        variables.add(name, "output", meaning_of(name), initial="calculated", unit=units[name])
+    variables.add_parameters(program.system.tunable)
+    exact = {"causality": "parameter", "initial": "exact"}
+    if program.tolerance is not None:
         about = "relative tolerance of the integrator in Co-Simulation"
-        start = run.integrator.rtol
-        add(TOLERANCE, "parameter", variability="tunable", initial="exact", start=start, description=about)
-    for column, pressure in (starts or {}).items():
+        variables.add(TOLERANCE, description=about, variability="tunable", start=program.tolerance, **exact)
+    for column, pressure in starts.items():
         about = "gauge pressure of the muscle at the start, from which its air mass follows; other states are kept"
-        add(f"{START}.{column}", "parameter", variability="fixed", initial="exact", start=pressure, unit="Pa",
-            description=about)  # fmt: skip
+        name = f"{START}.{column}"
+        variables.add(name, description=about, variability="fixed", start=pressure, unit="Pa", **exact)
     for i in range(1, indicators + 1):
         about = "changes its sign where the rates are not smooth"
-        add(f"event_indicator[{i}]", "local", is_indicator=True, description=about)
-    return checked(variables)
-
-
-def parameter_variables(tunable: Sequence[Leaf], first: int) -> list[Variable]:
-    """Parameters as tunable variables, whose value references follow each other from `first` on."""
-    return [
-        Variable(
-            f"{PARAMETERS}.{leaf.path}", first + i, "parameter", "tunable", "exact", float(leaf.value),
-            leaf.declared.unit, f"{leaf.declared.symbol}: {leaf.declared.meaning}", *leaf.declared.bounds,
-        )
-        for i, leaf in enumerate(tunable)
-    ]  # fmt: skip
+        variables.add(f"event_indicator[{i}]", "local", about, is_indicator=True)
+    return variables.checked()
 
 
 def _stated(v: Variable) -> Variable:
@@ -106,30 +114,12 @@ def _stated(v: Variable) -> Variable:
     return dataclasses.replace(v, name=name, description=about, unit=unit)
 
 
-def first_inputs(run: RunData) -> list[float]:
-    """The inputs at the beginning of the run."""
-    values: list[float] = run.segments.values[0].tolist()
-    return values
-
-
-def references_of(system: ExportedSystem, place: Place) -> tuple[int, int]:
+def references_of(known: Description, place: Place) -> tuple[int, int]:
     """The value references of the rate or output, and of the state or input, of a partial derivative."""
-    n, m = len(system.state_names), len(system.input_names)
+    n, m = len(known.state_names), len(known.input_names)
     row, column = place
     unknown = 1 + n + row if row < n else 1 + 2 * n + m + row - n
     return unknown, 1 + column if column < n else 1 + 2 * n + column - n
-
-
-def checked(variables: list[Variable]) -> list[Variable]:
-    """The variables with stated units. Raises ParameterError for two of one name."""
-    seen: set[str] = set()
-    for variable in variables:
-        if variable.name in seen:
-            raise ParameterError(
-                f"the FMU would have two variables '{variable.name}'; rename the muscle or signal of this name."
-            )
-        seen.add(variable.name)
-    return [_stated(v) for v in variables]
 
 
 BASE: dict[str, dict[str, int]] = {

@@ -10,17 +10,16 @@ import numpy as np
 from ...engine.compile.function import EventIndicators, Partials, event_indicators, partials
 from ...engine.compile.functions import Printer
 from ...engine.run import Problem, solve
-from ...engine.run.integrators import Rodas4
 from ...physics.plant.diagnostics import column_limits, describe_limit
 from ...physics.plant.plant import Plant
 from .c_source import CSource, csv_text
 from .compiler import Platform
+from .exported_run import ExportedRun
 from .fmi_description import FmuDescription, FmuExperiment
 from .fmi_package import FmuPackage, WrittenFmu, check_target, token_of
-from .fmi_variables import first_inputs, has_unit, make_variables, references_of
+from .fmi_variables import has_unit, make_variables, references_of
 from .identifiers import c_array, c_number, c_string, c_strings, filled
 from .printed_system import acting_parameters
-from .targets import ExportedRun
 from .write import make_run
 
 SLACK = 1e-10
@@ -83,30 +82,26 @@ def fmu_package(
 ) -> FmuPackage:
     """The FMU of a problem without its binary; arguments as for `write_fmu`."""
     chosen = acting_parameters(problem.compiled) if tunable is None else tunable
-    return _package(make_run(problem, name=name, title=title, tunable=chosen, notes=[NOTE]), fmi)
-
-
-def _package(program: ExportedRun, fmi: int) -> FmuPackage:
-    """The FMU of a system."""
-    system, run = program.system, program.run
-    derivatives, indicators = partials(system.traced), event_indicators(system.traced)
+    program = make_run(problem, name=name, title=title, tunable=chosen, notes=[NOTE])
+    derivatives, indicators = partials(program.system.traced), event_indicators(program.system.traced)
 
     def extend(printer: Printer) -> None:
         derivatives.extend(printer)
         indicators.extend(printer)
 
-    source = CSource(program.name, system, run.integrator, program.provenance, extend).files()
+    source = CSource(program.name, program.system, program.integrator, program.provenance, extend).files()
     starts = _start_pressures(program, derivatives)
-    variables = make_variables(system, run, indicators.count if fmi == 3 else 0, {s.column: s.pressure for s in starts})
+    variables = make_variables(program, indicators.count if fmi == 3 else 0, {s.column: s.pressure for s in starts})
     token = token_of(*source.values(), *variables, fmi)
-    dependencies: dict[int, list[int]] = {i: [i] for i in range(1, len(system.state_names) + 1)}
+    names = program.system.known.state_names
+    dependencies: dict[int, list[int]] = {i: [i] for i in range(1, len(names) + 1)}
     for place in derivatives.places:
-        unknown, known = references_of(system, place)
+        unknown, known = references_of(program.system.known, place)
         dependencies.setdefault(unknown, []).append(known)
-    tolerance = run.integrator.rtol if isinstance(run.integrator, Rodas4) else 1e-6
+    experiment = FmuExperiment(problem.start_time, float(program.times[-1]), program.tolerance or 1e-6)
     about = FmuDescription(
-        program.name, program.provenance[0], token, variables, dependencies, indicators.count,
-        FmuExperiment(run.start, float(run.times[-1]), tolerance), (f"{program.name}.c",),
+        program.name, program.provenance[0], token, variables, dependencies, indicators.count, experiment,
+        (f"{program.name}.c",),
     )  # fmt: skip
     instance = filled("instance.h", _instance(program, derivatives, indicators, token, starts), program.name)
     return FmuPackage(about, program.provenance, {**source, f"{program.name}_instance.h": instance}, adjoint=True)
@@ -123,17 +118,15 @@ class StartPressure(NamedTuple):
 
 def _start_pressures(program: ExportedRun, derivatives: Partials) -> list[StartPressure]:
     """The pressures of the muscles that follow from the mass of their air."""
-    system = program.system
-    plant = getattr(system.compiled.system, "plant", system.compiled.system)
-    state = dict(zip(system.state_names, program.run.initial.tolist(), strict=True))
-    outputs = system.compiled.system.outputs(
-        state, dict(zip(system.input_names, first_inputs(program.run), strict=True))
-    )
+    known, system = program.system.known, program.system.compiled.system
+    plant, states, names = getattr(system, "plant", system), known.state_names, known.output_names
+    state = dict(zip(states, program.problem.initial_vector.tolist(), strict=True))
+    outputs = system.outputs(state, dict(zip(known.input_names, program.first_inputs, strict=True)))
     found = []
     for prefix in plant.prefixes if isinstance(plant, Plant) else ():
         column, mass = f"{prefix}pressure", f"{prefix}air_mass"
-        if column in system.output_names and mass in system.state_names:
-            place = len(system.state_names) + list(system.output_names).index(column), system.state_names.index(mass)
+        if column in names and mass in states:
+            place = len(states) + names.index(column), states.index(mass)
             if place in derivatives.places:
                 found.append(StartPressure(column, float(outputs[column]), *place))
     return found
@@ -144,43 +137,44 @@ def _instance(
     starts: Sequence[StartPressure],
 ) -> Mapping[str, str]:  # fmt: skip
     """The places of the template of an instance."""
-    system, run, name = program.system, program.run, program.name
-    known, limits = system.compiled.description, _limits(system.compiled.system, system.columns)
-    lowest = [*known.lower_bounds.tolist(), *(-float("inf") for _ in system.input_names)]
+    system, known, problem, name = program.system, program.system.known, program.problem, program.name
+    initial, inputs = problem.initial_vector, program.first_inputs
+    limits = _limits(system.compiled.system, known.column_names)
+    lowest = [*known.lower_bounds.tolist(), *(-float("inf") for _ in known.input_names)]
     positive = set(known.positive_outputs.tolist())
-    lowest += [5e-324 if i in positive else -float("inf") for i in range(len(system.output_names))]
+    lowest += [5e-324 if i in positive else -float("inf") for i in range(len(known.output_names))]
     rows = "".join(
         f"  {{{column}, {c_number(low)}, {c_number(high)}, {c_string(text)}}},\n" for column, low, high, text in limits
     )
     upper, bounds = name.upper(), [leaf.declared.bounds for leaf in system.tunable]
-    scales = indicators.scales(run.initial, run.segments.values[0], system.defaults, system.nominal)
+    scales = indicators.scales(initial, np.array(inputs), system.defaults, system.compiled.nominal)
+    indices = {
+        "rows": [row for row, _ in derivatives.places], "columns": [column for _, column in derivatives.places],
+        "pressure_rows": [each.row for each in starts], "air_masses": [each.air_mass for each in starts],
+    }  # fmt: skip
     constants = [
-        c_strings(f"static const char *const {name}_names[]", system.columns),
+        c_strings(f"static const char *const {name}_names[]", known.column_names),
         c_array(f"static const double {name}_minimum[]", lowest),
-        c_array(f"static const double {name}_start_states[{upper}_STATES]", run.initial),
-        c_array(f"static const double {name}_start_inputs[{upper}_INPUTS + 1]", first_inputs(run), 1),
+        c_array(f"static const double {name}_start_states[{upper}_STATES]", initial),
+        c_array(f"static const double {name}_start_inputs[{upper}_INPUTS + 1]", inputs, 1),
         c_array(f"static const double {name}_lowest[{upper}_PARAMETERS + 1]", [low for low, _ in bounds], 1),
         c_array(f"static const double {name}_highest[{upper}_PARAMETERS + 1]", [high for _, high in bounds], 1),
         c_array(f"static const double {name}_scales[{upper}_INDICATORS + 1]", scales, 1),
-        _indices(f"{name}_rows", [row for row, _ in derivatives.places]),
-        _indices(f"{name}_columns", [column for _, column in derivatives.places]),
-        _indices(f"{name}_pressure_rows", [each.row for each in starts]),
-        _indices(f"{name}_air_masses", [each.air_mass for each in starts]),
+        *(
+            f"static const int {name}_{key}[] = {{{', '.join(map(str, [*values, 0]))}}};\n"
+            for key, values in indices.items()
+        ),
         c_array(f"static const double {name}_start_pressures[]", [each.pressure for each in starts], 1),
         "/* Ranges that are reported once when a column leaves them. */\n"
         f"static const struct {{\n  int column;\n  double low, high;\n  const char *text;\n}} {name}_limits[] = {{\n"
         f'{rows}  {{0, 0.0, 0.0, ""}}\n}};\n',
     ]
-    rtol = run.integrator.rtol if isinstance(run.integrator, Rodas4) else 0.0
     return {
         "file": name, "token": token, "partials": str(len(derivatives.places)), "limits": str(len(limits)),
         "indicators": str(indicators.count), "pressures": str(len(starts)), "slack": c_number(SLACK),
-        "rtol": c_number(rtol), "start": c_number(run.start), "constants": "".join(constants),
+        "rtol": c_number(program.tolerance or 0.0), "start": c_number(problem.start_time),
+        "constants": "".join(constants),
     }  # fmt: skip
-
-
-def _indices(name: str, values: Sequence[int]) -> str:
-    return f"static const int {name}[] = {{{', '.join(map(str, [*values, 0]))}}};\n"
 
 
 def _limits(system: object, columns: Sequence[str]) -> list[tuple[int, float, float, str]]:

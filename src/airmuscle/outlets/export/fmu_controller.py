@@ -16,7 +16,7 @@ from ...recording.columns import column_units
 from .compiler import Platform
 from .fmi_description import FmuDescription, FmuExperiment, xml_text
 from .fmi_package import FmuPackage, WrittenFmu, archive, check_target, token_of
-from .fmi_variables import Variable, base_powers, checked, has_unit, parameter_variables
+from .fmi_variables import Variable, Variables, base_powers, has_unit
 from .fmu import fmu_package
 from .identifiers import block_comment, c_array, c_number, c_strings, filled
 from .printed_controller import PrintedController, check_control_law, print_controller
@@ -73,24 +73,19 @@ def _variables(
         **named_signal_units(law), **{n: u for n, u in column_units(problem.system, known.output_names).items() if u},
     }  # fmt: skip
     first = _first_row(problem)
-    variables = [Variable("time", 0, "independent", unit="s", description="time")]
-
-    def add(name: str, causality: str, **attributes: object) -> None:
-        variables.append(Variable(name, len(variables), causality, **attributes))  # type: ignore[arg-type]
-
+    variables = Variables()
     for column in law.measured_columns:
         start, unit = first[f"{MEASURED}{column}"], units.get(column, "")
-        add(column, "input", start=start, unit=unit, description=f"{column}, measured")
+        variables.add(column, "input", f"{column}, measured", start=start, unit=unit)
     for signal, value in zip(law.setpoints, prepared.setpoint_values[0].tolist(), strict=True):
-        add(f"{SETPOINT}{signal}", "input", start=value, unit=units.get(signal, ""), description=f"{signal} wanted")
+        variables.add(f"{SETPOINT}{signal}", "input", f"{signal} wanted", start=value, unit=units.get(signal, ""))
     for command, (low, high) in zip(law.inputs, printed.ranges, strict=True):
-        about = f"command of {command}, held for {loop.sample_time:g} s"
-        add(
-            command, "output", variability="discrete", initial="calculated", minimum=low, maximum=high,
-            unit=units.get(command, ""), description=about,
+        variables.add(
+            command, "output", f"command of {command}, held for {loop.sample_time:g} s", variability="discrete",
+            initial="calculated", minimum=low, maximum=high, unit=units.get(command, ""),
         )  # fmt: skip
-    variables += parameter_variables(printed.tunable, len(variables))
-    return checked(variables)
+    variables.add_parameters(printed.tunable)
+    return variables.checked()
 
 
 def _first_row(problem: Problem) -> dict[str, float]:

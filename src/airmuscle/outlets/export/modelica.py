@@ -9,9 +9,8 @@ from ...engine.compile.ir.emission import computed
 from ...engine.compile.ir.instructions import Operand, instructions
 from ...engine.compile.text.body import TextBody
 from ...engine.run import Problem
-from .fmi_variables import first_inputs
+from .exported_run import ExportedRun
 from .identifiers import block_comment, filled, make_identifiers
-from .targets import ExportedRun
 from .write import make_run, write_files
 
 _WORDS = """
@@ -125,14 +124,14 @@ def modelica_text(program: ExportedRun) -> str:
 
 def _variables(program: ExportedRun) -> dict[str, dict[str, str]]:
     """Declarations of states, inputs, outputs and parameters by their names in the package, by array."""
-    system, initial = program.system, program.run.initial.tolist()
-    begins = zip(initial, system.nominal.tolist(), strict=True)
+    system, known, initial = program.system, program.system.known, program.problem.initial_vector.tolist()
+    begins = zip(initial, system.compiled.nominal.tolist(), strict=True)
     states = [f"start = {start!r}, fixed = true, nominal = {nominal!r}" for start, nominal in begins]
-    inputs = [f"start = {start!r}" for start in first_inputs(program.run)]
+    inputs = [f"start = {start!r}" for start in program.first_inputs]
     groups = {
-        "x": [("Real", name, text, "") for name, text in zip(system.state_names, states, strict=True)],
-        "u": [("input Real", name, text, "") for name, text in zip(system.input_names, inputs, strict=True)],
-        "o": [("output Real", name, "", "") for name in system.output_names],
+        "x": [("Real", name, text, "") for name, text in zip(known.state_names, states, strict=True)],
+        "u": [("input Real", name, text, "") for name, text in zip(known.input_names, inputs, strict=True)],
+        "o": [("output Real", name, "", "") for name in known.output_names],
         "p": [("parameter Real", f"p.{leaf.path}", "", f" = {float(leaf.value)!r}") for leaf in system.tunable],
     }
     units = system.units | {f"p.{leaf.path}": leaf.declared.unit for leaf in system.tunable}

@@ -174,9 +174,9 @@ def check_mujoco() -> Any:
 def _sources(part: Plant, name: str, controls: Sequence[Input], lines: Sequence[str]) -> dict[str, bytes]:
     """The C files by name: the muscle with a load whose mass and gravity the plugin sets, and the plugin."""
     system = export_system(compile_system(dataclasses.replace(part, mechanism=HangingMass(1.0))))
-    paths, states = [leaf.path for leaf in system.tunable], list(system.state_names)
+    paths, states = [leaf.path for leaf in system.tunable], system.known.state_names
     own = [leaf.path for leaf in leaves(part)]
-    places = [*(system.input_names.index(i.name) for i in controls), -1, -1]
+    places = [*(system.known.input_names.index(i.name) for i in controls), -1, -1]
     constants = [
         c_strings("static const char *const attributes[]", [*own, REST_LENGTH]),
         c_integers("static const int places[]", [paths.index(path) for path in own]),

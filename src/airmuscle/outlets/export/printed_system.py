@@ -9,7 +9,7 @@ import numpy as np
 from ...core import Array, Leaf, ParameterError, alternatives, leaves, printable
 from ...engine.compile.functions import ArraySizes, Extension, TracedSystem, implicit_module, rates_module
 from ...engine.compile.ir.emission import TargetLanguage
-from ...engine.compile.program import CompiledSystem
+from ...engine.compile.program import CompiledSystem, Description
 from ...engine.compile.text.body import Label, Labels
 from ...recording.columns import column_units, quantity_of
 from .identifiers import make_identifiers
@@ -25,39 +25,19 @@ class ExportedSystem:
     """The parameters that remain arguments, in the order of their vector."""
 
     @property
-    def state_names(self) -> tuple[str, ...]:
-        """The states."""
-        return self.compiled.description.state_names
-
-    @property
-    def input_names(self) -> tuple[str, ...]:
-        """The inputs."""
-        return self.compiled.description.input_names
-
-    @property
-    def output_names(self) -> tuple[str, ...]:
-        """The outputs."""
-        return self.compiled.description.output_names
-
-    @property
-    def columns(self) -> tuple[str, ...]:
-        """States, inputs and outputs."""
-        return self.compiled.description.column_names
+    def known(self) -> Description:
+        """Names, sizes and limits of the states, inputs and outputs."""
+        return self.compiled.description
 
     @property
     def units(self) -> dict[str, str]:
         """The units of all columns; empty where none is known."""
-        return column_units(self.compiled.system, self.output_names)
+        return column_units(self.compiled.system, self.known.output_names)
 
     @property
     def defaults(self) -> Array:
         """The values of the tunable parameters."""
         return np.array([leaf.value for leaf in self.tunable], dtype=float)
-
-    @property
-    def nominal(self) -> Array:
-        """The size of each state below which its relative error does not matter."""
-        return self.compiled.nominal
 
     def printed(
         self, language: TargetLanguage, *, implicit: bool = True, extend: Extension | None = None
@@ -71,18 +51,21 @@ class ExportedSystem:
     def _labels(self) -> Labels:
         """Names, units and meanings of the elements of the arrays of the printed functions."""
         states, inputs = self.compiled.system.states, self.compiled.system.input_variables
-        quantities = [quantity_of(name) for name in self.output_names]
+        units, outputs = self.units, self.known.output_names
         return make_labels({
             "x": [(s.name, s.unit, s.meaning) for s in states],
             "u": [(i.name, i.unit, i.meaning) for i in inputs],
-            "o": [
-                (name, self.units[name], known.meaning if known else "")
-                for name, known in zip(self.output_names, quantities, strict=True)
-            ],
+            "o": [(name, units[name], meaning_of(name)) for name in outputs],
             "p": [(leaf.path, leaf.declared.unit, leaf.declared.meaning) for leaf in self.tunable],
             "f": [(f"{s.name}_rate", per_second(s.unit), "") for s in states],
             "w": [(f"{i.name}_slope", per_second(i.unit), "") for i in inputs],
         })  # fmt: skip
+
+
+def meaning_of(output: str) -> str:
+    """The meaning of an output; empty where it is no known quantity."""
+    known = quantity_of(output)
+    return known.meaning if known else ""
 
 
 def make_labels(tables: Mapping[str, Sequence[tuple[str, str, str]]]) -> Labels:

@@ -1,9 +1,8 @@
 """JavaScript module, and MATLAB and Octave functions, of a system: functions, solver and the run of a scenario."""
 
-import dataclasses
 import json
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -13,9 +12,8 @@ from ...engine.compile.kernel_text import JavaScriptKernels, MatlabKernels
 from ...engine.compile.kernel_text.printer import KernelPrinter
 from ...engine.compile.text.programs import DEFINITION, JavaScriptLanguage, MatlabBody, MatlabLanguage
 from .c_source import csv_header
-from .exported_run import BETWEEN, SHAPES, STEP, TABLEAU, ExportedLoop, RunData, SolverText, program_data
+from .exported_run import BETWEEN, SHAPES, STEP, TABLEAU, ExportedRun, SolverText
 from .identifiers import block_comment, filled, line_comment
-from .printed_system import ExportedSystem
 
 ULP = """/** The distance from a number to the next. */
 function ulp(value) {
@@ -38,88 +36,57 @@ JS_DRIVEN = (
 """A function, the arrays of drivers, and the line that passes commands through their drivers."""
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class ScriptText:
-    """What the program of a system, its run and its loop is printed from; `name` is that of the program."""
+def javascript_files(program: ExportedRun) -> dict[str, str]:
+    """The ECMAScript module of a program, its types, a program for Node that writes the columns as CSV, and the
+    package.json of a folder that npm installs, by file name."""
+    name, loop = program.name, program.loop
+    names = {*STEP.values(), *BETWEEN.values()}
+    fields = {key: f"this.{word}" for key, word in zip(names, _camel(dict.fromkeys(names)), strict=True)}
+    fields |= {"nominal": "nominal"} | {key: key.upper() for key in TABLEAU}
+    lengths = {"STATES": "states.length", "INPUTS": "inputs.length", "STAGES": "WEIGHTS.length",
+               "JACOBIAN": "SIZES.jacobian", "FACTORS": "SIZES.factors"}  # fmt: skip
+    solver = SolverText(JavaScriptKernels(), program.integrator, fields, lengths, "work.")
+    functions, sizes = program.system.printed(JavaScriptLanguage(), implicit=solver.implicit)
+    functions = functions.replace("export function outputs(", "export function outputsOf(", 1)
+    text = "".join(f"export const {key} = {to_json(value)};\n" for key, value in _camel(program.data()).items())
+    text += f"const SIZES = {to_json({key: getattr(sizes, key) for key in ('held', 'jacobian', 'factors')})};\n"
+    text += "".join(f"const {key} = {to_json(value)};\n" for key, value in solver.constants.items())
+    if loop is not None:
+        text += f"export const loop = {to_json(_camel(loop.data(program.system.known)))};\n"
+        functions += f"\n{loop.controller.sample_in(JavaScriptLanguage('control_'))}"
+    places = {
+        "provenance": block_comment(program.provenance), "file": name, "constants": text, "functions": functions,
+        "solver": filled("solver.mjs", solver.places, name), "arguments": filled("arguments.mjs", {}, name),
+        "simulate": _simulation(program, "mjs", JavaScriptKernels(), JS_DRIVEN, {}),
+        "columns": to_json(["time", *program.columns]), "header": to_json(csv_header(program.columns)),
+    }  # fmt: skip
+    module = {"types": f"./{name}.d.mts", "default": f"./{name}.mjs"}
+    package = {
+        "name": name.replace("_", "-"), "version": "1.0.0", "private": True, "description": program.provenance[0],
+        "type": "module", "types": module["types"], "exports": {".": module},
+    }  # fmt: skip
+    return {
+        f"{name}.mjs": filled("program.mjs", places, name),
+        f"{name}.d.mts": filled("program.d.mts", {**places, **_types(program)}, name),
+        f"{name}.run.mjs": filled("run.mjs", places, name),
+        "package.json": json.dumps(package, indent=2) + "\n",
+    }
 
-    name: str
-    system: ExportedSystem
-    run: RunData
-    provenance: Sequence[str]
-    loop: ExportedLoop | None = None
 
-
-class JavaScriptModule(ScriptText):
-    """The ECMAScript module of one system and its run; `name` is the name of the files."""
-
-    def files(self, columns: Sequence[str]) -> dict[str, str]:
-        """Contents of the module, and of a program that writes these columns, after time, as CSV, by file name."""
-        solver = self._solver()
-        functions, sizes = self.system.printed(JavaScriptLanguage(), implicit=solver.implicit)
-        functions = functions.replace("export function outputs(", "export function outputsOf(", 1)
-        constants = {
-            "SIZES": {"held": sizes.held, "jacobian": sizes.jacobian, "factors": sizes.factors},
-            **solver.constants,
-        }
-        text = "".join(
-            f"export const {name} = {to_json(value)};\n"
-            for name, value in _camel(program_data(self.system, self.run)).items()
-        )
-        text += "".join(f"const {name} = {to_json(value)};\n" for name, value in constants.items())
-        comment = block_comment(self.provenance)
-        if self.loop is not None:
-            text += f"export const loop = {to_json(_camel(self.loop.data(self.system)))};\n"
-            functions += f"\n{self.loop.controller.sample_in(JavaScriptLanguage('control_'))}"
-        places = {
-            "provenance": comment, "constants": text, "functions": functions,
-            "solver": filled("solver.mjs", solver.places, self.name),
-            "arguments": filled("arguments.mjs", {}, self.name),
-            "simulate": _simulation(self, "mjs", JavaScriptKernels(), JS_DRIVEN, {}),
-        }  # fmt: skip
-        run = {
-            "provenance": comment, "file": self.name, "columns": to_json(["time", *columns]),
-            "header": to_json(csv_header(columns)),
-        }  # fmt: skip
-        return {
-            f"{self.name}.mjs": filled("program.mjs", places, self.name),
-            f"{self.name}.d.mts": filled("program.d.mts", self._types(comment), self.name),
-            f"{self.name}.run.mjs": filled("run.mjs", run, self.name),
-            "package.json": self._package(),
-        }
-
-    def _types(self, comment: str) -> dict[str, str]:
-        """The places of the TypeScript declarations."""
-        system, loop = self.system, self.loop
-        names = {
-            "states": system.state_names, "inputs": system.input_names, "outputs": system.output_names,
-            "parameters": [leaf.path for leaf in system.tunable],
-        }  # fmt: skip
-        types = {kind: _union(of) for kind, of in names.items()}
-        changes = columns = ""
-        if loop is not None:
-            columns = f" | {_union(loop.added_columns)}"
-            changes = f"  controllerParameters?: Values<{_union(leaf.path for leaf in loop.controller.tunable)}>;\n"
-            wanted = ", ".join(loop.controller.law.setpoints) or "none"
-            changes += f"  /** Set points {wanted}. */\n  setpoint?: Segments;\n"
-        results = "  samples: number;\n" if loop is not None else ""
-        return {"provenance": comment, **types, "columns": columns, "changes": changes, "results": results}
-
-    def _package(self) -> str:
-        """The package.json of a folder that npm installs."""
-        module = {"types": f"./{self.name}.d.mts", "default": f"./{self.name}.mjs"}
-        content = {
-            "name": self.name.replace("_", "-"), "version": "1.0.0", "private": True, "description": self.provenance[0],
-            "type": "module", "types": module["types"], "exports": {".": module},
-        }  # fmt: skip
-        return json.dumps(content, indent=2) + "\n"
-
-    def _solver(self) -> SolverText:
-        names = {*STEP.values(), *BETWEEN.values()}
-        fields = {name: f"this.{word}" for name, word in zip(names, _camel(dict.fromkeys(names)), strict=True)}
-        fields |= {"nominal": "nominal"} | {key: key.upper() for key in TABLEAU}
-        sizes = {"STATES": "states.length", "INPUTS": "inputs.length", "STAGES": "WEIGHTS.length",
-                 "JACOBIAN": "SIZES.jacobian", "FACTORS": "SIZES.factors"}  # fmt: skip
-        return SolverText(JavaScriptKernels(), self.run.integrator, fields, sizes, "work.")
+def _types(program: ExportedRun) -> dict[str, str]:
+    """The places of the TypeScript declarations."""
+    known, loop = program.system.known, program.loop
+    names = {
+        "states": known.state_names, "inputs": known.input_names, "outputs": known.output_names,
+        "parameters": [leaf.path for leaf in program.system.tunable],
+    }  # fmt: skip
+    types = {kind: _union(of) for kind, of in names.items()}
+    if loop is None:
+        return {**types, "columns": "", "changes": "", "results": ""}
+    changes = f"  controllerParameters?: Values<{_union(leaf.path for leaf in loop.controller.tunable)}>;\n"
+    changes += f"  /** Set points {', '.join(loop.controller.law.setpoints) or 'none'}. */\n  setpoint?: Segments;\n"
+    columns = f" | {_union(sum(loop.added_columns, ()))}"
+    return {**types, "columns": columns, "changes": changes, "results": "  samples: number;\n"}
 
 
 def _camel(data: dict[str, Any]) -> dict[str, Any]:
@@ -161,50 +128,34 @@ M_DRIVEN = (
 """The arrays of drivers, and the lines that pass commands through their drivers."""
 
 
-class OctaveFunctions(ScriptText):
-    """The function file of one system and that of its run; `name` is the name of the function."""
-
-    def files(self, columns: Sequence[str]) -> dict[str, str]:
-        """Contents of the function, and of a function that writes these columns, after time, as CSV, by file name."""
-        solver = self._solver()
-        functions, _ = self.system.printed(MatlabLanguage(), implicit=solver.implicit)
-        method = solver.constants
-        steps = {key.lower(): m_number(method.pop(key)) for key in ("FIRST_STEP", "CLOSE")}
-        held = {key.lower(): m_array(value) if np.ndim(value) else m_number(value) for key, value in method.items()}
-        constants = self._constants()
-        if self.loop is not None:
-            functions += f"\n{self.loop.controller.sample_in(MatlabLanguage('control_'))}"
-        places = {
-            "provenance": line_comment(self.provenance), "file": self.name, "functions": f"{DEFINITION}\n{functions}",
-            "constants": constants, "solver": filled("solver.m", {**solver.places, **steps}, self.name), **steps,
-            "solver_constants": "".join(f"  s.{key} = {value};\n" for key, value in held.items()),
-            "simulate": _simulation(self, "m", MatlabKernels(), M_DRIVEN, steps),
-            "loop_help": LOOP_HELP if self.loop else "",
-            "columns": m_strings(["time", *columns]), "header": m_string(csv_header(columns).strip("\n")),
-        }  # fmt: skip
-        return {
-            f"{self.name}.m": filled("program.m", places, self.name),
-            f"run_{self.name}.m": filled("run.m", places, self.name),
-        }
-
-    def _solver(self) -> SolverText:
-        fields = {name: f"s.{name}" for name in {*STEP.values(), *BETWEEN.values()}} | {"end": "s.finish"}
-        sizes = {"STATES": "s.n", "INPUTS": "numel(s.u)", "STAGES": "numel(s.weights)", "JACOBIAN": "0", "FACTORS": "0"}
-        return SolverText(MatlabKernels(SHAPES), self.run.integrator, fields, sizes)
-
-    def _constants(self) -> str:
-        """The fields of the model and of its loop."""
-        data = program_data(self.system, self.run)
-        data |= {"units": tuple(self.system.units[name] for name in self.system.columns)}
-        data["output_names"] = data.pop("outputs")
-        data["run"] |= data["run"].pop("segments")
-        return _fields("model", data if self.loop is None else {**data, "loop": self.loop.data(self.system)})
+def octave_files(program: ExportedRun) -> dict[str, str]:
+    """The function of a program, and a function that writes its columns as CSV, by file name."""
+    name, loop, system = program.name, program.loop, program.system
+    fields = {key: f"s.{key}" for key in {*STEP.values(), *BETWEEN.values()}} | {"end": "s.finish"}
+    sizes = {"STATES": "s.n", "INPUTS": "numel(s.u)", "STAGES": "numel(s.weights)", "JACOBIAN": "0", "FACTORS": "0"}
+    solver = SolverText(MatlabKernels(SHAPES), program.integrator, fields, sizes)
+    functions, _ = system.printed(MatlabLanguage(), implicit=solver.implicit)
+    method, data = solver.constants, program.data()
+    steps = {key.lower(): m_number(method.pop(key)) for key in ("FIRST_STEP", "CLOSE")}
+    data |= {"units": tuple(system.units[column] for column in system.known.column_names)}
+    data["output_names"] = data.pop("outputs")
+    data["run"] |= data["run"].pop("segments")
+    if loop is not None:
+        functions += f"\n{loop.controller.sample_in(MatlabLanguage('control_'))}"
+        data["loop"] = loop.data(system.known)
+    places = {
+        "provenance": line_comment(program.provenance), "file": name, "functions": f"{DEFINITION}\n{functions}",
+        "constants": _fields("model", data), "solver": filled("solver.m", {**solver.places, **steps}, name), **steps,
+        "solver_constants": "".join(_fields(f"s.{key.lower()}", value) for key, value in method.items()),
+        "simulate": _simulation(program, "m", MatlabKernels(), M_DRIVEN, steps), "loop_help": LOOP_HELP if loop else "",
+        "columns": m_strings(["time", *program.columns]), "header": m_string(csv_header(program.columns).strip("\n")),
+    }  # fmt: skip
+    return {f"{name}.m": filled("program.m", places, name), f"run_{name}.m": filled("run.m", places, name)}
 
 
 def _simulation(
-    program: JavaScriptModule | OctaveFunctions, suffix: str, kernels: KernelPrinter, driven: tuple[str, str, str],
-    places: Mapping[str, str],
-) -> str:  # fmt: skip
+    program: ExportedRun, suffix: str, kernels: KernelPrinter, driven: tuple[str, str, str], places: Mapping[str, str]
+) -> str:
     """The function `simulate`; `driven` are the texts of a loop with drivers: a function, their arrays, their call."""
     loop, name = program.loop, program.name
     if loop is None:

@@ -3,15 +3,15 @@
 import abc
 import dataclasses
 from collections.abc import Sequence
-from typing import Any, ClassVar
+from typing import Any
 
 from ...core import Leaf, ParameterError, autodiff, leaves, one_line, parts_of
 from ...engine.compile.functions import PARAMETERS, Printer
 from ...engine.compile.ir.emission import TargetLanguage
 from ...engine.compile.text.programs import DEFINITION, CLanguage, JavaScriptLanguage, MatlabLanguage
 from ...physics.muscle.characteristic import Characteristic, ContractionLaw, ForceLaw, PressureLaw
-from .c_source import CSource, loop_main
-from .exported_run import ExportedLoop, RunData
+from .c_source import CSource, main_program
+from .exported_run import ExportedRun
 from .identifiers import (
     block_comment,
     c_array,
@@ -22,8 +22,7 @@ from .identifiers import (
     provenance,
     with_cmake,
 )
-from .printed_system import ExportedSystem
-from .scripting import JavaScriptModule, OctaveFunctions, m_array, m_strings, to_json
+from .scripting import javascript_files, m_array, m_strings, octave_files, to_json
 
 FORMS: tuple[tuple[type[Characteristic], str, tuple[str, str], tuple[str, str, str]], ...] = (
     (ForceLaw, "force", ("pressure", "contraction"), ("force", "force_by_pressure", "stiffness")),
@@ -61,43 +60,14 @@ class PrintedLaw:
         printer.add("evaluate", {**inputs, PARAMETERS: self.parameters}, {"result": self.values}, self.arguments)
         return printer.module(), printer.held
 
-    def _places(self, held: int) -> dict[str, str]:
+    def places(self, held: int) -> dict[str, str]:
+        """The places of a template of which c has so many numbers."""
         first, second = self.arguments
         return {
             "provenance": block_comment(self.provenance), "file": self.name, "held": str(held),
             "parameters": str(len(self.known)), "first": first, "second": second,
             "first_unit": UNITS[first], "second_unit": UNITS[second], "results": ", ".join(self.results),
         }  # fmt: skip
-
-    def c_files(self) -> dict[str, str]:
-        """Header and source."""
-        text, held = self.text(CLanguage("double", f"{self.name}_", None))
-        size = f"[{self.name.upper()}_PARAMETERS + 1]"
-        constants = c_array(f"const double {self.name}_defaults{size}", self.defaults, 1)
-        constants += c_strings(f"const char *const {self.name}_parameter_names{size}", (p.path for p in self.known))
-        places = {**self._places(held), "functions": text, "constants": constants}
-        return {
-            f"{self.name}.h": filled("law.h", places, self.name),
-            f"{self.name}.c": filled("law.c", places, self.name),
-        }
-
-    def javascript_files(self) -> dict[str, str]:
-        """A module."""
-        text, held = self.text(JavaScriptLanguage())
-        names = to_json(list(self.results))
-        constants = f"export const parameters = {to_json([p.path for p in self.known])};\n"
-        constants += f"export const defaults = {to_json(self.defaults)};\nexport const results = {names};\n"
-        places = {**self._places(held), "functions": text, "constants": constants}
-        return {f"{self.name}.mjs": filled("law.mjs", places, self.name)}
-
-    def octave_files(self) -> dict[str, str]:
-        """A function file."""
-        text, held = self.text(MatlabLanguage())
-        places = {
-            **self._places(held), "provenance": line_comment(self.provenance), "defaults": m_array(self.defaults),
-            "names": m_strings(p.path for p in self.known), "functions": f"{DEFINITION}\n{text}",
-        }  # fmt: skip
-        return {f"{self.name}.m": filled("law.m", places, self.name)}
 
 
 def print_law(law: Characteristic, name: str, title: str) -> PrintedLaw:
@@ -132,23 +102,8 @@ def check_closed_form(model: Any) -> None:
             )
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class ExportedRun:
-    """A system with its run, ready for a target; `columns` are written by the program after time."""
-
-    name: str
-    system: ExportedSystem
-    run: RunData
-    provenance: Sequence[str]
-    columns: Sequence[str]
-    loop: ExportedLoop | None = None
-
-
 class Target(abc.ABC):
-    """A language that plants and laws are exported to."""
-
-    has_loops: ClassVar[bool] = False
-    """Whether a plant can be exported together with its controller."""
+    """A language that plants, with their controllers, and laws are exported to."""
 
     @abc.abstractmethod
     def run_files(self, program: ExportedRun) -> dict[str, str]:
@@ -167,47 +122,49 @@ class C99(Target):
     A controller has a header and a source of its own.
     """
 
-    has_loops: ClassVar[bool] = True
-
     def run_files(self, program: ExportedRun) -> dict[str, str]:
-        source = CSource(program.name, program.system, program.run.integrator, program.provenance)
-        if program.loop is None:
-            files = {**source.files(), "main.c": source.main(program.run, program.columns)}
-            return with_cmake(program.name, files)
-        main = loop_main(program.name, program.system, program.run, program.loop, program.columns, program.provenance)
-        files = {**source.files(), **program.loop.controller.source_files(), "main.c": main}
-        return with_cmake(program.name, files)
+        source = CSource(program.name, program.system, program.integrator, program.provenance).files()
+        controller = program.loop.controller.source_files() if program.loop else {}
+        return with_cmake(program.name, {**source, **controller, "main.c": main_program(program)})
 
     def law_files(self, law: PrintedLaw) -> dict[str, str]:
-        return with_cmake(law.name, law.c_files())
+        text, held = law.text(CLanguage("double", f"{law.name}_", None))
+        size = f"[{law.name.upper()}_PARAMETERS + 1]"
+        constants = c_array(f"const double {law.name}_defaults{size}", law.defaults, 1)
+        constants += c_strings(f"const char *const {law.name}_parameter_names{size}", (p.path for p in law.known))
+        places = {**law.places(held), "functions": text, "constants": constants}
+        return with_cmake(law.name, {f"{law.name}.{end}": filled(f"law.{end}", places, law.name) for end in "hc"})
 
 
 @dataclasses.dataclass(frozen=True)
 class JavaScript(Target):
     """An ECMAScript module for browsers and Node, and a program for Node that runs the scenario."""
 
-    has_loops: ClassVar[bool] = True
-
     def run_files(self, program: ExportedRun) -> dict[str, str]:
-        module = JavaScriptModule(program.name, program.system, program.run, program.provenance, program.loop)
-        return module.files(program.columns)
+        return javascript_files(program)
 
     def law_files(self, law: PrintedLaw) -> dict[str, str]:
-        return law.javascript_files()
+        text, held = law.text(JavaScriptLanguage())
+        stated = {"parameters": [p.path for p in law.known], "defaults": law.defaults, "results": law.results}
+        constants = "".join(f"export const {name} = {to_json(value)};\n" for name, value in stated.items())
+        places = {**law.places(held), "functions": text, "constants": constants}
+        return {f"{law.name}.mjs": filled("law.mjs", places, law.name)}
 
 
 @dataclasses.dataclass(frozen=True)
 class Octave(Target):
     """Functions for GNU Octave and MATLAB, and a function that runs the scenario."""
 
-    has_loops: ClassVar[bool] = True
-
     def run_files(self, program: ExportedRun) -> dict[str, str]:
-        functions = OctaveFunctions(program.name, program.system, program.run, program.provenance, program.loop)
-        return functions.files(program.columns)
+        return octave_files(program)
 
     def law_files(self, law: PrintedLaw) -> dict[str, str]:
-        return law.octave_files()
+        text, held = law.text(MatlabLanguage())
+        places = {
+            **law.places(held), "provenance": line_comment(law.provenance), "defaults": m_array(law.defaults),
+            "names": m_strings(p.path for p in law.known), "functions": f"{DEFINITION}\n{text}",
+        }  # fmt: skip
+        return {f"{law.name}.m": filled("law.m", places, law.name)}
 
 
 def program_name(title: str) -> str:

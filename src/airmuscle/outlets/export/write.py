@@ -15,7 +15,7 @@ from ...engine.run import Problem, solve
 from ...engine.run.batch.lanes import Double, Precision, Single
 from ...engine.run.sampled_loop import SampledLoop, prepare_loop
 from ...physics.muscle.characteristic import Characteristic
-from .exported_run import CONTROLLER, check_open_loop, export_loop, run_data
+from .exported_run import CONTROLLER, ExportedRun, export_loop
 from .identifiers import c_array, c_integers, c_number, filled, make_identifier, provenance
 from .printed_controller import (
     SINGLE_TOLERANCE,
@@ -26,7 +26,7 @@ from .printed_controller import (
     print_controller,
 )
 from .printed_system import export_system
-from .targets import C99, ExportedRun, Target, print_law, program_name
+from .targets import C99, Target, print_law, program_name
 
 TOLERANCE = 1e-9
 """Part of its range by which a command in C may differ from that in Python (chosen): sums are in another order."""
@@ -139,8 +139,7 @@ def write_program(
 ) -> tuple[Path, ...]:  # fmt: skip
     """Write a system and its run as a program in another language; returns the paths of its files.
 
-    problem  a system with its input signals or, for these targets, a control loop; initial state, output times and
-             integrator
+    problem  a system with its input signals or a control loop, initial state, output times and integrator
     target   C99(), JavaScript() or Octave()
     name     name of the files, and beginning of the names in them; by default the title
     tunable  paths of the parameters that the program can change, those of a controller with `controller.` before them;
@@ -150,9 +149,7 @@ def write_program(
     The files depend on the arguments and the version of airmuscle alone. Raises ParameterError for what cannot be
     exported, which it names, and FileError.
     """
-    program = make_run(
-        problem, name=name, title=title, tunable=tunable, columns=columns, with_loop=target.has_loops
-    )  # fmt: skip
+    program = make_run(problem, name=name, title=title, tunable=tunable, columns=columns, with_loop=True)
     return write_files(target.run_files(program), folder)
 
 
@@ -164,19 +161,26 @@ def make_run(
     title = title or type(problem.system).__name__
     name = checked_name(name) or program_name(title)
     loop, plant_parameters = None, tunable
-    if with_loop and isinstance(problem.input, ControlLoop):
+    if isinstance(problem.input, ControlLoop):
+        if not with_loop:
+            raise ParameterError(
+                f"the controller {type(problem.input.controller).__name__} cannot be exported to this target; export "
+                "the plant with input signals, or the loop to C, JavaScript, Octave, or as FMUs of an SSP package."
+            )
         plant_parameters, of_controller = _divided(tunable)
         loop = export_loop(problem, f"{name}_controller", title, of_controller)
-        run = run_data(problem, loop.others, loop.prepared.times)
-    else:
-        check_open_loop(problem)
-        run = run_data(problem)
+    integrator = problem.integrator
+    if integrator is None or not integrator.printed_step:
+        raise ParameterError(
+            f"the integrator {type(integrator).__name__} has no printed form; choose Rodas4, RungeKutta4 or "
+            "DormandPrince8."
+        )
     system = export_system(problem.compiled, plant_parameters)
-    known = (*system.columns, *(loop.added_columns if loop else ()))
+    known = sum(loop.added_columns if loop else (), system.known.column_names)
     check_known("the run has no column", columns, known)
-    lines = provenance(title, problem.system, (run.integrator,), notes)
+    lines = provenance(title, problem.system, (integrator,), notes)
     chosen = tuple(c for c in columns if c != "time") or known
-    return ExportedRun(name, system, run, lines, chosen, loop)
+    return ExportedRun(name, system, problem, lines, chosen, loop)
 
 
 def _divided(tunable: Sequence[str] | None) -> tuple[list[str] | None, list[str] | None]:

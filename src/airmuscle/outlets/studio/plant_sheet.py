@@ -63,7 +63,7 @@ def sheet_of_tables(
         "parameters": _parameter_rows(plant, sources),
         "inputs": _input_rows(plant),
         "controlled": program.loop is not None,
-        "columns": _column_rows(program.system.columns, program.system.units),
+        "columns": _column_rows(program.system.known.column_names, program.system.units),
         "muscles": [_muscle_row(plant, i) for i in range(len(plant.muscles))],
         "mechanism": _mechanism_row(plant),
         "references": [str(reference) for reference in cite(plant)],
