@@ -2,16 +2,19 @@
 
 import dataclasses
 import functools
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import typer
 
 from ...core import check_writable
 from ...engine.run.batch.lanes import Precision
-from ...files.library.entry_file import load_law
+from ...files import list_plants
+from ...files.library import load_law, read_toml
 from ...files.scenario.scenario import load_scenario
-from ..export import PRECISIONS, OnnxStack, Stack, TorchStack, WarpStack, write_controller, write_law, write_program
+from .. import export as outlet
+from ..export import PRECISIONS, MuscleActuator, OnnxStack, Stack, TorchStack, WarpStack
 from ..export.compiler import (
     PLATFORMS,
     PROCESSORS,
@@ -25,8 +28,8 @@ from ..export.identifiers import make_identifier
 from ..export.robot_description import WRITERS
 from ..export.targets import C99, JavaScript, Octave, Target
 from ..requests.declaration import RequestError, Where, option, request
-from .export_models import export_actuator, export_fmu, export_modelica, export_mujoco, export_robot, tell
 from .options import Folder, Json, complete_entry, with_requests
+from .terminal import echo, print_json
 
 TARGETS: dict[str, Target] = {"c": C99(), "js": JavaScript(), "octave": Octave()}
 """Languages by the names of the option --to."""
@@ -129,54 +132,128 @@ def export(source: Source, request: ExportRequest, out: Folder = DEFAULT_FOLDER,
       airmuscle export examples/pressure_loop.toml --to ssp --out loop.ssp
     """
     request = request if request.name else dataclasses.replace(request, name=make_identifier(Path(source).stem))
-    if request.to not in TARGETS and request.to != "arduino":
-        _export_model(source, out, request, json)
+    if request.to not in ("fmu", "ssp"):
+        check_writable(out)
+    files, lines, more = WRITERS_BY_TARGET.get(request.to, _export_program)(source, out, request)
+    if json:
+        print_json({"files": [str(file) for file in files], **more})
         return
-    check_writable(out)
+    for line in (*(f"file: {file}" for file in files), *lines):
+        echo(line)
+
+
+class Exported(NamedTuple):
+    """The files of an export, lines on their use, and what JSON states besides the files."""
+
+    files: Sequence[Path]
+    lines: Sequence[str] = ()
+    more: Mapping[str, Any] = {}
+
+
+def _export_fmu(source: str, out: Path, request: ExportRequest) -> Exported:
+    """The FMU of a plant or of its controller, or both as an SSP package, in a folder or as a file."""
+    platforms, fmi = [find_platform(each) for each in dict.fromkeys(request.platforms)], request.fmi
+    fmi = 3 if fmi is None else fmi
+    part = "ssp" if request.to == "ssp" else "controller" if request.controller else "plant"
+    suffix = ".ssp" if part == "ssp" else ".fmu"
+    path = out if out.suffix == suffix else out / f"{request.name}{suffix}"
+    check_writable(path.parent, shared=path.parent.exists())  # several commands may write into one folder
+    scenario = load_scenario(source)
+    common: dict[str, Any] = {
+        "fmi": fmi, "name": request.name, "title": scenario.title, "binary": not request.sources_only,
+        "platforms": platforms,
+    }  # fmt: skip
+    if part == "controller":
+        written = outlet.write_controller_fmu(scenario.problem, path, **common)
+    else:
+        write = outlet.write_ssp if part == "ssp" else outlet.write_fmu
+        written = write(scenario.problem, path, tunable=request.tunable or None, **common)
+    names = ", ".join(written.platforms)
+    binaries = f"with sources and a binary for {names}" if names else f"sources without a binary: {written.remark}"
+    uses = {
+        "plant": f"run: fmpy simulate {path}", "controller": f"inputs: fmpy info {path}",
+        "ssp": "open: SystemStructure.ssd joins plant and controller",
+    }  # fmt: skip
+    kinds = f"FMI {fmi}.0, {'Model Exchange and ' if part == 'plant' else ''}Co-Simulation, {binaries}"
+    return Exported([path], (kinds, uses[part]), {"platforms": list(written.platforms), "remark": written.remark})
+
+
+def _export_mujoco(source: str, out: Path, request: ExportRequest) -> Exported:
+    """A MuJoCo plugin."""
+    made = outlet.write_mujoco_plugin(load_scenario(source).plant, out, name=request.name, muscle=request.muscle)
+    low, high = made.control_range
+    size = f'actdim="{len(made.plant.states)}" dyntype="user" ctrlrange="{low:g} {high:g}"'
+    lines = (
+        f"plugin: {made.plugin_name}" + (f", source only: {made.remark}" if made.remark else ""),
+        f'MJCF: <plugin plugin="{made.plugin_name}" tendon="NAME" {size}/>',
+    )
+    return Exported(_files_of(made), lines, {"plugin": made.plugin_name, "remark": made.remark})
+
+
+def _files_of(plugin: MuscleActuator) -> list[Path]:
+    return [path for path in (plugin.source, plugin.library) if path is not None]
+
+
+def _export_robot(source: str, out: Path, request: ExportRequest) -> Exported:
+    """The robot description of a joint or an arm, with the plugins of its muscles."""
+    written = WRITERS[request.to](load_scenario(source).plant, out, name=request.name)
+    plugins = [path for each in written.plugins for path in _files_of(each)]
+    remarks, left = list(dict.fromkeys(each.remark for each in written.plugins if each.remark)), list(written.left_out)
+    lines = [f"plugins, source only: {remark}" for remark in remarks]
+    lines += [f"left out: {', '.join(left)}"] if left else []
+    return Exported([written.path, *plugins], lines, {"remarks": remarks, "left_out": left})
+
+
+def _export_actuator(source: str, out: Path, request: ExportRequest) -> Exported:
+    """The batched actuator of a muscle of a plant, or of a muscle behind a pressure regulator."""
+    file, stack = Path(source), STACKS[request.to]
+    if source in list_plants() if not file.exists() else "plant" in read_toml(file):
+        plant = load_scenario(source).plant
+        return Exported(outlet.write_actuator(plant, out, stack, name=request.name, muscle=request.muscle))
+    entry = load_law(source)
+    about: dict[str, Any] = {"name": request.name, "title": entry.title, "uncertainty": entry.uncertainty}
+    return Exported(outlet.write_actuator(outlet.regulated_plant(entry.muscle), out, stack, **about))
+
+
+def _export_modelica(source: str, out: Path, request: ExportRequest) -> Exported:
+    """A Modelica package."""
+    scenario, tunable = load_scenario(source), request.tunable or None
+    paths = outlet.write_modelica(scenario.problem, out, name=request.name, title=scenario.title, tunable=tunable)
+    return Exported(paths, (f'Modelica: loadFile("{paths[0]}"); block {request.name}.Plant',))
+
+
+WRITERS_BY_TARGET: Mapping[str, Callable[[str, Path, ExportRequest], Exported]] = {
+    **dict.fromkeys(("fmu", "ssp"), _export_fmu), "mujoco": _export_mujoco, "modelica": _export_modelica,
+    **dict.fromkeys(WRITERS, _export_robot), **dict.fromkeys(STACKS, _export_actuator),
+}  # fmt: skip
+"""Writers of models for simulators and learning stacks; the other targets are programs."""
+
+
+def _export_program(source: str, out: Path, request: ExportRequest) -> Exported:
+    """A law, a controller, or a plant with its run, which is built and run if that is asked for."""
     paths = _write(source, out, request)
     run = functools.partial(run_in_emulator, processor=request.processor) if request.processor else build_and_run
     lines, built = [f"run: {_instruction(request.to, paths, request.law, request.controller)}"], dict[str, Any]()
     if request.build:
         line, built = _build_results(run(paths), request.controller)
         lines.insert(0, line)
-    tell(json, paths, *lines, **built)
-
-
-def _export_model(source: str, out: Path, request: ExportRequest, json: bool) -> None:
-    """Write a model for a simulator or a learning stack."""
-    to, name, muscle, tunable = request.to, request.name, request.muscle, request.tunable or None
-    if to in ("fmu", "ssp"):
-        platforms = [find_platform(each) for each in dict.fromkeys(request.platforms)]
-        part, fmi = "ssp" if to == "ssp" else "controller" if request.controller else "plant", request.fmi
-        export_fmu(
-            source, out, name, tunable, 3 if fmi is None else fmi, not request.sources_only, platforms, part, json
-        )
-        return
-    check_writable(out)
-    if to == "mujoco":
-        export_mujoco(source, out, name, muscle, json)
-    elif to in WRITERS:
-        export_robot(source, out, name, to, json)
-    elif to in STACKS:
-        export_actuator(source, out, name, muscle, STACKS[to], json)
-    else:
-        export_modelica(source, out, name, tunable, json)
+    return Exported(paths, lines, built)
 
 
 def _write(source: str, out: Path, request: ExportRequest) -> tuple[Path, ...]:
     """Write a law, a controller, or a plant with its run."""
     if request.law:
         entry = load_law(source)
-        return write_law(entry.characteristic, out, TARGETS[request.to], name=request.name, title=entry.title)
+        return outlet.write_law(entry.characteristic, out, TARGETS[request.to], name=request.name, title=entry.title)
     scenario = load_scenario(source)
     common: dict[str, Any] = {"name": request.name, "title": scenario.title}
     if request.controller:
-        return write_controller(
+        return outlet.write_controller(
             scenario.problem, out, tunable=request.tunable, precision=request.precision,
             arduino=request.to == "arduino", **common,
         )  # fmt: skip
     target, tunable = TARGETS[request.to], request.tunable or None
-    return write_program(scenario.problem, out, target, tunable=tunable, columns=scenario.columns, **common)
+    return outlet.write_program(scenario.problem, out, target, tunable=tunable, columns=scenario.columns, **common)
 
 
 def _build_results(built: BuiltProgram, controller: bool) -> tuple[str, dict[str, str | int | None]]:

@@ -85,16 +85,16 @@ class FmuDescription:
         }  # fmt: skip
         return Element("fmiModelDescription", {**attributes, **common})
 
-    def _experiment(self, root: Element) -> None:
-        given = self.experiment
+    def _variables(self, root: Element) -> Element:
+        """The element of the variables, after units, categories of messages, and experiment."""
+        add_units(root, [v.unit for v in self.variables])
+        categories, given = SubElement(root, "LogCategories"), self.experiment
+        for name in CATEGORIES:
+            SubElement(categories, "Category", name=name)
         attributes = {"startTime": given.start, "stopTime": given.stop}
         attributes |= {key: x for key, x in (("tolerance", given.tolerance), ("stepSize", given.step)) if x}
         SubElement(root, "DefaultExperiment", {key: repr(float(x)) for key, x in attributes.items()})
-
-    def _categories(self, root: Element) -> None:
-        categories = SubElement(root, "LogCategories")
-        for name in CATEGORIES:
-            SubElement(categories, "Category", name=name)
+        return SubElement(root, "ModelVariables")
 
     def _fmi2(self) -> Element:
         root = self._root({"fmiVersion": "2.0", "guid": self.token, "numberOfEventIndicators": str(self.indicators)})
@@ -109,18 +109,13 @@ class FmuDescription:
             files = SubElement(SubElement(root, kind, {**can, **derivatives, **more}), "SourceFiles")
             for file in self.units(2):
                 SubElement(files, "File", name=file)
-        add_units(root, [v.unit for v in self.variables])
-        self._categories(root)
-        self._experiment(root)
-        variables = SubElement(root, "ModelVariables")
+        variables = self._variables(root)
         for v in self.variables:
-            attributes = {"name": v.name, "valueReference": str(v.reference), **_kind(v)}
-            scalar = SubElement(variables, "ScalarVariable", attributes)
+            scalar = SubElement(variables, "ScalarVariable", _kind(v))
             derivative = {} if v.derivative_of is None else {"derivative": str(v.derivative_of + 1)}
             SubElement(scalar, "Real", {**_numbers(v), **derivative})
         structure = SubElement(root, "ModelStructure")
-        groups = (("Outputs", self._outputs), ("Derivatives", self._rates), ("InitialUnknowns", self._initial_unknowns))
-        for group, references in groups:
+        for group, references in zip(("Outputs", "Derivatives", "InitialUnknowns"), self._unknowns, strict=True):
             parent = SubElement(structure, group) if references else structure
             for reference in references:
                 given = self._dependencies(reference, 1) if group != "InitialUnknowns" else {}
@@ -136,36 +131,29 @@ class FmuDescription:
             can |= {"providesDirectionalDerivatives": "true", "providesAdjointDerivatives": "true"}
             SubElement(root, "ModelExchange", can)
         SubElement(root, "CoSimulation", {**can, "canHandleVariableCommunicationStepSize": "true"})
-        add_units(root, [v.unit for v in self.variables])
-        self._categories(root)
-        self._experiment(root)
-        variables = SubElement(root, "ModelVariables")
+        variables = self._variables(root)
         for v in self.variables:
             derivative = {} if v.derivative_of is None else {"derivative": str(v.derivative_of)}
-            attributes = {"name": v.name, "valueReference": str(v.reference), **_kind(v), **_numbers(v), **derivative}
-            SubElement(variables, "Float64", attributes)
+            SubElement(variables, "Float64", {**_kind(v), **_numbers(v), **derivative})
         structure = SubElement(root, "ModelStructure")
-        for element, references in (("Output", self._outputs), ("ContinuousStateDerivative", self._rates)):
+        elements = ("Output", "ContinuousStateDerivative", "InitialUnknown")
+        for element, references in zip(elements, self._unknowns, strict=True):
             for reference in references:
-                SubElement(structure, element, {"valueReference": str(reference), **self._dependencies(reference, 0)})
-        for reference in self._initial_unknowns:
-            SubElement(structure, "InitialUnknown", valueReference=str(reference))
+                given = self._dependencies(reference, 0) if element != "InitialUnknown" else {}
+                SubElement(structure, element, {"valueReference": str(reference), **given})
         for v in self.variables:
             if v.is_indicator:
                 SubElement(structure, "EventIndicator", valueReference=str(v.reference))
         return root
 
     @property
-    def _outputs(self) -> list[int]:
-        return [v.reference for v in self.variables if v.causality == "output"]
-
-    @property
-    def _rates(self) -> list[int]:
-        return [v.reference for v in self.variables if v.derivative_of is not None]
-
-    @property
-    def _initial_unknowns(self) -> list[int]:
-        return [v.reference for v in self.variables if v.initial == "calculated"]
+    def _unknowns(self) -> tuple[list[int], list[int], list[int]]:
+        """The value references of outputs, of rates, and of what is computed at the start."""
+        return (
+            [v.reference for v in self.variables if v.causality == "output"],
+            [v.reference for v in self.variables if v.derivative_of is not None],
+            [v.reference for v in self.variables if v.initial == "calculated"],
+        )
 
     def _dependencies(self, reference: int, offset: int) -> dict[str, str]:
         """The states and inputs on which an unknown depends; of a state, itself."""
@@ -181,7 +169,10 @@ def xml_text(root: Element) -> str:
 
 def _kind(v: Variable) -> dict[str, str]:
     """Attributes of a variable that state what it is."""
-    given = {"causality": v.causality, "variability": v.variability, "initial": v.initial, "description": v.description}
+    given = {
+        "name": v.name, "valueReference": str(v.reference), "causality": v.causality, "variability": v.variability,
+        "initial": v.initial, "description": v.description,
+    }  # fmt: skip
     return {key: text for key, text in given.items() if text}
 
 

@@ -15,6 +15,7 @@ from .fmi_description import FmuDescription
 from .identifiers import block_comment, filled, template
 
 VERSIONS = (2, 3)
+NOT_REQUESTED = "none was requested"
 HEADERS = {
     2: ("fmi2FunctionTypes.h", "fmi2Functions.h", "fmi2TypesPlatform.h"),
     3: ("fmi3FunctionTypes.h", "fmi3Functions.h", "fmi3PlatformTypes.h"),
@@ -61,21 +62,16 @@ class FmuPackage:
     def files(self, fmi: int) -> dict[str, bytes]:
         """The files by their paths in the FMU."""
         name, places = self.about.name, {"provenance": block_comment(self.provenance), "file": self.about.name}
-        if fmi == 3:
-            places["adjoint"] = filled("adjoint.h", {}, name) if self.adjoint else ""
-        texts = {
-            **self.sources,
-            f"fmi{fmi}.c": filled(f"fmi{fmi}.c", places, name),
-            **{file: template(f"fmi/{file}") for file in HEADERS[fmi]},
-        }
-        if fmi == 3:
-            texts["fmi3_absent.h"] = filled("fmi3_absent.h", {}, name)
-            texts["buildDescription.xml"] = _build_description(name, self.about.units(fmi))
         page = PAGE.format(html.escape(self.about.title), html.escape("\n".join(self.provenance)))
         files = {"modelDescription.xml": self.about.text(fmi), "documentation/index.html": page}
-        files |= {f"sources/{file}": text for file, text in texts.items()}
+        texts = {**self.sources, **{file: template(f"fmi/{file}") for file in HEADERS[fmi]}}
         if fmi == 3:  # FMI 2.0 has no terminals
+            places["adjoint"] = filled("adjoint.h", {}, name) if self.adjoint else ""
+            texts["fmi3_absent.h"] = filled("fmi3_absent.h", {}, name)
+            texts["buildDescription.xml"] = _build_description(name, self.about.units(fmi))
             files["terminalsAndIcons/terminalsAndIcons.xml"] = self.about.terminals()
+        texts[f"fmi{fmi}.c"] = filled(f"fmi{fmi}.c", places, name)
+        files |= {f"sources/{file}": text for file, text in texts.items()}
         if self.related:
             span = {key: repr(value) for key, value in dataclasses.asdict(self.about.experiment).items()}
             run = filled("run.exp", {**span, "title": html.escape(self.about.title)}, name)
@@ -87,38 +83,35 @@ class FmuPackage:
         self, path: str | Path, fmi: int, binary: bool = True, platforms: Sequence[Platform] = ()
     ) -> WrittenFmu:  # fmt: skip
         """Write the FMU, with binaries for this machine or for platforms. Raises ParameterError and FileError."""
-        target = Path(path)
         content, folders, remark = self.content(fmi, binary, platforms)
-        with atomic_folder(target.parent) as staging:
-            (staging / target.name).write_bytes(content)
-        return WrittenFmu(target, tuple(folders), remark)
+        return write_archive(path, content, folders, remark)
 
     def content(
         self, fmi: int, binary: bool = True, platforms: Sequence[Platform] = ()
     ) -> tuple[bytes, list[str], str]:
-        """The bytes of the FMU, the folders of its binaries, and why there are none."""
-        files, folders, remark = self.files(fmi), list[str](), "none was requested"
-        if binary:
-            folders, libraries, remark = self._binaries(fmi, files, platforms)
-            files |= libraries
-        return archive(files, "modelDescription.xml"), folders, remark
-
-    def _binaries(
-        self, fmi: int, files: Mapping[str, bytes], platforms: Sequence[Platform]
-    ) -> tuple[list[str], dict[str, bytes], str]:
-        """Folders and files of the binaries; without platforms that of this machine, or none and the reason."""
+        """The bytes of the FMU, the folders of its binaries, and why there are none; without platforms the binary is
+        that of this machine, if it can be compiled."""
+        files, name, folders, remark = self.files(fmi), self.about.name, list[str](), "" if binary else NOT_REQUESTED
         sources = {file.removeprefix("sources/"): text for file, text in files.items() if file.startswith("sources/")}
-        name, folders, libraries = self.about.name, list[str](), dict[str, bytes]()
-        for target in platforms or [this_platform()]:
+        for target in (platforms or [this_platform()]) if binary else ():
             try:
                 library = target.compile(sources, self.about.units(fmi), name)
             except ParameterError as reason:
                 if platforms:
                     raise
-                return [], {}, str(reason)
-            folders.append(target.folder(fmi))
-            libraries[f"binaries/{folders[-1]}/{name}{target.suffix}"] = library
-        return folders, libraries, ""
+                remark = str(reason)
+            else:
+                folders.append(target.folder(fmi))
+                files[f"binaries/{folders[-1]}/{name}{target.suffix}"] = library
+        return archive(files, "modelDescription.xml"), folders, remark
+
+
+def write_archive(path: str | Path, content: bytes, folders: Sequence[str], remark: str) -> WrittenFmu:
+    """Write the bytes of an FMU or of a package of FMUs. Raises FileError."""
+    target = Path(path)
+    with atomic_folder(target.parent) as staging:
+        (staging / target.name).write_bytes(content)
+    return WrittenFmu(target, tuple(folders), remark)
 
 
 def check_target(path: str | Path, fmi: int, suffix: str = ".fmu") -> Path:

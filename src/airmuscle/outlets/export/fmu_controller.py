@@ -7,7 +7,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 import numpy as np
 
-from ...core import ParameterError, atomic_folder
+from ...core import ParameterError
 from ...engine.compile.text.programs import CLanguage
 from ...engine.loop import MEASURED, SETPOINT, ControlLoop, Schedule, named_signal_units
 from ...engine.run import Problem, solve
@@ -15,7 +15,7 @@ from ...engine.run.sampled_loop import SampledLoop, prepare_loop
 from ...recording.columns import column_units
 from .compiler import Platform
 from .fmi_description import FmuDescription, FmuExperiment, xml_text
-from .fmi_package import FmuPackage, WrittenFmu, archive, check_target, token_of
+from .fmi_package import FmuPackage, WrittenFmu, archive, check_target, token_of, write_archive
 from .fmi_variables import Variable, Variables, base_powers, has_unit
 from .fmu import fmu_package
 from .identifiers import block_comment, c_array, c_number, c_strings, filled
@@ -151,9 +151,7 @@ def write_ssp(
     for part, package in packages.items():
         files[f"resources/{part}.fmu"], folders, remark = package.content(fmi, binary, platforms)
     files["SystemStructure.ssd"] = _structure(base, {part: p.about for part, p in packages.items()}).encode()
-    with atomic_folder(target.parent) as staging:
-        (staging / target.name).write_bytes(archive(files, "SystemStructure.ssd"))
-    return WrittenFmu(target, tuple(folders), remark)
+    return write_archive(target, archive(files, "SystemStructure.ssd"), folders, remark)
 
 
 def _structure(name: str, parts: dict[str, FmuDescription]) -> str:
@@ -162,7 +160,10 @@ def _structure(name: str, parts: dict[str, FmuDescription]) -> str:
         "xmlns:ssd": STRUCTURE, "xmlns:ssc": COMMON, "version": "1.0", "name": name,
     })  # fmt: skip
     system = SubElement(root, "ssd:System", name=name)
-    inside = {part: _ports(about) for part, about in parts.items()}
+    inside = {
+        part: {v.name: v for v in about.variables if v.causality in ("input", "output")}
+        for part, about in parts.items()
+    }
     joined = [
         (a, signal, b) for a, b in (("plant", "controller"), ("controller", "plant"))
         for signal, v in inside[a].items() if v.causality == "output"
@@ -176,9 +177,7 @@ def _structure(name: str, parts: dict[str, FmuDescription]) -> str:
     _connectors(system, [v for _, v in outside])
     elements = SubElement(system, "ssd:Elements")
     for part, ports in inside.items():
-        component = SubElement(
-            elements, "ssd:Component", name=part, type=FMU_TYPE, source=f"resources/{part}.fmu"
-        )  # fmt: skip
+        component = SubElement(elements, "ssd:Component", name=part, type=FMU_TYPE, source=f"resources/{part}.fmu")
         _connectors(component, list(ports.values()))
     connections = SubElement(system, "ssd:Connections")
     for part, v in outside:
@@ -186,15 +185,13 @@ def _structure(name: str, parts: dict[str, FmuDescription]) -> str:
     for a, signal, b in joined:
         ends = {"startElement": a, "startConnector": signal, "endElement": b, "endConnector": signal}
         SubElement(connections, "ssd:Connection", ends)
-    _units(root, sorted({v.unit for ports in inside.values() for v in ports.values() if has_unit(v.unit)}))
+    units = SubElement(root, "ssd:Units")
+    for unit in sorted({v.unit for ports in inside.values() for v in ports.values() if has_unit(v.unit)}):
+        powers = {base: str(power) for base, power in (base_powers(unit) or {}).items()}
+        SubElement(SubElement(units, "ssc:Unit", name=unit), "ssc:BaseUnit", powers)
     experiment = parts["controller"].experiment
     SubElement(root, "ssd:DefaultExperiment", startTime=repr(experiment.start), stopTime=repr(experiment.stop))
     return xml_text(root)
-
-
-def _ports(about: FmuDescription) -> dict[str, Variable]:
-    """Inputs and outputs of an FMU by name."""
-    return {v.name: v for v in about.variables if v.causality in ("input", "output")}
 
 
 def _connectors(parent: Element, variables: Sequence[Variable]) -> None:
@@ -202,10 +199,3 @@ def _connectors(parent: Element, variables: Sequence[Variable]) -> None:
     for v in variables:
         connector = SubElement(connectors, "ssd:Connector", name=v.name, kind=v.causality)
         SubElement(connector, "ssc:Real", {"unit": v.unit} if has_unit(v.unit) else {})
-
-
-def _units(root: Element, names: Sequence[str]) -> None:
-    units = SubElement(root, "ssd:Units")
-    for name in names:
-        powers = base_powers(name) or {}
-        SubElement(SubElement(units, "ssc:Unit", name=name), "ssc:BaseUnit", {b: str(p) for b, p in powers.items()})

@@ -168,7 +168,8 @@ class ExportedActuator:
         bounds = np.array([leaf.declared.bounds for leaf in model.parameters], dtype=float).reshape(-1, 2)
         return {
             "provenance": line_comment(self.provenance).replace("%", "#"), "title": self.title,
-            "class": self.class_name, "file": self.name, "functions": functions, "held": str(max(held, 1)),
+            "class": "".join(word[:1].upper() + word[1:] for word in self.name.split("_")),
+            "file": self.name, "functions": functions, "held": str(max(held, 1)),
             "unit": model.controls[0].unit if model.controls else "1", "command": model.command_meaning,
             "length": repr(float(model.part.resting_lengths[0])), "low": repr(float(low)), "high": repr(float(high)),
             "step": repr(float(model.step)), "states": _tuple(s.name for s in model.part.states),
@@ -178,10 +179,11 @@ class ExportedActuator:
             "identified": _tuple(self.identified), "spread": _tuple(tuple(row) for row in self.root.tolist()),
         }  # fmt: skip
 
-    @property
-    def class_name(self) -> str:
-        """The name of the class."""
-        return "".join(word[:1].upper() + word[1:] for word in self.name.split("_"))
+    def files(self, language: TargetLanguage, templates: Mapping[str, str], **more: str) -> dict[str, str | bytes]:
+        """The filled templates, by the ends of the names of their files."""
+        places = self.places(language) | more
+        return {f"{self.name}{end}.py": filled(f"{each}_actuator.pyt", places, self.name)
+                for end, each in templates.items()}  # fmt: skip
 
 
 class Stack(abc.ABC):
@@ -202,12 +204,7 @@ class TorchStack(Stack):
     word: ClassVar[str] = "torch"
 
     def files(self, actuator: ExportedActuator) -> dict[str, str | bytes]:
-        places, name = actuator.places(TorchLanguage()), actuator.name
-        return {
-            f"{name}.py": filled("torch_actuator.pyt", places, name),
-            f"{name}_mjlab.py": filled("mjlab_actuator.pyt", places, name),
-            f"{name}_isaaclab.py": filled("isaaclab_actuator.pyt", places, name),
-        }
+        return actuator.files(TorchLanguage(), {"": "torch", "_mjlab": "mjlab", "_isaaclab": "isaaclab"})
 
 
 @dataclasses.dataclass(frozen=True)
@@ -219,11 +216,7 @@ class WarpStack(Stack):
 
     def files(self, actuator: ExportedActuator) -> dict[str, str | bytes]:
         number = "wp.float32" if self.precision == Single() else "wp.float64"
-        places, name = actuator.places(WarpLanguage()) | {"real": number}, actuator.name
-        return {
-            f"{name}_warp.py": filled("warp_actuator.pyt", places, name),
-            f"{name}_newton.py": filled("newton_actuator.pyt", places, name),
-        }
+        return actuator.files(WarpLanguage(), {"_warp": "warp", "_newton": "newton"}, real=number)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ...core import Array, Input, ParameterError, ShortRepr, atomic_folder, check_known, leaves, with_parameters
+from ...core import Array, Input, ParameterError, ShortRepr, check_known, leaves, with_parameters
 from ...engine.compile.program import compile_system
 from ...engine.run.integrators import Rodas4
 from ...physics.mechanism import HangingMass
@@ -20,7 +20,7 @@ from .compiler import compile_library
 from .identifiers import block_comment, c_integers, c_number, c_strings, filled, provenance
 from .printed_system import export_system
 from .targets import program_name
-from .write import checked_name
+from .write import checked_name, write_files
 
 OLDEST, BROKEN = (3, 17), ("4.0.0",)
 """First version of MuJoCo whose plugin actuators have several states, and versions in which they do not work."""
@@ -140,19 +140,13 @@ def write_mujoco_plugin(plant: Plant, folder: str | Path, *, name: str = "", mus
     controls = controls_of(part)
     lines = provenance(f"Muscle {part.muscles[0].name} for MuJoCo", part, (), [NOTE])
     files = _sources(part, program, controls, lines)
-    target = Path(folder)
-    library, remark = b"", ""
+    library, remark = f"lib{program}_plugin.so", ""
     try:
-        library = _build(program, files)
+        files[library] = _build(program, files)
     except ParameterError as reason:
         remark = str(reason)
-    with atomic_folder(target) as staging:
-        for source, text in files.items():
-            (staging / source).write_bytes(text)
-        if library:
-            (staging / f"lib{program}_plugin.so").write_bytes(library)
-    file = target / f"lib{program}_plugin.so" if library else None
-    return MuscleActuator(part, program, target / f"{program}_plugin.c", file, remark, controls)
+    written = dict(zip(files, write_files(files, folder), strict=True))
+    return MuscleActuator(part, program, written[f"{program}_plugin.c"], written.get(library), remark, controls)
 
 
 def check_mujoco() -> Any:

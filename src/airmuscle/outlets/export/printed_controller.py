@@ -58,25 +58,18 @@ class PrintedController:
     @property
     def places(self) -> dict[str, str]:
         """The places of a header: numbers of memories, measurements and so on, enumerations, provenance."""
-        law = self.law
-        counts = {
-            "memory": len(law.initial_memory), "measurements": len(law.measured_columns),
-            "setpoints": len(law.setpoints), "commands": len(law.inputs), "parameters": len(self.tunable),
-        }  # fmt: skip
-        return {key: str(count) for key, count in counts.items()} | {
+        keys = ("memory", "measurements", "setpoints", "commands", "parameters")
+        counts = {key: str(len(names)) for key, names in zip(keys, self._kinds.values(), strict=True)}
+        return counts | {
             "provenance": block_comment(self.provenance), "file": self.name, "enumerations": self._enumerations(),
             "number": self.number,
         }  # fmt: skip
 
     def source_files(self) -> dict[str, str]:
         """Header and source, by file name."""
-        printer = Printer(CLanguage(self.number, f"{self.name}_", labels=self._labels))
-        printer.add_code("sample", list(self.inputs), self.code, list(self.outputs))
-        places = {**self.places, "functions": printer.text[-1], "constants": self._constants()}
-        return {
-            f"{self.name}.h": filled("controller.h", places, self.name),
-            f"{self.name}.c": filled("controller.c", places, self.name),
-        }
+        functions = self.sample_in(CLanguage(self.number, f"{self.name}_"))
+        places = {**self.places, "functions": functions, "constants": self._constants()}
+        return {f"{self.name}.{end}": filled(f"controller.{end}", places, self.name) for end in "hc"}
 
     def sample_in(self, language: TargetLanguage) -> str:
         """The function of a sample in another language; its arguments are measurement, set point, memory, parameters,

@@ -8,14 +8,14 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
 
-from ...core import STANDARD_GRAVITY, ParameterError, atomic_folder
+from ...core import STANDARD_GRAVITY, ParameterError
 from ...physics import AntagonisticJoint, Mechanism, MuscleRoute, PlanarArm, SerialArm, SpatialLink, WithStickSlip
 from ...physics.mechanism.antagonistic_joint import ConstantRadius
 from ...physics.plant import Plant, open_plant
 from .identifiers import provenance
 from .mujoco_plugin import REST_LENGTH, MuscleActuator, write_mujoco_plugin
 from .targets import program_name
-from .write import checked_name
+from .write import checked_name, write_files
 
 LEAST = 1e-9
 """Mass [kg] and moment of inertia [kg m2] that stand for zero, which simulators refuse (chosen)."""
@@ -251,9 +251,7 @@ def _comment(title: str, plant: Plant, notes: Sequence[str] = ()) -> str:
 def _written(root: Any, folder: str | Path, file: str) -> Path:
     ET.indent(root)
     text: bytes = ET.tostring(root, encoding="utf-8", xml_declaration=True)
-    with atomic_folder(folder) as staging:
-        (staging / file).write_bytes(text + b"\n")
-    return Path(folder) / file
+    return write_files({file: text + b"\n"}, folder)[0]
 
 
 WRITERS: dict[str, Callable[..., WrittenRobot]] = {"mjcf": write_mjcf, "urdf": write_urdf}
