@@ -203,7 +203,7 @@ def test_a_component_in_the_limit_of_the_printed_one_changes_nothing(nothing):
     """Each substituted component contains the printed one as a limit, so the table shows the cause and nothing else."""
     base = causing.run_fill_of(causing.PRINTED, NUMBERS)
     effect = causing.effect_of(
-        base, null := causing.Substitution("none", "none", **nothing), causing.run_fill_of(null, NUMBERS)
+        base, null := causing.Substitution("none", "none", nothing), causing.run_fill_of(null, NUMBERS)
     )
     assert np.abs(effect.pressure).max() < 1e3
     assert np.abs(effect.contraction).max() < 5e-4

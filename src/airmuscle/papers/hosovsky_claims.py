@@ -2,7 +2,6 @@
 
 import dataclasses
 import math
-from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -31,15 +30,6 @@ STRONGER = 1.2
 """Ratio above which filling is affected more than discharging, by at least a fifth (chosen)."""
 SMALLEST_EFFECT = 100.0
 """Pressure change [Pa] below which a ratio has no meaning (chosen)."""
-COMPONENTS: Mapping[str, Callable[[float], str]] = {
-    "line_length": lambda value: "pressure measured at the valve",
-    "critical_ratio": lambda value: rf"\(b = {value:g}\)",
-    "index": lambda value: rf"\(m = {value:g}\)",
-    "laminar_ratio": lambda value: f"laminar above {value:g}",
-    "heat_transfer": lambda value: rf"first law, \(hA = {value:g}\) W/K",
-    "series_stiffness": lambda value: "nonlinear series spring",
-}
-"""Parameters whose substitution affects filling more at the chosen value, each with the component that it sets."""
 SENSOR_RANGE = 0.6
 """Upper end of the range of the pressure sensor [MPa], printed."""
 NEGLIGIBLE = 5.0
@@ -66,14 +56,13 @@ def ratio_ranges(parameters: UnpublishedParameters, suspected: SuspectedCauses) 
     """Simulate fill and discharge at the low end, the chosen value and the high end of each parameter."""
     base = run_fill_of(PRINTED, parameters)
     result = []
-    for name, component in COMPONENTS.items():
+    for name in (s.varied for s in substitutions(parameters, suspected) if s.varied):
         item = getattr(suspected, name)
         values = (item.low, item.value, item.high)
         ratios = []
         for value in values:
-            varied = dataclasses.replace(suspected, **{name: dataclasses.replace(item, value=value)})
-            wanted = component(value)
-            chosen = next(s for s in substitutions(parameters, varied) if s.component == wanted)
+            varied = replace(suspected, **{name: replace(item, value=value)})
+            chosen = next(s for s in substitutions(parameters, varied) if s.varied == name)
             effect = effect_of(base, chosen, run_fill_of(chosen, parameters))
             small = abs(effect.largest("pressure", FILLING)) < SMALLEST_EFFECT
             ratios.append(math.nan if small else fill_discharge_ratio(effect))
@@ -87,19 +76,17 @@ def range_table(ranges: tuple[RatioRange, ...]) -> Table:
         "parameter": [r.meaning for r in ranges],
         "unit": [format_unit(r.unit) for r in ranges],
     }
-    for i, place in enumerate(("low end", "chosen value", "high end")):
-        columns[place] = [r.values[i] for r in ranges]
-    for i, place in enumerate(("low end", "chosen value", "high end")):
-        columns[f"ratio at the {place} [1]"] = [
-            None if math.isnan(r.ratios[i]) else float(f"{r.ratios[i]:.3g}") for r in ranges
-        ]
+    places = ("low end", "chosen value", "high end")
+    columns |= {place: [r.values[i] for r in ranges] for i, place in enumerate(places)}
+    for i, place in enumerate(places):
+        ratios = [None if math.isnan(r.ratios[i]) else float(f"{r.ratios[i]:.3g}") for r in ranges]
+        columns[f"ratio at the {place} [1]"] = ratios
     note = (
         "Ratio of the largest pressure change during filling to that during discharging. No value: the component "
         "equals the printed one."
     )
-    return Table(
-        "hosovsky_effect_ranges", "Filling and discharging over the ranges of the suspected causes", columns, note
-    )
+    title = "Filling and discharging over the ranges of the suspected causes"
+    return Table("hosovsky_effect_ranges", title, columns, note)
 
 
 def describe_ranges(ranges: tuple[RatioRange, ...]) -> str:

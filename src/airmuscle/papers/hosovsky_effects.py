@@ -6,6 +6,7 @@ then one of each cause together. The parameter values are chosen, as the paper p
 """
 
 import dataclasses
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -62,32 +63,30 @@ class SuspectedCauses:
         return tuple(getattr(self, field.name).as_row() for field in dataclasses.fields(self))
 
 
-@dataclasses.dataclass(frozen=True)
+@dataclasses.dataclass(frozen=True, eq=False)
 class Substitution:
-    """One substituted component of the printed plant, with its cause and the column of the measured pressure."""
+    """Substituted components of the printed plant with their cause.
+
+    parts            components by their names in `plant`, or the braid angle
+    varied           field of SuspectedCauses over whose range the ratio of both phases is stated
+    pressure_column  column of the measured pressure
+    """
 
     cause: str
     component: str
-    gas: am.physics.Gas | None = None
-    spring: am.physics.Spring | None = None
-    wall: am.physics.Wall | None = None
-    valve: am.physics.Orifice = MATRIX
-    tube: am.physics.TubeModel | None = None
-    series: am.physics.SeriesElement | None = None
-    braid_angle: float | None = None
+    parts: Mapping[str, Any]
+    varied: str = ""
     pressure_column: str = "pressure"
 
     def plant(self, parameters: UnpublishedParameters) -> am.Plant:
-        """Return the plant with the substituted component."""
-        if self.braid_angle is not None:
-            parameters = parameters.with_value("braid_angle", self.braid_angle)
-        return plant(
-            parameters, hanging_load(parameters), gas=self.gas, spring=self.spring, valve=self.valve, tube=self.tube,
-            wall=self.wall, series=self.series,
-        )  # fmt: skip
+        """Return the plant with the substituted components."""
+        parts = dict(self.parts)
+        if "braid_angle" in parts:
+            parameters = parameters.with_value("braid_angle", parts.pop("braid_angle"))
+        return plant(parameters, hanging_load(parameters), **parts)
 
 
-PRINTED = Substitution("as printed", "isothermal gas, constant spring, rigid wall, no line")
+PRINTED = Substitution("as printed", "isothermal gas, constant spring, rigid wall, no line", {})
 CAUSES = ("line", "flow law", "heat transfer", "spring", "volume", "gas law")
 COMBINED = "combined"
 
@@ -103,36 +102,35 @@ def substitutions(parameters: UnpublishedParameters, suspected: SuspectedCauses)
     laminar = dataclasses.replace(MATRIX, laminar_ratio=s.laminar_ratio.value)
     hardening = am.physics.CubicSpring(stiffness, s.hardening.value)
     wall = am.physics.ViscoelasticWall(s.wall_compliance.value, s.wall_time_constant.value)
+    fittings = am.physics.Tube(am.Valve(100.0 * MATRIX.conductance, 0.5), dead)  # with a wide opening to the muscle
     angles = parameters.braid_angle
     return (
-        Substitution("line", "volume and resistance", tube=lumped),
-        Substitution("line", "with inertia, 10 segments", tube=am.physics.DistributedTube(length, diameter, 10)),
-        Substitution("line", "pressure measured at the valve", tube=lumped, pressure_column="tube.pressure"),
-        Substitution("flow law", rf"\(b = {s.critical_ratio.value:g}\)", valve=critical),
-        Substitution("flow law", rf"\(m = {s.index.value:g}\)", valve=indexed),
-        Substitution("flow law", f"laminar above {s.laminar_ratio.value:g}", valve=laminar),
-        *(Substitution("heat transfer", rf"first law, \(hA = {value:g}\) W/K", gas=am.physics.EnergyBalance(value))
-          for value in (s.heat_transfer.low, s.heat_transfer.value, s.heat_transfer.high)),
-        Substitution("heat transfer", "first law, adiabatic", gas=am.physics.EnergyBalance(0.0)),
-        Substitution("heat transfer", r"polytropic, \(n = 1.2\)", gas=am.Polytropic(1.2)),
-        Substitution("spring", "no spring", spring=am.LinearSpring(0.0)),
-        Substitution("spring", "three times the stiffness", spring=am.LinearSpring(3.0 * stiffness)),
-        Substitution("spring", "hardening spring", spring=hardening),
-        Substitution("spring", "nonlinear series spring", series=series),
-        Substitution("volume", f"braid angle {angles.low:g} rad", braid_angle=angles.low),
-        Substitution("volume", f"braid angle {angles.high:g} rad", braid_angle=angles.high),
-        Substitution("volume", "viscoelastic wall", wall=wall),
-        Substitution("volume", f"fittings of {dead * 1e6:g} cm³", tube=_dead_volume(dead)),
-        Substitution("gas law", "second virial coefficient of air", gas=am.physics.VirialGas()),
-        Substitution("gas law", r"volume flow of (11), \(P_0 Q\)", valve=MATRIX_BY_VOLUME),
-        Substitution(COMBINED, r"line, \(b\), first law, spring, wall", heat, hardening, wall,
-                     critical, dataclasses.replace(lumped, gas=heat)),
+        Substitution("line", "volume and resistance", {"tube": lumped}),
+        Substitution("line", "with inertia, 10 segments", {"tube": am.physics.DistributedTube(length, diameter, 10)}),
+        Substitution("line", "pressure measured at the valve", {"tube": lumped}, "line_length", "tube.pressure"),
+        Substitution("flow law", rf"\(b = {s.critical_ratio.value:g}\)", {"valve": critical}, "critical_ratio"),
+        Substitution("flow law", rf"\(m = {s.index.value:g}\)", {"valve": indexed}, "index"),
+        Substitution("flow law", f"laminar above {s.laminar_ratio.value:g}", {"valve": laminar}, "laminar_ratio"),
+        *(Substitution("heat transfer", rf"first law, \(hA = {value:g}\) W/K",
+                       {"gas": am.physics.EnergyBalance(value)}, varied)
+          for value, varied in ((s.heat_transfer.low, ""), (s.heat_transfer.value, "heat_transfer"),
+                                (s.heat_transfer.high, ""))),
+        Substitution("heat transfer", "first law, adiabatic", {"gas": am.physics.EnergyBalance(0.0)}),
+        Substitution("heat transfer", r"polytropic, \(n = 1.2\)", {"gas": am.Polytropic(1.2)}),
+        Substitution("spring", "no spring", {"spring": am.LinearSpring(0.0)}),
+        Substitution("spring", "three times the stiffness", {"spring": am.LinearSpring(3.0 * stiffness)}),
+        Substitution("spring", "hardening spring", {"spring": hardening}),
+        Substitution("spring", "nonlinear series spring", {"series": series}, "series_stiffness"),
+        Substitution("volume", f"braid angle {angles.low:g} rad", {"braid_angle": angles.low}),
+        Substitution("volume", f"braid angle {angles.high:g} rad", {"braid_angle": angles.high}),
+        Substitution("volume", "viscoelastic wall", {"wall": wall}),
+        Substitution("volume", f"fittings of {dead * 1e6:g} cm³", {"tube": fittings}),
+        Substitution("gas law", "second virial coefficient of air", {"gas": am.physics.VirialGas()}),
+        Substitution("gas law", r"volume flow of (11), \(P_0 Q\)", {"valve": MATRIX_BY_VOLUME}),
+        Substitution(COMBINED, r"line, \(b\), first law, spring, wall",
+                     {"gas": heat, "spring": hardening, "wall": wall, "valve": critical,
+                      "tube": dataclasses.replace(lumped, gas=heat)}),
     )  # fmt: skip
-
-
-def _dead_volume(volume: float) -> am.physics.Tube:
-    """Return a volume with a wide opening to the muscle: a hundred times the conductance of the valve."""
-    return am.physics.Tube(am.Valve(100.0 * MATRIX.conductance, 0.5), volume)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -167,16 +165,13 @@ def run_fill_of(substitution: Substitution, parameters: UnpublishedParameters) -
 
 def effect_of(base: am.Recording, substitution: Substitution, run: am.Recording) -> Effect:
     """Return the changes of a run with a substituted component relative to that of the printed plant."""
-    pressure, contraction = (
-        run[substitution.pressure_column] - base["pressure"],
-        run["contraction"] - base["contraction"],
-    )
-    delays = [
-        _response_time(run["time"], run[substitution.pressure_column], *phase)
-        - _response_time(base["time"], base["pressure"], *phase)
+    time, pressure, contraction = base["time"], run[substitution.pressure_column], run["contraction"]
+    filling, discharging = (
+        _response_time(run["time"], pressure, *phase) - _response_time(time, base["pressure"], *phase)
         for phase in (FILLING, DISCHARGING)
-    ]
-    return Effect(substitution, base["time"], pressure, contraction, (delays[0], delays[1]))
+    )
+    changes = pressure - base["pressure"], contraction - base["contraction"]
+    return Effect(substitution, time, *changes, (filling, discharging))
 
 
 def _response_time(time: Array, pressure: Array, begin: float, end: float) -> float:
@@ -193,9 +188,8 @@ def effect_table(effects: tuple[Effect, ...]) -> Table:
                                      "substituted component": [e.substitution.component for e in effects]}  # fmt: skip
     for column, unit, size in (("pressure", "kPa", 1e3), ("contraction", "% of length", 0.01)):
         for phase_name, phase in phases:
-            columns[f"{column}, {phase_name}: largest change [{unit}]"] = [
-                _round(e.largest(column, phase) / size) for e in effects
-            ]
+            heading = f"{column}, {phase_name}: largest change [{unit}]"
+            columns[heading] = [_round(e.largest(column, phase) / size) for e in effects]
     for i, (phase_name, _) in enumerate(phases):
         columns[f"{phase_name}: delay at 90 % [ms]"] = [_round(round(e.delays[i] * 1e3, 3)) for e in effects]
     columns["pressure, ratio of filling to discharging [1]"] = [_round(fill_discharge_ratio(e)) for e in effects]

@@ -102,24 +102,20 @@ def muscle(
 ) -> am.Muscle:
     """Return the Hill muscle of equation (1)."""
     braid = am.geometry.Braid(0.010, parameters.braid_angle.value, parameters.length.value)
-    return am.Muscle(
-        surface(data),
-        braid,
-        spring or am.LinearSpring(parameters.stiffness.value),
-        am.LinearDamper(parameters.damping.value),
-    )
+    stiffness, damper = parameters.stiffness.value, am.LinearDamper(parameters.damping.value)
+    return am.Muscle(surface(data), braid, spring or am.LinearSpring(stiffness), damper)
 
 
 def plant(
     parameters: UnpublishedParameters,
     mechanism: am.Mechanism,
     *,
-    gas: am.physics.Gas | None = None,
+    gas: am.physics.Gas = am.Isothermal(),
     spring: am.physics.Spring | None = None,
-    wall: am.physics.Wall | None = None,
+    wall: am.physics.Wall = am.physics.RigidWall(),
     valve: am.physics.Orifice = MATRIX,
     tube: am.physics.TubeModel | None = None,
-    series: am.physics.SeriesElement | None = None,
+    series: am.physics.SeriesElement = am.physics.RigidSeriesElement(),
     data: str = FORCE_MAPS[0],
 ) -> am.Plant:
     """Return the plant: muscle, two valves with closed centre, load and gas.
@@ -127,13 +123,9 @@ def plant(
     The defaults are those of the paper: isothermal gas, rigid wall, no line, no series spring.
     """
     valves = am.FillDischarge(am.Supply(SUPPLY_PRESSURE), valve, valve)
-    actuator = dataclasses.replace(
-        muscle(parameters, data, spring),
-        wall=wall or am.physics.RigidWall(),
-        series=series or am.physics.RigidSeriesElement(),
-    )
+    actuator = dataclasses.replace(muscle(parameters, data, spring), wall=wall, series=series)
     circuit = valves if tube is None else am.physics.WithTubes(valves, tube)
-    return am.Plant(actuator, circuit, mechanism, gas or am.Isothermal(), am.Ambient())
+    return am.Plant(actuator, circuit, mechanism, gas, am.Ambient())
 
 
 def hanging_load(parameters: UnpublishedParameters) -> am.HangingMass:

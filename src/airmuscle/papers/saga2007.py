@@ -87,43 +87,33 @@ def tables() -> tuple[Table, ...]:
 
 def interpretation_table() -> Table:
     """Return the pressures of every interpretation at three loads."""
-    rows = [(name, force, law) for name, law in INTERPRETATIONS.items() for force in (0.0, 100.0, 200.0)]
-    columns: dict[str, Any] = {"interpretation": [r[0] for r in rows], "load [N]": [r[1] for r in rows]}
-    for c in CONTRACTIONS:
-        columns[f"pressure at {100 * c:g} % [MPa]"] = [
-            round(law.equilibrium_pressure(c, f) / 1e6, 4) for _, f, law in rows
-        ]
+    rows = [(name, force, np.array([law.equilibrium_pressure(c, force) for c in CONTRACTIONS]))
+            for name, law in INTERPRETATIONS.items() for force in (0.0, 100.0, 200.0)]  # fmt: skip
     note = (
         r"Without rings. The paper prints \(w = 2\), \(q = 1\); \(M = 5.126\). Exact mechanics: \(w = 1\), "
         r"\(q = 2\), \(M = m/\pi\), rubber along the arc."
     )
-    return Table("saga2007_readings", "Pressure by equation (19) in all interpretations", columns, note)
+    title = "Pressure by equation (19) in all interpretations"
+    options: dict[str, Any] = {"contraction": CONTRACTIONS, "kind": "interpretation", "digits": 4}
+    return saga2007_pairs.pressure_table("saga2007_readings", title, rows, note, **options)
 
 
 def exact_table() -> Table:
     """Return the pressures of the exact meridian and of the circular meridian with virtual work."""
     contraction = saga2007_pairs.CONTRACTIONS
-    rows: list[tuple[str, float, Any]] = []
-    for name, line in LINES.items():
-        for force in (0.0, 100.0, 200.0):
-            rows.append(
-                (f"exact meridian, line {name}", force, pressure_along(exact_meridian(line), contraction, force))
-            )
-            rows.append(
-                (
-                    f"circular meridian, virtual work, line {name}",
-                    force,
-                    circular_meridian(line).pressure(contraction, force),
-                )
-            )
-    columns: dict[str, Any] = {"model": [r[0] for r in rows], "load [N]": [r[1] for r in rows]}
-    for i, c in enumerate(contraction):
-        columns[f"pressure at {100 * c:g} % [MPa]"] = [round(float(r[2][i]) / 1e6, 6) for r in rows]
+    models = {"exact meridian": exact_meridian, "circular meridian, virtual work": circular_meridian}
+    rows = [
+        (f"{model}, line {name}", force, pressure_along(law(line), contraction, force))
+        for name, line in LINES.items()
+        for force in (0.0, 100.0, 200.0)
+        for model, law in models.items()
+    ]
     note = (
         "No value: at 1 % the unloaded tube with line A would be narrower in the middle than at its ends, which the "
         "model does not cover."
     )
-    return Table("saga2007_exact", "Pressure of the exact and of the circular meridian", columns, note)
+    title = "Pressure of the exact and of the circular meridian"
+    return saga2007_pairs.pressure_table("saga2007_exact", title, rows, note)
 
 
 def outline_table() -> Table:
@@ -170,12 +160,9 @@ def virtual_work_table() -> Table:
     for name, law in laws.items():
         columns[f"{name} [N]"] = np.round(law.force(PRESSURE, contraction), 2)
     columns["parabola, virtual work [N]"] = np.round(virtual_work(DEFAULT, PRESSURE, contraction), 2)
-    columns["circular meridian, virtual work [N]"] = np.round(
-        circular_meridian(LINES["B"]).force(PRESSURE, contraction), 2
-    )
-    columns["exact meridian [N]"] = np.round(
-        exact_meridian(LINES["B"]).shape_at_pressure(PRESSURE, contraction).force, 2
-    )
+    circle, exact = circular_meridian(LINES["B"]), exact_meridian(LINES["B"])
+    columns["circular meridian, virtual work [N]"] = np.round(circle.force(PRESSURE, contraction), 2)
+    columns["exact meridian [N]"] = np.round(exact.shape_at_pressure(PRESSURE, contraction).force, 2)
     note = (
         "At 0.11 MPa. A negative tension is a push; no value: there is no outline. A balance that differs from the "
         "virtual work of its own outline generates or dissipates energy on a closed path; the tensions of the circular "

@@ -127,19 +127,9 @@ def lifting(law: am.characteristic.Characteristic) -> tuple[float, str]:
     return 100 * reached, "As a separate maximum, at small contraction, 200 N is reached." * (0 < reached < 0.1)
 
 
-def max_tension() -> float:
-    """Return the tension [N] of inextensible fibres without rubber at 35 % and 0.11 MPa."""
-    return PRESSURE * float(exact_meridian(LINES["A"]).geometry.effective_area(0.35))
-
-
 def initial_pressure(law: am.characteristic.Saga2007) -> float:
     """Return the pressure [Pa] for 1 % contraction without load."""
     return max(law.threshold_pressure, float(law.equilibrium_pressure(0.01, 0.0)))
-
-
-def initial_ratio(law: am.characteristic.Saga2007) -> float:
-    """Return the ratio of the pressures for 1 % and for 10 % contraction without load [1]."""
-    return initial_pressure(law) / float(law.equilibrium_pressure(0.10, 0.0))
 
 
 def ring_ratio(law: am.characteristic.Saga2007, force: float) -> tuple[float, str]:
@@ -151,17 +141,8 @@ def ring_ratio(law: am.characteristic.Saga2007, force: float) -> tuple[float, st
     return min(float(np.min(more / fewer)) for fewer, more in itertools.pairwise(pressures)), note
 
 
-def strain_ratio(law: am.characteristic.Saga2007, force: float) -> Any:
-    """Return the ratio of the rubber strains with two rings and without at 0.11 MPa [1]."""
-    return _strength_ratio(law, force, lambda muscle, c: muscle.middle_strain(c))
-
-
-def tension_ratio(law: am.characteristic.Saga2007, force: float) -> Any:
-    """Return the ratio of the fibre tensions with two rings and without at 0.11 MPa [1]."""
-    return _strength_ratio(law, force, lambda muscle, c: muscle.end_tension(PRESSURE, c, force))
-
-
-def _strength_ratio(law: am.characteristic.Saga2007, force: float, measure: Callable[[Any, float], Any]) -> Any:
+def strength_ratio(law: am.characteristic.Saga2007, force: float, measure: Callable[[Any, float], Any]) -> Any:
+    """Return the ratio of a measure of the load of the muscle with two rings and without at 0.11 MPa [1]."""
     muscles = [with_rings(law, n) for n in (0, 2)]
     try:
         plain, ringed = (float(measure(muscle, float(muscle.contraction(PRESSURE, force)))) for muscle in muscles)
@@ -173,9 +154,8 @@ def _strength_ratio(law: am.characteristic.Saga2007, force: float, measure: Call
 def pressure_error(law: am.characteristic.Saga2007, force: float, low: float, high: float, points: int) -> float:
     """Return the maximum pressure error [%] relative to the exact meridian with the same rubber."""
     exact, at = exact_meridian(law.rubber, law.geometry.rings), np.linspace(low, high, points)
-    return 100 * float(
-        np.max(np.abs(law.equilibrium_pressure(at, force) / exact.shape_at_force(at, force).pressure - 1))
-    )
+    errors = law.equilibrium_pressure(at, force) / exact.shape_at_force(at, force).pressure - 1
+    return 100 * float(np.max(np.abs(errors)))
 
 
 def largest_radius(law: am.characteristic.Saga2007) -> tuple[float, str]:
@@ -198,11 +178,6 @@ def _reaches_target(law: am.characteristic.Saga2007, pressure: float, force: flo
         return abs(float(law.contraction(pressure, force)) - target) < 1e-9
     except SolveError:
         return False
-
-
-def max_pressure(law: am.characteristic.Saga2007, force: float) -> float:
-    """Return the maximum pressure [MPa] of the formula from 0 to 40 %."""
-    return float(np.max(law.equilibrium_pressure(np.linspace(0.0, 0.4, 81), force))) / 1e6
 
 
 def tension(law: Law, pressure: float, contraction: np.ndarray | float) -> np.ndarray:

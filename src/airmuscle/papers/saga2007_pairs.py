@@ -5,6 +5,7 @@ closures. The previous model, Ferraresi et al. 2001, is the circle with the bala
 """
 
 import functools
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -131,6 +132,17 @@ def errors(rubber: am.characteristic.RubberLine, force: float, contraction: Arra
     """
     reference = np.asarray(exact_meridian(rubber).shape_at_force(contraction, force).pressure)
     return {pair: value / reference - 1 for pair, value in pressures(rubber, force, contraction).items()}
+
+
+def pressure_table(
+    name: str, title: str, rows: Sequence[tuple[str, float, Array]], note: str, contraction: Array = CONTRACTIONS,
+    kind: str = "model", digits: int = 6,
+) -> Table:  # fmt: skip
+    """Return a table of pressures [Pa] over contraction by model and load [N]."""
+    columns: dict[str, list[Any]] = {kind: [r[0] for r in rows], "load [N]": [r[1] for r in rows]}
+    for i, c in enumerate(contraction):
+        columns[f"pressure at {100 * c:g} % [MPa]"] = [round(float(r[2][i]) / 1e6, digits) for r in rows]
+    return Table(name, title, columns, note)
 
 
 def tables() -> tuple[Table, ...]:

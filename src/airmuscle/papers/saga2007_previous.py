@@ -172,15 +172,13 @@ def previous_model_table() -> Table:
                          narrow.pressure(contraction, force)))  # fmt: skip
             exact = np.asarray(exact_meridian(line).shape_at_force(contraction, force).pressure)
             rows.append((f"exact meridian, line {name}", force, exact))
-    columns: dict[str, Any] = {"model": [r[0] for r in rows], "load [N]": [r[1] for r in rows]}
-    for i, c in enumerate(contraction):
-        columns[f"pressure at {100 * c:g} % [MPa]"] = [round(float(r[2][i]) / 1e6, 6) for r in rows]
     note = (
         r"The printed sum over the fibres is \(\cot(\pi/N)\) = 5.027 for 16 fibres; evenly distributed fibres give "
         r"\(N/\pi\) = 5.093. The initial radius is that of the ends unless stated (chosen: it is not printed for this "
         "muscle). No value: no exact outline (line A without load at 1 %)."
     )
-    return Table("saga2007_previous", "Previous model: circular meridian with equations (A) and (B)", columns, note)
+    title = "Previous model: circular meridian with equations (A) and (B)"
+    return pairs.pressure_table("saga2007_previous", title, rows, note)
 
 
 def previous_model_figure() -> Plot:
