@@ -4,7 +4,6 @@ The server computes no curve and no run: it sends printed programs, which the pa
 """
 
 import collections
-import json
 import threading
 from collections.abc import Callable, Mapping
 from importlib import metadata
@@ -27,6 +26,7 @@ from .security import (
     json_answer,
     limited_body,
     secured,
+    table_of,
 )
 from .tasks import (
     MAX_TEXT,
@@ -86,10 +86,10 @@ class Sheets:
             self._of_library[key] = known["id"]
         return known
 
-    def of_text(self, task: Callable[[str], dict[str, Any]], text: str, limit: float | None = None) -> dict[str, Any]:
-        """The sheet that a task makes of a text, within a limit of time [s], by default TIME_LIMIT."""
+    def of_text(self, task: Callable[[str], dict[str, Any]], text: str, limit: float = TIME_LIMIT) -> dict[str, Any]:
+        """The sheet that a task makes of a text, within a limit of time [s]."""
         pool = self._long_pool if task in LONG_TASKS else self._pool
-        return self.keep(pool.call(task, text, limit=TIME_LIMIT if limit is None else limit))
+        return self.keep(pool.call(task, text, limit=limit))
 
     def keep(self, sheet: dict[str, Any]) -> dict[str, Any]:
         """The sheet, which is kept."""
@@ -203,7 +203,7 @@ class Handlers:
 
         return handle
 
-    def of_text(self, task: Callable[[str], dict[str, Any]], limit: float | None = None) -> Callable[[Any], Any]:
+    def of_text(self, task: Callable[[str], dict[str, Any]], limit: float = TIME_LIMIT) -> Callable[[Any], Any]:
         """The handler of the sheets that a task makes of texts of users."""
 
         async def handle(request: Any) -> Any:
@@ -231,18 +231,13 @@ class Handlers:
 
 def read_page_request(text: str) -> dict[str, Any]:
     """The identifiers of sheets and the state in a request for a page, without that of fits. Raises BadRequest."""
-    try:
-        wanted = json.loads(text)
-    except (ValueError, RecursionError):
-        raise BadRequest("the request is not JSON.") from None
-    if not isinstance(wanted, dict) or not isinstance(wanted.get("state"), dict):
-        raise BadRequest("the request must contain sheets and a state.")
-    names = wanted.get("sheets")
-    if not isinstance(names, list) or not all(isinstance(name, str) for name in names):
-        raise BadRequest("sheets must be a list of identifiers.")
+    wanted = table_of(text)
+    names, state = wanted.get("sheets"), wanted.get("state")
+    if not isinstance(state, dict) or not isinstance(names, list) or not all(isinstance(name, str) for name in names):
+        raise BadRequest("the request must contain sheets, a list of identifiers, and a state.")
     if not 1 <= len(names) <= MAX_PAGE_SHEETS:
         raise BadRequest(f"{len(names)} sheets are requested; allowed range: 1 to {MAX_PAGE_SHEETS}.")
-    return {"sheets": names, "state": {name: state for name, state in wanted["state"].items() if name != "fit"}}
+    return {"sheets": names, "state": {name: state for name, state in state.items() if name != "fit"}}
 
 
 def _without_script(sheet: Mapping[str, Any]) -> dict[str, Any]:

@@ -13,7 +13,6 @@ GET  /api/fit/task/ID/FILE            result.json, report.html, muscle.toml, rep
 
 import collections
 import dataclasses
-import json
 import secrets
 import shutil
 import threading
@@ -28,8 +27,8 @@ from .fit_settings import FitSettings, read_settings
 from .fit_sheet import sheet_of_files
 from .fit_task import DOWNLOADS, RESULT, run_fit
 from .fit_uploads import UploadStore, check_file_name
-from .security import BadRequest, decoded, json_answer, limited_body
-from .worker import LimitedWorker, LimitError
+from .security import BadRequest, decoded, json_answer, limited_body, table_of
+from .worker import LimitedWorker
 
 MAX_SETTINGS = 256 * 1024
 """Largest size of the settings [bytes] (chosen)."""
@@ -70,7 +69,6 @@ class FitQueue:
     ) -> None:
         self._task, self._count, self._make_worker = task, count, make_worker
         self._tasks: collections.OrderedDict[str, FitTask] = collections.OrderedDict()
-        self._waiting: collections.deque[FitTask] = collections.deque()
         self._running: dict[str, Any] = {}
         self._threads: list[threading.Thread] = []
         self._changed = threading.Condition()
@@ -84,11 +82,10 @@ class FitQueue:
         identifier = secrets.token_urlsafe(16)
         out = folder / "tasks" / identifier
         with self._changed:
-            if len(self._waiting) >= MAX_WAITING:
+            if len(self._in(WAITING)) >= MAX_WAITING:
                 raise BadRequest(f"{MAX_WAITING} fits wait already; try again later.", 503)
             task = FitTask(identifier, set_name, out, (str(folder), str(out), *arguments))
             self._tasks[identifier] = task
-            self._waiting.append(task)
             self._forget_old()
             if len(self._threads) < self._count:
                 thread = threading.Thread(target=self._serve, name="airmuscle studio fit", daemon=True)
@@ -97,10 +94,13 @@ class FitQueue:
             self._changed.notify()
         return identifier
 
+    def _in(self, *states: str) -> list[FitTask]:
+        """The tasks in these states, in the order of their arrival."""
+        return [task for task in list(self._tasks.values()) if task.state in states]
+
     def _forget_old(self) -> None:
-        ended = [name for name, task in self._tasks.items() if task.state not in (WAITING, RUNNING)]
-        for name in ended[: max(0, len(self._tasks) - MAX_TASKS)]:
-            shutil.rmtree(self._tasks.pop(name).folder, ignore_errors=True)
+        for task in self._in(DONE, FAILED, CANCELLED)[: max(0, len(self._tasks) - MAX_TASKS)]:
+            shutil.rmtree(self._tasks.pop(task.identifier).folder, ignore_errors=True)
 
     def find(self, identifier: str) -> FitTask:
         """A task. Raises BadRequest if it is not kept."""
@@ -113,20 +113,19 @@ class FitQueue:
         """State, progress and error of a task, and the number of fits before it."""
         task = self.find(identifier)
         with self._changed:
-            before = self._waiting.index(task) if task in self._waiting else 0
+            waiting = self._in(WAITING)
+            before = waiting.index(task) if task in waiting else 0
         keys = ("state", "fraction", "text", "error", "field")
         return {**{key: getattr(task, key) for key in keys}, "before": before}
 
     def is_needed(self, set_name: str) -> bool:
         """Whether a task of a set waits or runs."""
-        return any(t.set_name == set_name and t.state in (WAITING, RUNNING) for t in list(self._tasks.values()))
+        return any(task.set_name == set_name for task in self._in(WAITING, RUNNING))
 
     def cancel(self, identifier: str) -> None:
         """End a task that waits or runs; its result is not written."""
         task = self.find(identifier)
         with self._changed:
-            if task.state == WAITING:
-                self._waiting.remove(task)
             if task.state in (WAITING, RUNNING):
                 task.state = CANCELLED
             worker = self._running.get(identifier)
@@ -137,7 +136,6 @@ class FitQueue:
         """End all tasks and processes."""
         with self._changed:
             self._stopped = True
-            self._waiting.clear()
             workers = list(self._running.values())
             self._changed.notify_all()
         for worker in workers:
@@ -155,11 +153,10 @@ class FitQueue:
 
     def _next(self, worker: Any) -> FitTask | None:
         with self._changed:
-            while not self._waiting and not self._stopped:
-                self._changed.wait()
+            self._changed.wait_for(lambda: self._stopped or self._in(WAITING))
             if self._stopped:
                 return None
-            task = self._waiting.popleft()
+            task = self._in(WAITING)[0]
             task.state = RUNNING
             self._running[task.identifier] = worker
             return task
@@ -173,8 +170,6 @@ class FitQueue:
         state, error, field = DONE, "", ""
         try:
             worker.call(self._task, task.arguments, TIME_LIMIT, report)
-        except LimitError as reason:
-            state, error = FAILED, str(reason)
         except AirmuscleError as reason:
             state, error = FAILED, str(reason)
             field = reason.field if isinstance(reason, RequestError) else ""
@@ -267,9 +262,8 @@ class FitService:
 def _settings(wanted: dict[str, Any]) -> FitSettings | ArmSettings:
     """The settings of measurement files of a muscle, or of episodes of an arm."""
     given = wanted.get("settings", {})
-    return (
-        read_arm_settings(given) if isinstance(given, dict) and given.get("record") == "arm" else read_settings(given)
-    )
+    is_arm = isinstance(given, dict) and given.get("record") == "arm"
+    return read_arm_settings(given) if is_arm else read_settings(given)
 
 
 def _name(wanted: dict[str, Any], key: str) -> str:
@@ -281,10 +275,4 @@ def _name(wanted: dict[str, Any], key: str) -> str:
 
 async def _content(request: Any) -> dict[str, Any]:
     """The table in the body of a request. Raises BadRequest."""
-    try:
-        content = json.loads(decoded(await limited_body(request, MAX_SETTINGS)))
-    except (ValueError, RecursionError):
-        raise BadRequest("the request is not JSON.") from None
-    if not isinstance(content, dict):
-        raise BadRequest("the request must be a table.")
-    return content
+    return table_of(decoded(await limited_body(request, MAX_SETTINGS)))

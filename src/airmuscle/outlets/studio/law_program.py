@@ -48,7 +48,8 @@ def print_law(law: am.characteristic.Characteristic, geometry: am.geometry.Geome
     Parameters are the leaves of the law, then those of the geometry unless it is part of the law. Raises TraceError
     for a law without a closed form.
     """
-    (model, shape), p = _symbols(law, geometry)
+    model, p = autodiff.symbolic(parameter_model(law, geometry))
+    model, shape = law_and_geometry(model, geometry)
     printer, names = Printer(JavaScriptLanguage(exported=False)), []
     for name, inputs, outputs in _functions(model, shape):
         printer.add(name, {**inputs, "p": p}, {"f": outputs})
@@ -58,14 +59,14 @@ def print_law(law: am.characteristic.Characteristic, geometry: am.geometry.Geome
     return LawProgram(printer.module(), tuple(names), printer.held, tuple(map(float, _limits(law))))
 
 
-def _symbols(
-    law: am.characteristic.Characteristic, geometry: am.geometry.Geometry | None
-) -> tuple[tuple[Any, Any], Any]:
-    """The law and its geometry with symbols, and the vector of these."""
-    if geometry is None or geometry == getattr(law, "geometry", None):
-        model, p = autodiff.symbolic(law)
-        return (model, None if geometry is None else model.geometry), p
-    return autodiff.symbolic((law, geometry))
+def parameter_model(law: am.characteristic.Characteristic, geometry: am.geometry.Geometry | None) -> Any:
+    """What has the parameters of the page as leaves: the law, or the pair with a geometry that is not part of it."""
+    return law if geometry is None or geometry == getattr(law, "geometry", None) else (law, geometry)
+
+
+def law_and_geometry(model: Any, geometry: am.geometry.Geometry | None) -> tuple[Any, Any]:
+    """The law and its geometry in what `parameter_model` has made of them."""
+    return model if isinstance(model, tuple) else (model, None if geometry is None else model.geometry)
 
 
 def _functions(model: Any, shape: Any) -> list[tuple[str, dict[str, Any], Any]]:

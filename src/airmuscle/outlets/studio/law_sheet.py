@@ -17,11 +17,12 @@ import numpy as np
 
 import airmuscle as am
 
-from ...core import Leaf, ParameterError, TraceError, cite, conversion, leaves, tree
+from ...core import Array, Leaf, ParameterError, TraceError, cite, conversion, leaves, tree
 from ...files.library import Entry, to_toml
 from ...physics.muscle.characteristic.validity_range import validity_range_of
 from ...physics.muscle.geometry.straight_fibre import FibreTube
-from .law_program import print_law
+from ..export.targets import FORMS
+from .law_program import law_and_geometry, parameter_model, print_law
 
 _FIRST = 7.0e250
 """The first of the marks: numbers that no file contains."""
@@ -49,13 +50,6 @@ def law_sheet(entry: Entry) -> dict[str, Any]:
     law, errors = _in_closed_form(entry)
     geometry = entry.geometry
     program = print_law(law, geometry)
-    kind = (
-        "force"
-        if isinstance(law, am.characteristic.ForceLaw)
-        else "contraction"
-        if isinstance(law, am.characteristic.ContractionLaw)
-        else "pressure"
-    )
     rows = _parameter_leaves(law, geometry)
     limits = validity_range_of(law, entry.validity_range)
     sheet: dict[str, Any] = {
@@ -66,7 +60,7 @@ def law_sheet(entry: Entry) -> dict[str, Any]:
         "warning": entry.warning,
         "law": type(entry.characteristic).__name__,
         "formula": (type(entry.characteristic).__doc__ or "").strip().partition("\n")[0],
-        "kind": kind,
+        "kind": next(method for kind, method, *_ in FORMS if isinstance(law, kind)),
         "functions": list(program.functions),
         "held": program.held,
         "limits": list(program.limits),
@@ -116,7 +110,7 @@ def _parameter_leaves(
 ) -> list[tuple[str, Leaf]]:
     """The parameters in the order of the program, each with its path in the file of the entry."""
     rows = [(f"characteristic.{leaf.path}", leaf) for leaf in leaves(law)]
-    if geometry is not None and geometry != getattr(law, "geometry", None):
+    if parameter_model(law, geometry) is not law:
         rows += [(f"geometry.{leaf.path}", leaf) for leaf in leaves(geometry)]
     return rows
 
@@ -162,14 +156,18 @@ def _geometry_sheet(geometry: am.geometry.Geometry, printed: bool) -> dict[str, 
     sheet = {"model": type(geometry).__name__, "segments": segments, "range": [float(low), float(high)]}
     if printed:
         return sheet
-    contractions = np.linspace(max(low, -0.05), min(high, 0.6), OUTLINE_CONTRACTIONS)
-    outlines = [geometry.outline(float(c), OUTLINE_POINTS) for c in contractions]
-    return {
-        **sheet,
-        "contractions": contractions.tolist(),
-        "axial": [axial.tolist() for axial, _ in outlines],
-        "radius": [radius.tolist() for _, radius in outlines],
-    }
+    return {**sheet, **sampled_outline(geometry, np.linspace(max(low, -0.05), min(high, 0.6), OUTLINE_CONTRACTIONS))}
+
+
+def sampled_outline(
+    geometry: am.geometry.Geometry, contractions: Array, points: int = OUTLINE_POINTS, decimals: int | None = None
+) -> dict[str, Any]:
+    """Axial positions and radii of an outline at contractions (n,), rounded to decimals if given."""
+    outlines = [geometry.outline(float(c), points) for c in contractions]
+    if decimals is not None:
+        outlines = [(np.round(axial, decimals), np.round(radius, decimals)) for axial, radius in outlines]
+    axial, radius = ([each[i].tolist() for each in outlines] for i in (0, 1))
+    return {"contractions": contractions.tolist(), "axial": axial, "radius": radius}
 
 
 def _toml(entry: Entry, fixed: bool) -> dict[str, Any]:
@@ -190,26 +188,16 @@ def _toml(entry: Entry, fixed: bool) -> dict[str, Any]:
 
 
 def _changed_template(entry: Entry) -> Template:
-    law, geometry = entry.characteristic, entry.geometry
-    if geometry is None or geometry == getattr(law, "geometry", None):
-        count = sum(1 for _ in leaves(law))
+    def write(model: Any) -> str:
+        law, geometry = law_and_geometry(model, entry.geometry)
+        return to_toml(dataclasses.replace(entry, characteristic=law, geometry=geometry))
 
-        def write(model: Any) -> str:
-            own = None if geometry is None else model.geometry
-            return to_toml(dataclasses.replace(entry, characteristic=model, geometry=own))
-
-        return toml_template(write, law, count)
-    both = (law, geometry)
-    return toml_template(
-        lambda pair: to_toml(dataclasses.replace(entry, characteristic=pair[0], geometry=pair[1])),
-        both,
-        sum(1 for _ in leaves(both)),
-    )
+    return toml_template(write, parameter_model(entry.characteristic, entry.geometry))
 
 
-def toml_template(write: Callable[[Any], str], model: Any, count: int) -> Template:
-    """The template of the text that `write` makes of a model with `count` leaves. Raises ParameterError."""
-    marks = [_FIRST + i * _STEP for i in range(count)]
+def toml_template(write: Callable[[Any], str], model: Any) -> Template:
+    """The template of the text that `write` makes of a model, with a place for each leaf. Raises ParameterError."""
+    marks = [_FIRST + i * _STEP for i, _ in enumerate(leaves(model))]
     place = {repr(mark): i for i, mark in enumerate(marks)}
     text = write(tree.unflatten(model, marks))
     template: Template = []
@@ -218,7 +206,7 @@ def toml_template(write: Callable[[Any], str], model: Any, count: int) -> Templa
         template += [text[end : match.start()], place[match.group()]]
         end = match.end()
     template.append(text[end:])
-    missing = set(range(count)) - {item for item in template if isinstance(item, int)}
+    missing = set(range(len(marks))) - {item for item in template if isinstance(item, int)}
     if missing:
         raise ParameterError(f"{type(model).__name__}: {len(missing)} parameters do not appear in its file.")
     return template

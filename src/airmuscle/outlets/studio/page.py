@@ -16,41 +16,12 @@ MAX_PAGE_SHEETS = 12
 """Maximum number of muscles and plants in a self-contained page (chosen)."""
 MAX_MUSCLES = 6
 """Maximum number of muscles in one chart (chosen)."""
-SCRIPTS = (
-    "vendor/uPlot.iife.min.js",
-    "scripts/numbers.js",
-    "scripts/roots.js",
-    "scripts/law.js",
-    "scripts/elements.js",
-    "scripts/source.js",
-    "scripts/figure.js",
-    "scripts/chart.js",
-    "scripts/outline.js",
-    "scripts/parameters.js",
-    "scripts/muscle-chart.js",
-    "scripts/muscle-point.js",
-    "scripts/muscle-tab.js",
-    "scripts/plant-start.js",
-    "scripts/plant-run.js",
-    "scripts/plant-drawing.js",
-    "scripts/plant-traces.js",
-    "scripts/plant-tab.js",
-    "scripts/fit-source.js",
-    "scripts/fit-scatter.js",
-    "scripts/fit-data.js",
-    "scripts/fit-arm.js",
-    "scripts/fit-files.js",
-    "scripts/fit-result.js",
-    "scripts/fit-tab.js",
-    "scripts/joint-loop.js",
-    "scripts/joint-statics.js",
-    "scripts/joint-linear.js",
-    "scripts/joint-drawing.js",
-    "scripts/joint-charts.js",
-    "scripts/joint-tab.js",
-    "scripts/size-tab.js",
-    "scripts/main.js",
-)
+_NAMES = """
+    numbers roots law elements source figure chart outline parameters muscle-chart muscle-point muscle-tab
+    plant-start plant-run plant-drawing plant-traces plant-tab fit-source fit-scatter fit-data fit-arm fit-files
+    fit-result fit-tab joint-loop joint-statics joint-linear joint-drawing joint-charts joint-tab size-tab main
+"""
+SCRIPTS = ("vendor/uPlot.iife.min.js", *(f"scripts/{name}.js" for name in _NAMES.split()))
 """Scripts in the order in which the page runs them."""
 STYLES = ("vendor/uPlot.min.css", "style.css", "fit.css")
 SERVER_ONLY = ("scripts/fit-", "fit.css")
@@ -94,12 +65,8 @@ def self_contained_page(sheets: Sequence[Mapping[str, Any]], state: Mapping[str,
         f"default-src 'none'; script-src {' '.join(map(_digest, scripts))}; "
         f"style-src {' '.join(map(_digest, styles))}; img-src data: blob:; base-uri 'none'; form-action 'none'"
     )
-    head = "\n".join(
-        [
-            f'<meta http-equiv="Content-Security-Policy" content="{policy}">',
-            *(f"<style>{text}</style>" for text in styles),
-        ]
-    )
+    head = f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
+    head += "\n".join(f"<style>{text}</style>" for text in styles)
     licence = web_file(LICENCE).replace("--", "- -")
     comment = f"<!--\nuPlot, in the first script, is used under this licence:\n\n{licence}\n-->"
     body = f'<script type="application/json" id="embedded">{embedded}</script>\n'
@@ -124,20 +91,14 @@ def open_sheets(names: Sequence[str]) -> tuple[dict[str, Any], ...]:
 
 def first_state(sheets: Sequence[dict[str, Any]]) -> dict[str, Any]:
     """The state of a page that begins with these sheets."""
-    laws = [sheet for sheet in sheets if "plant" not in sheet]
-    muscles = [_named(sheet) | {"values": {}} for sheet in laws]
-    plants = [sheet for sheet in sheets if "plant" in sheet]
-    plant = _named(plants[0]) if plants else {"name": ""}
+    named = [{"text": sheet["own_text"]} if sheet.get("own_text") else {"name": sheet["name"]} for sheet in sheets]
+    muscles = [{**name, "values": {}} for name, sheet in zip(named, sheets, strict=True) if "plant" not in sheet]
+    plants = [name for name, sheet in zip(named, sheets, strict=True) if "plant" in sheet]
     return {
         "tab": "muscle" if muscles else "plant",
         "muscle": {"muscles": muscles[:MAX_MUSCLES], "active": 0},
-        "plant": plant,
+        "plant": plants[0] if plants else {"name": ""},
     }
-
-
-def _named(sheet: dict[str, Any]) -> dict[str, Any]:
-    """What the state of a page contains of a sheet: the text of a file, or a name of the library."""
-    return {"text": sheet["own_text"]} if sheet.get("own_text") else {"name": sheet["name"]}
 
 
 def export_page(names: Sequence[str], path: str | Path) -> Path:

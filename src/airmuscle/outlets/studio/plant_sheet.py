@@ -18,7 +18,7 @@ from ...files.scenario.scenario import TABLES, Scenario, build_scenario, initial
 from ...recording.columns import display_scale
 from ...report.formatting import format_number
 from ..export.write import make_run
-from .law_sheet import parameter_row, script_text, toml_template
+from .law_sheet import parameter_row, sampled_outline, script_text, toml_template
 
 NAMES = (
     "states", "inputs", "outputs", "run", "Solver", "prepare", "outputsOf", "SIZES",
@@ -146,17 +146,10 @@ def _muscle_row(plant: am.Plant, index: int) -> dict[str, Any]:
     start = "muscle" if not isinstance(plant.muscle, tuple) else f"muscle[{index}]"
     ends = (f"{start}.geometry.resting_length", f"{start}.contractile.geometry.resting_length")
     length = next((paths.index(path) for path in ends if path in paths), None)
-    value = float(muscle.geometry.resting_length)
-    return {"name": muscle.name, "prefix": prefix, "length_index": length, "length": value,
-            "outline": _sampled_outline(muscle.geometry)}  # fmt: skip
-
-
-def _sampled_outline(geometry: am.geometry.Geometry) -> dict[str, Any]:
-    low, high = (float(limit) for limit in geometry.contraction_range)
+    value, (low, high) = float(muscle.geometry.resting_length), map(float, muscle.geometry.contraction_range)
     grid = np.linspace(max(low, -0.05), min(high, 0.45), OUTLINE_CONTRACTIONS)
-    outlines = [geometry.outline(float(c), OUTLINE_POINTS) for c in grid]
-    rounded = [[np.round(values, 6).tolist() for values in pair] for pair in outlines]
-    return {"contractions": grid.tolist(), "axial": [a for a, _ in rounded], "radius": [r for _, r in rounded]}
+    return {"name": muscle.name, "prefix": prefix, "length_index": length, "length": value,
+            "outline": sampled_outline(muscle.geometry, grid, OUTLINE_POINTS, 6)}  # fmt: skip
 
 
 def _mechanism_row(plant: am.Plant) -> dict[str, Any]:
@@ -217,9 +210,8 @@ def svg_uri(figure: Any) -> str:
 
 def _toml(scenario: Scenario, tables: Mapping[str, Any]) -> dict[str, Any]:
     """Parts of the scenario file: the plant with places for its parameters, input and run as they are."""
-    plant = scenario.plant
     return {
-        "plant": toml_template(lambda model: part_toml("plant", model), plant, sum(1 for _ in leaves(plant))),
+        "plant": toml_template(lambda model: part_toml("plant", model), scenario.plant),
         "input": tables_toml({"input": tables.get("input", {})}),
         "run": tables_toml({"run": tables["run"]}),
     }

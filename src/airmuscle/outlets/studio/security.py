@@ -10,6 +10,7 @@ no use.
 
 import dataclasses
 import ipaddress
+import json
 import secrets
 from collections.abc import Awaitable, Callable, Mapping, MutableMapping
 from http.cookies import CookieError, SimpleCookie
@@ -185,6 +186,17 @@ def decoded(body: bytes) -> str:
         return body.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise BadRequest(f"the text is not UTF-8 (byte {error.start}).") from None
+
+
+def table_of(text: str, error: type[AirmuscleError] = BadRequest) -> dict[str, Any]:
+    """The table in the text of a request. Raises an error of this class for another content."""
+    try:
+        content = json.loads(text)
+    except (ValueError, RecursionError):
+        raise error("the request is not JSON.") from None
+    if not isinstance(content, dict):
+        raise error("the request must be a table of fields.")
+    return content
 
 
 def json_answer(content: Any, status: int = 200) -> Any:

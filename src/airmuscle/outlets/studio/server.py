@@ -34,13 +34,6 @@ _OUTSIDE = "192.0.2.1"
 """An address of another network, RFC 5737: its route names the address of this machine; nothing is sent to it."""
 
 
-class _NoLimit:
-    """A limit that has not begun."""
-
-    def cancel(self) -> None:
-        """Nothing is to be cancelled."""
-
-
 def limited_protocol() -> Any:
     """The protocol class for uvicorn. Raises ImportError without uvicorn."""
     from uvicorn.protocols.http.h11_impl import H11Protocol
@@ -51,7 +44,7 @@ def limited_protocol() -> Any:
         def connection_made(self, transport: Any) -> None:
             self.phase: Any = None
             self.since = 0.0
-            self.limit: Any = _NoLimit()
+            self.limit: Any = None
             super().connection_made(transport)
             self.follow()
             close_one_of(self.connections)
@@ -66,7 +59,8 @@ def limited_protocol() -> Any:
 
         def connection_lost(self, exc: Exception | None) -> None:
             super().connection_lost(exc)
-            self.limit.cancel()
+            if self.limit is not None:
+                self.limit.cancel()
 
         def follow(self) -> None:
             """Begin the limit of time of the phase in which the request is."""
@@ -74,7 +68,8 @@ def limited_protocol() -> Any:
             if (limit, self.cycle) == self.phase:
                 return
             self.phase, self.since = (limit, self.cycle), self.loop.time()
-            self.limit.cancel()
+            if self.limit is not None:
+                self.limit.cancel()
             self.limit = self.loop.call_later(limit, self.transport.abort)
 
     return LimitedProtocol

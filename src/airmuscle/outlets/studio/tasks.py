@@ -27,6 +27,7 @@ from ...report.data import as_sheet, csv_text
 from ..requests import JOINT, LIFT, SizeRequest, build, form_fields, options_of
 from .law_sheet import law_sheet
 from .plant_sheet import sheet_of_plant, sheet_of_tables
+from .security import table_of
 
 MAX_TEXT = 64 * 1024
 """Largest size of a muscle or scenario file [bytes] (chosen)."""
@@ -166,11 +167,8 @@ def size_sheet(text: str) -> dict[str, Any]:
 
 def read_request(text: str) -> dict[str, str]:
     """The fields of a request. Raises ParameterError for another form."""
-    try:
-        given = json.loads(text)
-    except (ValueError, RecursionError):
-        raise ParameterError("the request is not JSON.") from None
-    if not isinstance(given, dict) or set(given) - set(FIELDS):
+    given = table_of(text, ParameterError)
+    if set(given) - set(FIELDS):
         raise ParameterError(f"the request must have the fields {', '.join(FIELDS)} and no others.")
     if not all(isinstance(value, str) and len(value) <= MAX_FIELD for value in given.values()):
         raise ParameterError(f"the fields of the request must be texts of at most {MAX_FIELD} characters.")

@@ -37,12 +37,9 @@ class LimitedWorker:
         try:
             return self._worker.call(run_task, (task, *arguments), limit, report)
         except WorkerError as error:
-            cause = (
-                f"the computation takes more than {limit:g} s; give a smaller model or file."
-                if error.late
-                else ("the computation ended without a result, for lack of memory; give a smaller model.")
-            )
-            raise LimitError(cause) from None
+            late = f"takes more than {limit:g} s; give a smaller model or file."
+            memory = "ended without a result, for lack of memory; give a smaller model."
+            raise LimitError(f"the computation {late if error.late else memory}") from None
 
     def kill(self) -> None:
         """End the process from another thread; the call that waits for it raises LimitError."""
