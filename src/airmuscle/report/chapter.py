@@ -66,26 +66,26 @@ class Table(ShortRepr):
 
     name: str
     title: str
-    columns: Mapping[str, TableColumn]
+    columns: Mapping[str, Any]
     note: str = ""
+    _: dataclasses.KW_ONLY
     shown: bool = True
     series: bool = False
     folded: bool = False
     brief: int | Sequence[int] = 0
     key: str = ""
 
-    def __init__(
-        self, name: str, title: str, columns: Mapping[str, Any], note: str = "", *, shown: bool = True,
-        series: bool = False, folded: bool = False, brief: int | Sequence[int] = 0, key: str = "",
-    ) -> None:  # fmt: skip
-        made = {key: each if isinstance(each, TableColumn) else TableColumn(each) for key, each in columns.items()}
+    def __post_init__(self) -> None:
+        made = {key: each if isinstance(each, TableColumn) else TableColumn(each) for key, each in self.columns.items()}
         lengths = {key: len(each.values) for key, each in made.items()}
         if len(set(lengths.values())) > 1:
-            raise ValueError(f"table {name}: all columns must have the same length, not {lengths}.")
-        given = {"name": name, "title": title, "columns": made, "note": note, "shown": shown and not series,
-                 "series": series, "folded": folded, "brief": brief, "key": key or name}  # fmt: skip
-        for key, value in given.items():
-            object.__setattr__(self, key, value)
+            raise ValueError(f"table {self.name}: all columns must have the same length, not {lengths}.")
+        for name, value in (
+            ("columns", made),
+            ("shown", self.shown and not self.series),
+            ("key", self.key or self.name),
+        ):
+            object.__setattr__(self, name, value)
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values())).values) if self.columns else 0

@@ -23,23 +23,17 @@ class Kind(enum.Enum):
     @property
     def description(self) -> str:
         """Description of the kind for the report."""
-        return _DESCRIPTIONS[self]
+        return _DESCRIPTIONS[self][1]
 
     def headline(self, count: int) -> str:
         """Name of the kind behind the number of its statements."""
-        name, rest = _HEADLINES[self]
-        return f"{name}{'s' * (count != 1)} {rest}"
+        return f"{self.value}{'s' * (count != 1)} {_DESCRIPTIONS[self][0]}"
 
 
-_HEADLINES = {
-    Kind.CLAIM: ("claim", "of the papers"),
-    Kind.FINDING: ("comparison", "of this report"),
-    Kind.CHECK: ("check", "of the computation"),
-}
 _DESCRIPTIONS = {
-    Kind.CLAIM: "claims of the paper",
-    Kind.FINDING: "comparisons of this report, which the paper does not make",
-    Kind.CHECK: "checks of the computation",
+    Kind.CLAIM: ("of the papers", "claims of the paper"),
+    Kind.FINDING: ("of this report", "comparisons of this report, which the paper does not make"),
+    Kind.CHECK: ("of the computation", "checks of the computation"),
 }
 
 

@@ -1,6 +1,7 @@
 """Tables and quantities as they are shown, with headings and units; tables of parameters and of estimates."""
 
 import dataclasses
+import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Protocol
@@ -52,7 +53,10 @@ def shown_columns(table: Table, *, chosen: bool = True, brief: bool = False) -> 
     columns = {name: each for name, each in table.columns.items() if each.brief or not brief}
     scales = _scales_of_rows(table.columns[UNIT], rows, chosen) if UNIT in table.columns else []
     shown = [_shown(name, each, rows, scales, chosen, brief) for name, each in columns.items()]
-    return [_with_meanings_once(each) if each.heading == MEANING and chosen else each for each in shown]
+    for each in shown if chosen else ():
+        if each.heading == MEANING:
+            each.cells[1:] = ["" if cell == above else cell for above, cell in itertools.pairwise(each.cells)]
+    return shown
 
 
 def _shown(
@@ -118,12 +122,6 @@ def _times(value: Any, factor: float) -> Any:
     if isinstance(value, tuple):
         return tuple(_times(each, factor) for each in value)
     return scaled_numbers(value, factor) if isinstance(value, str) else value * factor
-
-
-def _with_meanings_once(shown: ShownColumn) -> ShownColumn:
-    cells = shown.cells
-    once = ["" if i and cell == cells[i - 1] else cell for i, cell in enumerate(cells)]
-    return dataclasses.replace(shown, cells=once)
 
 
 def rows_of(shown: list[ShownColumn]) -> list[tuple[Any, ...]]:

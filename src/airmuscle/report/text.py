@@ -47,7 +47,7 @@ def _lines(chapter: Chapter, result: Sequence[str], width: int, rest: str) -> It
 
 def _value_lines(values: Sequence[NamedValue]) -> Iterator[str]:
     cells = [(each.name, " ".join(filter(None, value_cells(each))), each.remark) for each in values]
-    widths = [max((cell_width(row[i]) for row in cells), default=0) for i in range(2)]
+    widths = [max(map(cell_width, column)) for column in zip(*cells, strict=True)]
     for name, value, remark in cells:
         yield f"{_padded(name, widths[0])}   {_padded(value, widths[1])}   {remark}".rstrip()
 
@@ -69,7 +69,10 @@ def table_lines(table: Table, width: int, rest: str) -> Iterator[str]:
 
 def _grid(columns: Sequence[ShownColumn], width: int) -> Iterator[list[str]]:
     """The lines of the header, then those of each row."""
-    headings = [_UNIT.sub(_unbroken, printable(to_plain(each.heading))) for each in columns]
+    headings = [
+        _UNIT.sub(lambda unit: unit[0].replace(" ", "\N{NO-BREAK SPACE}"), printable(to_plain(each.heading)))
+        for each in columns
+    ]
     cells = [[printable(to_plain(text)) for text in each.texts] for each in columns]
     widths, gap = _widths(headings, cells, width)
     right = [each.is_numeric for each in columns]
@@ -77,10 +80,6 @@ def _grid(columns: Sequence[ShownColumn], width: int) -> Iterator[list[str]]:
     yield [*header, "─" * min(width, sum(widths) + gap * (len(widths) - 1))]
     for row in zip(*cells, strict=True):
         yield _row(row, widths, right, gap)
-
-
-def _unbroken(match: re.Match[str]) -> str:
-    return match[0].replace(" ", "\N{NO-BREAK SPACE}")
 
 
 def _row(cells: Sequence[str], widths: Sequence[int], right: Sequence[bool], gap: int) -> list[str]:

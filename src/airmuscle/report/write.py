@@ -60,7 +60,9 @@ def write_into(
     try:
         for chapter in chapters:
             for plot in chapter.plots:
-                save_figure(plot, staging / "figures" / plot.name)
+                (staging / "figures").mkdir(exist_ok=True)
+                for suffix, content in rendered_figure(plot).items():
+                    (staging / "figures" / f"{plot.name}.{suffix}").write_bytes(content)
             for table in chapter.tables:
                 save_table(table, staging / "data" / f"{table.name}.csv")
         claims = [claim.as_dict() for chapter in chapters for claim in chapter.claims]
@@ -70,13 +72,6 @@ def write_into(
         (staging / REPORT_FILE).write_text(text, encoding="utf-8", errors="backslashreplace")  # names of files
     except OSError as error:
         raise FileError(f"{staging.parent}: the report cannot be written: {error.strerror or error}.") from error
-
-
-def save_figure(plot: Plot, stem: Path) -> None:
-    """Write the figure of a plot as `stem`.svg and `stem`.png."""
-    stem.parent.mkdir(parents=True, exist_ok=True)
-    for suffix, content in rendered_figure(plot).items():
-        stem.with_name(f"{stem.name}.{suffix}").write_bytes(content)
 
 
 def rendered_figure(plot: Plot) -> dict[str, bytes]:
@@ -131,9 +126,8 @@ def _template() -> Any:
     import jinja2  # needed by reports only
     from markupsafe import Markup
 
-    environment = jinja2.Environment(
-        autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True
-    )
+    options: Any = {"autoescape": True, "trim_blocks": True, "lstrip_blocks": True}
+    environment = jinja2.Environment(undefined=jinja2.StrictUndefined, **options)
     environment.filters.update(
         cell=lambda value, column=None: Markup(render_cell(value, column)),
         header=lambda text: Markup(render_header(text)),
@@ -176,14 +170,10 @@ def render_header(header: str) -> str:
 
 def image_data_uri(stem: Path) -> str:
     """Return a figure as a data URI: the SVG, or the PNG if the SVG is larger than `MAX_SVG_BYTES`."""
-    vector = stem.with_name(f"{stem.name}.svg").read_bytes()
-    if len(vector) <= MAX_SVG_BYTES:
-        return _data_uri("image/svg+xml", vector)
-    return _data_uri("image/png", stem.with_name(f"{stem.name}.png").read_bytes())
-
-
-def _data_uri(media_type: str, content: bytes) -> str:
-    return f"data:{media_type};base64,{base64.b64encode(content).decode('ascii')}"
+    kind, content = "svg+xml", stem.with_name(f"{stem.name}.svg").read_bytes()
+    if len(content) > MAX_SVG_BYTES:
+        kind, content = "png", stem.with_name(f"{stem.name}.png").read_bytes()
+    return f"data:image/{kind};base64,{base64.b64encode(content).decode('ascii')}"
 
 
 def anchor(text: str) -> str:

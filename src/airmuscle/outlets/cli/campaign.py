@@ -20,7 +20,7 @@ from ...bench.identify.campaign import STAGES, Campaign, LeftOutStage, StaticSta
 from ...bench.identify.campaign.campaign_chapters import UnreadFile, ValidationRow, campaign_chapters, stage_data
 from ...bench.readers import ColumnMapping
 from ...bench.readers.reader import complete_bench, find_files, read_file
-from ...core import atomic_file, atomic_folder, check_writable, program_fingerprint
+from ...core import atomic_file, atomic_folder, program_fingerprint
 from ...core.errors import AirmuscleError, ColumnError, FileError, IdentificationError
 from ...core.tree import fingerprint
 from ...engine.compile.cache.store import cache_folder, read_private
@@ -143,8 +143,6 @@ def campaign(
     recordings, aside = complete[: len(recordings)], complete[len(recordings) :]
     geometry = None if size is None else braid_of_length(size, check_one_length(resting_lengths(recordings)))
     writes = execution.writes(out)
-    if writes:
-        check_writable(out)
     result = _identify(recordings, geometry, out if writes else None, execution)
     validation = [row for recording in aside for row in _validation(result, recording)]
     scenarios = campaign_scenarios(result)

@@ -86,7 +86,10 @@ class LazyCommands(TyperGroup):
         check_interrupted()
         command = typer.Typer(**SETTINGS)
         command.command(row.name)(function)
-        built = _without_types(typer.main.get_command(command))
+        built: Any = typer.main.get_command(command)
+        for each in built.params:
+            if each.param_type_name == "argument":  # no Python type after its name in a help text
+                each.display_type_rich = lambda ctx: ""
         if row.name in RUN_CODE:
             built.params.append(_allow_code_option())
         return built
@@ -134,14 +137,6 @@ def _allow_code_option() -> Any:
     (flag,) = (each for each in typer.main.get_command(command).params if each.name == "allow_code")
     flag.expose_value = False
     return flag
-
-
-def _without_types(command: Any) -> Any:
-    """The command, whose help shows no Python type after the name of an argument."""
-    for each in command.params:
-        if each.param_type_name == "argument":
-            each.display_type_rich = lambda ctx: ""
-    return command
 
 
 @contextlib.contextmanager

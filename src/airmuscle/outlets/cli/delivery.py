@@ -27,10 +27,14 @@ def deliver(
     others   files elsewhere that are named with those of the folder
     writes   whether this process writes the files; otherwise it names those that another one writes
     """
-    worded = in_option_words(command, chapters)
-    if out is not None and writes:
-        write_result(out, worded, title, files or {})
-    print_result(worded, {**(others or {}), **({} if out is None else result_paths(out, title, files or {}))}, json)
+    worded, paths = [in_words(each, lambda text: in_options(text, command)) for each in chapters], dict(others or {})
+    if out is not None:
+        if writes:
+            write_result(out, worded, title, files or {})
+        for name in (*(files or {}), *([REPORT_FILE] if title else [])):
+            path = Path(name) if len(Path(name).parts) == 1 else Path(name).parent  # the files of a folder as one
+            paths[path.stem] = out / path
+    print_result(worded, paths, json)
 
 
 def print_result(chapters: Sequence[Chapter], paths: Mapping[str, Path], json: bool) -> None:
@@ -45,13 +49,8 @@ def print_result(chapters: Sequence[Chapter], paths: Mapping[str, Path], json: b
         echo(f"{name}: {path}")
 
 
-def in_option_words(command: str, chapters: Sequence[Chapter]) -> list[Chapter]:
-    """The chapters with hints that name the options of a command."""
-    return [in_words(chapter, lambda text: in_options(text, command)) for chapter in chapters]
-
-
-def write_result(out: Path, chapters: Sequence[Chapter], title: str, files: Files) -> dict[str, Path]:
-    """Write the files and the report, all or none; returns their paths."""
+def write_result(out: Path, chapters: Sequence[Chapter], title: str, files: Files) -> None:
+    """Write the files and the report, all or none."""
     with atomic_folder(out) as folder:
         for name, content in files.items():
             path = folder / name
@@ -62,11 +61,3 @@ def write_result(out: Path, chapters: Sequence[Chapter], title: str, files: File
                 content(path)
         if title:
             write_into(folder, chapters, title=title)
-    return result_paths(out, title, files)
-
-
-def result_paths(out: Path, title: str, files: Files) -> dict[str, Path]:
-    """The paths of the files and of the report of a result, those of a folder as one."""
-    names = [*files, *([REPORT_FILE] if title else [])]
-    parts = [Path(name) if len(Path(name).parts) == 1 else Path(name).parent for name in names]
-    return {path.stem: out / path for path in parts}

@@ -60,13 +60,17 @@ class Execution:
             yield min(local, tasks or local)
 
     def writes(self, out: Path) -> bool:
-        """Whether this process writes the output; false with a message if another one that has joined does."""
-        if self.join is not None:
-            try:
-                check_writable(out)
-            except FolderInUseError:
-                echo(f"{out} is written by another process; this one computes for {self.join} only", err=True)
-                return False
+        """Whether this process writes the output; false with a message if another one that has joined does.
+
+        Raises FileError for a folder that cannot be written to.
+        """
+        try:
+            check_writable(out)
+        except FolderInUseError:
+            if self.join is None:
+                raise
+            echo(f"{out} is written by another process; this one computes for {self.join} only", err=True)
+            return False
         return True
 
     def takes_over(self, out: Path) -> bool:

@@ -27,7 +27,7 @@ from ..export.compiler import (
 from ..export.identifiers import make_identifier
 from ..export.robot_description import WRITERS
 from ..export.targets import C99, JavaScript, Octave, Target
-from ..requests.declaration import RequestError, Where, option, request
+from ..requests.declaration import Where, check_rules, option, request
 from .options import Folder, Json, complete_entry, with_requests
 from .terminal import echo, print_json
 
@@ -81,7 +81,7 @@ class ExportRequest:
         """Raise RequestError for options that do not fit together."""
         law, controller, to = self.law, self.controller, self.to
         of_an_fmu = self.fmi is not None or self.sources_only or bool(self.platforms)
-        rules = {
+        check_rules({
             "--controller: a controller is exported to C, and without --law; write --to c, --to arduino or --to fmu.":
                 controller and (law or to not in ("c", "arduino", "fmu")),
             "--tunable: all parameters of a controller in an FMU can be changed; leave it out.":
@@ -101,10 +101,7 @@ class ExportRequest:
             "--sources-only and --platforms exclude each other.": self.sources_only and self.platforms,
             f"--muscle belongs to --to mujoco, {', '.join(STACKS)}.":
                 self.muscle and to not in ("mujoco", "fmu", "ssp", *STACKS),
-        }  # fmt: skip
-        for message, applies in rules.items():
-            if applies:
-                raise RequestError(message)
+        })  # fmt: skip
 
 
 @with_requests

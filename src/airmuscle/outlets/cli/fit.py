@@ -49,8 +49,6 @@ def fit(
         )
     recordings = read_recordings(files, reading)
     writes = execution.writes(out)
-    if writes:
-        check_writable(out)
     progress = computation_progress("comparison" if request.compare else "fit")
     with execution.executor() as executor, progress as show:
         found = fit_requested(request, files, recordings, lambda _, fraction: show(fraction), executor)

@@ -6,7 +6,7 @@ import re
 import tomllib
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, NamedTuple
 
 import typer
 
@@ -104,8 +104,7 @@ def show(name: Name, variant: EntryRequest, json: Json = False) -> None:
         echo(f"- {source}")
 
 
-@dataclasses.dataclass(frozen=True)
-class ListRow:
+class ListRow(NamedTuple):
     """Name, title, kind and provenance of a library file."""
 
     name: str
@@ -130,9 +129,9 @@ def list_entries(json: Json = False) -> None:
     """
     rows = library_rows()
     if json:
-        print_json([dataclasses.asdict(row) for row in rows])
+        print_json([row._asdict() for row in rows])
         return
-    print_table({field.name: [getattr(row, field.name) for row in rows] for field in dataclasses.fields(ListRow)})
+    print_table(dict(zip(ListRow._fields, zip(*rows, strict=True), strict=True)))
 
 
 def library_rows() -> list[ListRow]:
@@ -154,7 +153,7 @@ def library_rows() -> list[ListRow]:
 def _with_data_set(law: ListRow, data: ListRow) -> ListRow:
     """One row for a law and the data set of the same name."""
     provenance = law.provenance if data.provenance in ("", law.provenance) else f"{law.provenance}; {data.provenance}"
-    return dataclasses.replace(law, kind=f"{law.kind}; {data.kind}", provenance=provenance)
+    return law._replace(kind=f"{law.kind}; {data.kind}", provenance=provenance)
 
 
 def _row(path: Path, kind_of: Callable[[Mapping[str, Any]], str]) -> ListRow:

@@ -86,7 +86,7 @@ def with_requests(command: Command) -> Command:
     parameters, classes = list[inspect.Parameter](), dict[str, type[Any]]()
     for parameter in inspect.signature(command).parameters.values():
         hint = hints[parameter.name]
-        if isinstance(hint, type) and options_of_request(hint):
+        if isinstance(hint, type) and "__dataclass_fields__" in hint.__dict__ and options_of(hint):
             classes[parameter.name] = hint
             parameters += map(_parameter, options_of(hint))
         else:
@@ -114,11 +114,6 @@ def _usage_errors() -> Iterator[None]:
         yield
     except RequestError as error:
         raise typer.BadParameter(str(error)) from None
-
-
-def options_of_request(cls: Any) -> bool:
-    """Whether a class is a request."""
-    return "__dataclass_fields__" in cls.__dict__ and bool(options_of(cls))
 
 
 def flag_of(declared: Option) -> str:

@@ -32,32 +32,8 @@ def _toml_table(hint: Hint) -> str:
     return f"columns = {{ {', '.join(entries)} }}"
 
 
-def _unit(hint: Hint) -> str:
-    return "use " + " ".join(f"--unit '{name}=...'" for name in hint.value)
-
-
 def _fix(hint: Hint) -> str:
     return "use " + ("--fix PARAMETER" if hint.value is ... else " ".join(f"--fix '{name}'" for name in hint.value))
-
-
-def _column(hint: Hint) -> str:
-    return "use " + " ".join(f'--column "{key}={text}"' for key, text in hint.value.items())
-
-
-def _leave_out(hint: Hint) -> str:
-    return f"use --leave-out {hint.value.quantity}"
-
-
-def _censoring(hint: Hint) -> str:
-    return "use --uncensored" if hint.constant == "UNCENSORED" else "omit --uncensored"
-
-
-def _constant(hint: Hint) -> str:
-    return "use " + " ".join(f"--constant '{name}={value}'" for name, value in hint.value.items())
-
-
-def _time(hint: Hint) -> str:
-    return f"use --time {TIME_BASE_NAMES[hint.value]}"
 
 
 def _missing(hint: Hint) -> str:
@@ -68,11 +44,11 @@ def _missing(hint: Hint) -> str:
 
 
 _FILES: Mapping[str, Instruction] = {
-    "units": _unit,
-    "columns": _column,
-    "constants": _constant,
+    "units": lambda hint: "use " + " ".join(f"--unit '{name}=...'" for name in hint.value),
+    "columns": lambda hint: "use " + " ".join(f'--column "{key}={text}"' for key, text in hint.value.items()),
+    "constants": lambda hint: "use " + " ".join(f"--constant '{name}={value}'" for name, value in hint.value.items()),
     "file_name": lambda hint: f"use --file-name '{hint.value}'",
-    "time": _time,
+    "time": lambda hint: f"use --time {TIME_BASE_NAMES[hint.value]}",
     "decimal": lambda hint: f"use --decimal '{hint.value}'",
     "resting_length": lambda hint: 'use --resting-length "..."',
     "ambient": lambda hint: 'use --ambient "..."',
@@ -97,11 +73,10 @@ INSTRUCTIONS: Mapping[str, Mapping[str, Instruction]] = {
         **_FILES,
         "fixed": _fix,
         "degree": lambda hint: f"use --degree {hint.value}",
-        "censoring": _censoring,
+        "censoring": lambda hint: "use --uncensored" if hint.constant == "UNCENSORED" else "omit --uncensored",
         "loss": lambda hint: f"use --robust '{hint.value.scale:g} N'",
         "sigma": lambda hint: "use --equal-weights",
-        "by": _leave_out,
-        "leave_out": _leave_out,
+        **dict.fromkeys(("by", "leave_out"), lambda hint: f"use --leave-out {hint.value.quantity}"),
         "bench.fit_hysteresis": lambda hint: "run `airmuscle hysteresis`",
         "bench.estimate_length_error": lambda hint: "use --length-error SPECIMEN",
     },
@@ -184,6 +159,7 @@ def terminal_width() -> int:
 def reading_progress(label: str = "reading") -> Iterator[Callable[[str, float], None]]:
     """Yield a callback (name, fraction done), such as `read(progress=...)` takes, which draws one bar per name."""
     from rich.console import Console
+    from rich.markup import escape
     from rich.progress import Progress, TaskID
 
     console = Console(stderr=True)
@@ -193,7 +169,7 @@ def reading_progress(label: str = "reading") -> Iterator[Callable[[str, float], 
         def show(name: str, fraction: float) -> None:
             task = tasks.get(name)
             if task is None:
-                task = tasks[name] = display.add_task(_without_markup(f"{label} {name}"), total=1.0)
+                task = tasks[name] = display.add_task(escape(printable(f"{label} {name}")), total=1.0)
             display.update(task, completed=fraction)
 
         yield show
@@ -223,10 +199,3 @@ def counted_progress(label: str) -> Iterator[Callable[[str, int, int], None]]:
             display.update(bar, description=step, completed=done, total=total)
 
         yield show
-
-
-def _without_markup(text: str) -> str:
-    """Printable text for rich, in which brackets are not markup."""
-    from rich.markup import escape
-
-    return escape(printable(text))

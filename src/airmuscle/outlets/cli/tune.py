@@ -113,8 +113,8 @@ def tune(
     loaded = load_scenario_loop(scenario)
     target = save or scenario.with_name(f"{scenario.stem}-tuned.toml")
     writes = execution.writes(out)
-    for folder in (out, target.parent) if writes else ():
-        check_writable(folder)
+    if writes:
+        check_writable(target.parent)
     loaded.check_target(target)
     objective, perturbations = request.objective, request.perturbations
     ranges = loaded.bounds(request.bounds)

@@ -31,6 +31,13 @@ class RequestError(InputError):
         self.field = field
 
 
+def check_rules(rules: Mapping[str, Any]) -> None:
+    """Raise RequestError with the first message whose condition applies."""
+    for message, applies in rules.items():
+        if applies:
+            raise RequestError(message)
+
+
 @dataclasses.dataclass(frozen=True)
 class Option:
     """Declaration of one field of a request.

@@ -12,7 +12,7 @@ from ...core import ParameterError, quantity, tree
 from ...files.library import Entry, resting_lengths
 from ...physics.muscle.geometry import Braid, Geometry
 from ...recording import Recording
-from .declaration import RequestError, Where, option, request
+from .declaration import RequestError, Where, check_rules, option, request
 
 _UNITS = {"radius": "m", "angle": "rad"}
 
@@ -203,24 +203,18 @@ class FitRequest:
 
     def check(self, where: Where) -> None:
         """Raise RequestError for fields that do not fit together."""
-        if self.characteristic is None and not self.compare:
-            raise RequestError(
-                f"give the characteristic to fit with {where('characteristic')}, or rank all with {where('compare')}"
-            )
-        if self.free_contraction and not self.shape:
-            raise RequestError(f"{where('free_contraction')} requires {where('shape')}")
-        if self.shape and self.compare:
-            raise RequestError(
-                f"{where('shape')} is for a ContractileSurface, given with {where('characteristic')}; it excludes "
-                f"{where('compare')}"
-            )
-        if self.purpose is not None and (not self.compare or self.leave_out is not None):
-            raise RequestError(f"{where('purpose')} is for {where('compare')}, and excludes {where('leave_out')}")
-        if self.compare and (self.uncensored or self.equal_weights):
-            raise RequestError(
-                f"{where('compare')} ranks by errors of rows with positive force: {where('uncensored')} and "
-                f"{where('equal_weights')} do not apply"
-            )
+        law, compare, shape = where("characteristic"), where("compare"), where("shape")
+        check_rules({
+            f"give the characteristic to fit with {law}, or rank all with {compare}":
+                self.characteristic is None and not self.compare,
+            f"{where('free_contraction')} requires {shape}": self.free_contraction and not self.shape,
+            f"{shape} is for a ContractileSurface, given with {law}; it excludes {compare}":
+                self.shape and self.compare,
+            f"{where('purpose')} is for {compare}, and excludes {where('leave_out')}":
+                self.purpose is not None and (not self.compare or self.leave_out is not None),
+            f"{compare} ranks by errors of rows with positive force: {where('uncensored')} and "
+            f"{where('equal_weights')} do not apply": self.compare and (self.uncensored or self.equal_weights),
+        })  # fmt: skip
 
     @property
     def split(self) -> GroupSplit | None:

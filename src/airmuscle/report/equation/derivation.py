@@ -1,6 +1,8 @@
 """Equation of a law: its traced expression in named symbols, with shared parts defined once."""
 
 import dataclasses
+import itertools
+import math
 import re
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
@@ -43,12 +45,12 @@ _INDEX = re.compile(r"\[\d+\]$")
 
 @dataclasses.dataclass(frozen=True)
 class Symbol:
-    """A symbol of an equation; the value [SI] is None for an argument, for the result and for a shared part."""
+    """A symbol of an equation; the value [SI] is NaN for an argument, for the result and for a shared part."""
 
     name: str
     unit: str
     meaning: str
-    value: float | None = None
+    value: float = math.nan
 
 
 ARGUMENTS = {
@@ -73,11 +75,14 @@ class LawEquation(ShortRepr):
     arguments: tuple[Symbol, ...]
     parameters: tuple[Symbol, ...]
     """With their values, in the order of their first occurrence in the law."""
-    parts: tuple[tuple[Symbol, Node], ...]
-    """Parts that occur repeatedly, each defined by the ones before it."""
     value: Node
     part_nodes: Mapping[Node, str]
-    """Names of the parts."""
+    """Names of the parts that occur repeatedly, each defined by the ones before it."""
+
+    @property
+    def parts(self) -> tuple[tuple[Symbol, Node], ...]:
+        """The symbols of the parts with their definitions."""
+        return tuple((Symbol(name, "", ""), node) for node, name in self.part_nodes.items())
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -233,8 +238,7 @@ def _named(
         if new.symbol(labels[node]) in present
     )
     names = _part_names([n for n in in_order(root) if n in shared], traced.arguments, {p.name for p in parameters})
-    parts = tuple((Symbol(name, "", ""), node) for node, name in names.items())
-    return LawEquation("Parameters as symbols, SI units", result, tuple(arguments), parameters, parts, root, names)
+    return LawEquation("Parameters as symbols, SI units", result, tuple(arguments), parameters, root, names)
 
 
 def _part_names(parts: Sequence[Node], arguments: Sequence[Node], taken: Collection[str]) -> dict[Node, str]:
@@ -244,11 +248,8 @@ def _part_names(parts: Sequence[Node], arguments: Sequence[Node], taken: Collect
         own = tuple(symbol.name for symbol in depends_on(node, arguments))
         letters = _SUM_NAMES if len(summands(node)) > MAX_INNER_TERMS else _PART_NAMES.get(own, _MIXED_PART_NAMES)
         base = next((letter for letter in letters if letter not in used), letters[0])
-        name, number = base, 1
-        while name in taken or name in names.values():
-            number += 1
-            name = f"{base}_{number}"
-        names[node] = name
+        tried = itertools.chain([base], (f"{base}_{number}" for number in itertools.count(2)))
+        names[node] = next(name for name in tried if name not in taken and name not in names.values())
     return names
 
 
@@ -261,8 +262,9 @@ def _physical(traced: _Traced, result: Symbol, arguments: Sequence[Symbol]) -> L
             numbers[node] = new.number(float(traced.parameters[node].value))
         elif node in traced.arguments and node.name == ARGUMENTS["pressure"].name:
             numbers[node] = new.product(new.number(BAR), bar)
-        else:
-            numbers[node] = _copied(node, numbers, new)
+        else:  # without rounding: products and quotients of numbers are not evaluated
+            inner = (numbers[each] for each in node.arguments)
+            numbers[node] = new.node(node.kind, *inner) if node.arguments else node
     points = [bar if node.name == "p" else node for node in traced.arguments][::-1]
     count = 0
 
@@ -279,12 +281,4 @@ def _physical(traced: _Traced, result: Symbol, arguments: Sequence[Symbol]) -> L
         return None
     symbols = tuple(PRESSURE_IN_BAR if each.unit == "Pa" else each for each in arguments)
     names = _part_names([n for n in in_order(value) if n in _long_sums(value)], points, ())
-    parts = tuple((Symbol(name, "", ""), node) for node, name in names.items())
-    return LawEquation("Physical form: numbers, with the pressure in bar", result, symbols, (), parts, value, names)
-
-
-def _copied(node: Node, numbers: Mapping[Node, Node], new: Expressions) -> Node:
-    """The node on replaced arguments, without rounding: products and quotients of numbers are not evaluated."""
-    if not node.arguments:
-        return node
-    return new.unevaluated(node.kind, *(numbers[each] for each in node.arguments))
+    return LawEquation("Physical form: numbers, with the pressure in bar", result, symbols, (), value, names)

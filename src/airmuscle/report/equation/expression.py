@@ -1,8 +1,8 @@
 """Expressions: nodes of a formula, shared where they are equal, with the elementary simplifications."""
 
 import math
-from collections import Counter
-from collections.abc import Collection, Iterator, Mapping
+from collections import Counter, defaultdict
+from collections.abc import Callable, Collection, Iterator, Mapping
 from fractions import Fraction
 
 NUMBER, SYMBOL, ADD, NEGATIVE, PRODUCT, QUOTIENT, POWER = "number", "symbol", "add", "neg", "mul", "div", "pow"
@@ -57,17 +57,18 @@ class Expressions:
     def __init__(self) -> None:
         self._nodes: dict[tuple[object, ...], Node] = {}
 
-    def _node(self, kind: str, *arguments: Node, value: float | str | None = None) -> Node:
+    def node(self, kind: str, *arguments: Node, value: float | str | None = None) -> Node:
+        """An operation as it is; with numbers that are not evaluated, a polynomial is expanded exactly."""
         key = (kind, value, *arguments)
         return self._nodes.setdefault(key, Node(kind, arguments, value))
 
     def number(self, value: float) -> Node:
         """A number; minus zero is zero."""
-        return self._node(NUMBER, value=float(value) + 0.0)
+        return self.node(NUMBER, value=float(value) + 0.0)
 
     def symbol(self, name: str) -> Node:
         """A symbol."""
-        return self._node(SYMBOL, value=name)
+        return self.node(SYMBOL, value=name)
 
     def add(self, a: Node, b: Node) -> Node:
         """The sum a + b; the selection of one of two summands is one node."""
@@ -79,13 +80,13 @@ class Expressions:
             return self.number(0.0)
         if a.kind == b.kind == "if" and b.arguments[0] is self.negation(a.arguments[0]):
             return self.where(a.arguments[0], a.arguments[1], b.arguments[1])
-        return self._node(ADD, a, b)
+        return self.node(ADD, a, b)
 
     def negative(self, a: Node) -> Node:
         """The negative -a."""
         if is_number(a):
             return self.number(-a.number)
-        return a.arguments[0] if a.kind == NEGATIVE else self._node(NEGATIVE, a)
+        return a.arguments[0] if a.kind == NEGATIVE else self.node(NEGATIVE, a)
 
     def product(self, a: Node, b: Node) -> Node:
         """The product a b; powers of one base are collected, and a sign is moved outside."""
@@ -99,7 +100,7 @@ class Expressions:
         (base, m), (other_base, n) = _as_power(a), _as_power(b)
         if base is other_base:
             return self.power(base, self.number(m + n))
-        return self._node(PRODUCT, a, b)
+        return self.node(PRODUCT, a, b)
 
     def quotient(self, a: Node, b: Node) -> Node:
         """The quotient a/b."""
@@ -109,7 +110,7 @@ class Expressions:
             return a
         if a.kind == NEGATIVE:
             return self.negative(self.quotient(a.arguments[0], b))
-        return self._node(QUOTIENT, a, b)
+        return self.node(QUOTIENT, a, b)
 
     def power(self, a: Node, exponent: Node) -> Node:
         """The power a^exponent."""
@@ -119,13 +120,13 @@ class Expressions:
             return a
         if is_number(a) and is_number(exponent) and (a.number > 0 or exponent.number == int(exponent.number) > 0):
             return self.number(a.number**exponent.number)
-        return self._node(POWER, a, exponent)
+        return self.node(POWER, a, exponent)
 
     def negation(self, condition: Node) -> Node:
         """The logical negation of a condition."""
         if is_number(condition):
             return self.number(float(condition.number == 0.0))
-        return condition.arguments[0] if condition.kind == "not" else self._node("not", condition)
+        return condition.arguments[0] if condition.kind == "not" else self.node("not", condition)
 
     def where(self, condition: Node, a: Node, b: Node) -> Node:
         """a where the condition holds, else b; a maximum, minimum or absolute value if it is one."""
@@ -138,39 +139,26 @@ class Expressions:
         if condition.kind in ("lt", "le"):
             low, high = condition.arguments
             if (low, high) == (b, a):
-                return self._node(MAXIMUM, a, b)
+                return self.node(MAXIMUM, a, b)
             if (low, high) == (a, b):
-                return self._node(MINIMUM, a, b)
+                return self.node(MINIMUM, a, b)
             if is_number(low, 0.0) and high is a and b is self.negative(a):
-                return self._node("abs", a)
-        return self._node(WHERE, condition, a, b)
+                return self.node("abs", a)
+        return self.node(WHERE, condition, a, b)
 
     def apply(self, kind: str, *arguments: Node) -> Node:
         """Any operation by its kind, simplified."""
-        match kind:
-            case "add":
-                return self.add(*arguments)
-            case "neg":
-                return self.negative(*arguments)
-            case "mul":
-                return self.product(*arguments)
-            case "div":
-                return self.quotient(*arguments)
-            case "pow":
-                return self.power(*arguments)
-            case "not":
-                return self.negation(*arguments)
-            case "where":
-                return self.where(*arguments)
-            case "if" if is_number(arguments[0]):
-                return arguments[1] if arguments[0].number != 0.0 else self.number(0.0)
+        simplified: dict[str, Callable[..., Node]] = {
+            "add": self.add, "neg": self.negative, "mul": self.product, "div": self.quotient, "pow": self.power,
+            "not": self.negation, "where": self.where,
+        }  # fmt: skip
+        if kind in simplified:
+            return simplified[kind](*arguments)
+        if kind == "if" and is_number(arguments[0]):
+            return arguments[1] if arguments[0].number != 0.0 else self.number(0.0)
         if kind in COMPARISONS and all(is_number(each) for each in arguments):
             return self.number(float(_COMPARE[kind](arguments[0].number, arguments[1].number)))
-        return self._node(kind, *arguments)
-
-    def unevaluated(self, kind: str, *arguments: Node) -> Node:
-        """An operation as it is, with numbers that are not evaluated: a polynomial is then expanded exactly."""
-        return self._node(kind, *arguments)
+        return self.node(kind, *arguments)
 
 
 _COMPARE = {"lt": float.__lt__, "le": float.__le__, "eq": float.__eq__, "ne": float.__ne__}
@@ -232,29 +220,25 @@ def _power(base: Polynomial, exponent: Fraction) -> Polynomial | None:
 
 
 def _sum(a: Polynomial, b: Polynomial) -> Polynomial | None:
-    total = dict(a)
+    total = defaultdict(Fraction, a)
     for monomial, c in b.items():
-        total[monomial] = total.get(monomial, Fraction(0)) + c
-    return _checked({monomial: c for monomial, c in total.items() if c})
+        total[monomial] += c
+    return _checked(total)
 
 
 def _product(a: Polynomial, b: Polynomial) -> Polynomial | None:
-    total: Polynomial = {}
+    total: defaultdict[Monomial, Fraction] = defaultdict(Fraction)
     for m, c in a.items():
         for n, d in b.items():
-            powers = Counter(dict(m))
-            powers.update(dict(n))
-            key = tuple(sorted(powers.items(), key=lambda item: _order(item[0])))
-            total[key] = total.get(key, Fraction(0)) + c * d
-    return _checked({monomial: c for monomial, c in total.items() if c})
+            powers = (Counter(dict(m)) + Counter(dict(n))).items()
+            total[tuple(sorted(powers, key=lambda item: (str(item[0].value or ""), id(item[0]))))] += c * d
+    return _checked(total)
 
 
 def _checked(polynomial: Polynomial) -> Polynomial | None:
-    return polynomial if len(polynomial) <= MAX_TERMS else None
-
-
-def _order(node: Node) -> tuple[str, int]:
-    return (str(node.value or ""), id(node))
+    """The polynomial without monomials that cancel; None if it is too long."""
+    kept = {monomial: c for monomial, c in polynomial.items() if c}
+    return kept if len(kept) <= MAX_TERMS else None
 
 
 def coefficients_by_monomial(polynomial: Polynomial, parameters: Collection[Node]) -> dict[Monomial, Node] | None:

@@ -46,8 +46,7 @@ def _read(function: Any, new: Expressions, arguments: Sequence[Node], parameters
         elif code == casadi.OP_CONST:
             current[target[0]] = new.number(function.instruction_constant(k))
         elif code == casadi.OP_INPUT:
-            inputs = arguments[source[0]] if source[0] < len(arguments) else parameters[source[1]]
-            current[target[0]] = inputs
+            current[target[0]] = arguments[source[0]] if source[0] < len(arguments) else parameters[source[1]]
         elif code in kinds:
             current[target[0]] = _apply(new, kinds[code], [current[i] for i in source])
         else:
@@ -93,8 +92,7 @@ def within(root: Node, new: Expressions, ranges: Mapping[Node, Bounds]) -> Node:
         for each in in_order(node):
             if each not in bounds:
                 bounds[each] = _bounds_of(each, bounds, ranges)
-        node = _reduced(node, new, bounds)
-        nodes[old] = node
+        nodes[old] = _reduced(node, new, bounds)
     return nodes[root]
 
 

@@ -27,56 +27,43 @@ def displayed_lines(equation: LawEquation) -> list[str]:
 
 def latex_source(equation: LawEquation, validity: str) -> str:
     """The equation and the values of its parameters in LaTeX (amsmath), with all digits."""
-    lines = [line.removeprefix(r"\begin{align*} ").removesuffix(r" \end{align*}") for line in _latex_lines(
-        equation, Latex(equation.part_nodes))]  # fmt: skip
-    lines += [
-        rf"{latex_symbol(each.name)} &= {_latex_number(each.value)}{_latex_unit(each.unit)}"
-        for each in equation.parameters
-    ]
-    return "\n".join(
-        [f"% {_signature(equation)}. {validity}", r"\begin{align*}", " \\\\\n".join(lines), r"\end{align*}"]
-    )
+    notation = Latex(equation.part_nodes)
+    lines = [line.removeprefix(r"\begin{align*} ").removesuffix(r" \end{align*}")
+             for line in _latex_lines(equation, notation)]  # fmt: skip
+    for each in equation.parameters:
+        unit = "" if each.unit == "1" else rf"\,\mathrm{{{each.unit.replace('^', '')}}}"
+        lines.append(rf"{latex_symbol(each.name)} &= {notation.number(each.value)}{unit}")
+    head = f"% {_signature(equation)}. {validity}\n\\begin{{align*}}\n"
+    return head + " \\\\\n".join(lines) + "\n\\end{align*}"
 
 
 def matlab_source(equation: LawEquation, validity: str) -> str:
     """The equation as a MATLAB function of arrays."""
-    notation = Matlab(equation.part_nodes, _argument_nodes(equation))
-    given = ", ".join(each.name for each in equation.arguments)
-    return "\n".join(
-        [
-            f"function {_variable(equation)} = muscle_{_word(equation)}({given})",
-            f"% {_signature(equation)}. {validity}",
-            *(f"{each.name} = {notation.number(_value(each))};  % {_described(each)}" for each in equation.parameters),
-            *(f"{part.name} = {notation.text(node, definition=True)};" for part, node in equation.parts),
-            f"{_variable(equation)} = {notation.text(equation.value)};",
-            "end",
-        ]
-    )
+    names, result = [each.name for each in equation.arguments], equation.result.name
+    notation = Matlab(equation.part_nodes, {node for node in _symbols(equation) if node.name in names})
+    lines = [
+        f"function {result} = muscle_{_word(equation)}({', '.join(names)})", f"% {_signature(equation)}. {validity}",
+        *(f"{each.name} = {notation.number(each.value)};  % [{each.unit}] {each.meaning}"
+          for each in equation.parameters),
+        *(f"{part.name} = {notation.text(node, definition=True)};" for part, node in equation.parts),
+        f"{result} = {notation.text(equation.value)};", "end",
+    ]  # fmt: skip
+    return "\n".join(lines)
 
 
 def c_source(equation: LawEquation, validity: str) -> str:
     """The equation as a C function."""
     notation = C(equation.part_nodes)
     arguments = ", ".join(f"double {each.name}" for each in equation.arguments)
-    return "\n".join(
-        [
-            "#include <math.h>",
-            "",
-            f"/* {_signature(equation)}. {validity} */",
-            f"double muscle_{_word(equation)}({arguments})",
-            "{",
-            *(
-                f"    const double {each.name} = {notation.number(_value(each))}; /* {_described(each)} */"
-                for each in equation.parameters
-            ),
-            *(
-                f"    const double {part.name} = {notation.text(node, definition=True)};"
-                for part, node in equation.parts
-            ),
-            f"    return {notation.text(equation.value)};",
-            "}",
-        ]
-    )
+    lines = [
+        "#include <math.h>", "", f"/* {_signature(equation)}. {validity} */",
+        f"double muscle_{_word(equation)}({arguments})", "{",
+        *(f"    const double {each.name} = {notation.number(each.value)}; /* [{each.unit}] {each.meaning} */"
+          for each in equation.parameters),
+        *(f"    const double {part.name} = {notation.text(node, definition=True)};" for part, node in equation.parts),
+        f"    return {notation.text(equation.value)};", "}",
+    ]  # fmt: skip
+    return "\n".join(lines)
 
 
 def excel_source(equation: LawEquation) -> str:
@@ -88,7 +75,7 @@ def excel_source(equation: LawEquation) -> str:
     for part, _ in equation.parts:
         cells[part.name] = f"{chr(ord('A') + len(cells))}2"
     texts = Excel({}).number
-    values = {each.name: texts(_value(each)) for each in equation.parameters}
+    values = {each.name: texts(each.value) for each in equation.parameters}
     names: dict[Node, str] = {node: cells[part.name] for part, node in equation.parts}
     for node in _symbols(equation):
         text = cells.get(node.name) or values[node.name]
@@ -110,10 +97,8 @@ def _latex_equation(left: str, node: Node, notation: Latex, *, definition: bool 
     terms = summands(node) if definition or node not in notation.defined else [node]
     if len(terms) <= TERMS_PER_LINE:
         return rf"\begin{{align*}} {left} &= {notation.text(node, definition=definition)} \end{{align*}}"
-    texts = [notation.text(term) for term in terms]
-    signed = [
-        text if i == 0 else f"- {text[1:]}" if text.startswith("-") else f"+ {text}" for i, text in enumerate(texts)
-    ]
+    first, *others = map(notation.text, terms)
+    signed = [first, *(f"- {text[1:]}" if text.startswith("-") else f"+ {text}" for text in others)]
     rows = [" ".join(signed[i : i + TERMS_PER_LINE]) for i in range(0, len(signed), TERMS_PER_LINE)]
     return rf"\begin{{align*}} {left} &= " + " \\\\\n&\\quad {} ".join(rows) + r" \end{align*}"
 
@@ -123,49 +108,18 @@ def _symbols(equation: LawEquation) -> set[Node]:
     return {node for root in roots for node in in_order(root) if node.kind == "symbol"}
 
 
-def _argument_nodes(equation: LawEquation) -> set[Node]:
-    names = {each.name for each in equation.arguments}
-    return {node for node in _symbols(equation) if node.name in names}
-
-
-def _variable(equation: LawEquation) -> str:
-    return equation.result.name
-
-
 def _word(equation: LawEquation) -> str:
     return equation.result.meaning.split()[-1]
 
 
 def _signature(equation: LawEquation) -> str:
-    sources = " and ".join(_described_quantity(each) for each in equation.arguments)
-    text = f"{_described_quantity(equation.result)} from {sources}"
+    result, *sources = (f"{each.meaning} {_headed(each)}" for each in (equation.result, *equation.arguments))
+    text = f"{result} from {' and '.join(sources)}"
     return text[0].upper() + text[1:]
-
-
-def _described_quantity(symbol: Symbol) -> str:
-    return f"{symbol.meaning} {_headed(symbol)}"
 
 
 def _headed(symbol: Symbol) -> str:
     return f"{symbol.name} [{symbol.unit}]" if symbol.unit else symbol.name
-
-
-def _described(symbol: Symbol) -> str:
-    return f"[{symbol.unit}] {symbol.meaning}"
-
-
-def _value(symbol: Symbol) -> float:
-    assert symbol.value is not None
-    return symbol.value
-
-
-def _latex_number(value: float | None) -> str:
-    assert value is not None
-    return Latex({}).number(value)
-
-
-def _latex_unit(unit: str) -> str:
-    return "" if unit == "1" else rf"\,\mathrm{{{unit.replace('^', '')}}}"
 
 
 REMARKS = {
