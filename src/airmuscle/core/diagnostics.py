@@ -3,7 +3,7 @@
 import dataclasses
 import enum
 from collections.abc import Iterator, Mapping, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 from .arrays import Array
 from .errors import Hint, HintedText
@@ -12,39 +12,26 @@ from .errors import Hint, HintedText
 class Status(enum.IntEnum):
     """How a computation ended; `message` is the reason in words. `simulate` never returns PAUSED or NOT_STARTED."""
 
-    DONE = 0
-    PAUSED = 1
-    STEP_TOO_SMALL = 2
-    NOT_FINITE = 3
-    TOO_MANY_STEPS = 4
-    INTERRUPTED = 5
-    NOT_STARTED = 6
-    NEGATIVE_AIR_MASS = 7
-    NON_FINITE_COMMAND = 8
-    NON_POSITIVE_VOLUME = 9
-    SINGULAR = 10
-    NOT_CONVERGED = 11
+    message: str
+    """The reason, as the end of a sentence that begins with "because"."""
 
-    @property
-    def message(self) -> str:
-        """The reason, as the end of a sentence that begins with "because"."""
-        return _MESSAGES[self]
+    DONE = 0, "it is complete"
+    PAUSED = 1, "it was paused"
+    STEP_TOO_SMALL = 2, "the step became too small"
+    NOT_FINITE = 3, "a rate or an output is not finite"
+    TOO_MANY_STEPS = 4, "it took more steps than allowed"
+    INTERRUPTED = 5, "it was interrupted"
+    NOT_STARTED = 6, "no initial state was given"
+    NEGATIVE_AIR_MASS = 7, "an air mass became negative"
+    NON_FINITE_COMMAND = 8, "the controller gave a command that is not finite"
+    NON_POSITIVE_VOLUME = 9, "a muscle volume became zero or negative"
+    SINGULAR = 10, "the Jacobian is singular"
+    NOT_CONVERGED = 11, "Newton's method did not converge"
 
-
-_MESSAGES = {
-    Status.DONE: "it is complete",
-    Status.PAUSED: "it was paused",
-    Status.STEP_TOO_SMALL: "the step became too small",
-    Status.NOT_FINITE: "a rate or an output is not finite",
-    Status.TOO_MANY_STEPS: "it took more steps than allowed",
-    Status.INTERRUPTED: "it was interrupted",
-    Status.NOT_STARTED: "no initial state was given",
-    Status.NEGATIVE_AIR_MASS: "an air mass became negative",
-    Status.NON_FINITE_COMMAND: "the controller gave a command that is not finite",
-    Status.NON_POSITIVE_VOLUME: "a muscle volume became zero or negative",
-    Status.SINGULAR: "the Jacobian is singular",
-    Status.NOT_CONVERGED: "Newton's method did not converge",
-}
+    def __new__(cls, value: int, message: str = "") -> Self:  # without a message: the member of a value
+        status = int.__new__(cls, value)
+        status._value_, status.message = value, message
+        return status
 
 
 class DiagnosticCode(enum.StrEnum):

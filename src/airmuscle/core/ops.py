@@ -6,7 +6,7 @@ symbols are traced, JAX arrays are passed to jax.numpy. Models are written with 
 
 import math
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from types import ModuleType
 from typing import Any
 
@@ -124,95 +124,45 @@ def hypot(x: Value, y: Value) -> Value:
     return sqrt(x * x + y * y)
 
 
-def floor(x: Value) -> Value:
-    """Greatest integer that is not above `x`; its derivative is 0."""
-    return _unary("floor", x)
-
-
-def _unary(name: str, x: Value) -> Value:
-    """A function of the library of `x`; of a number outside its domain NaN or infinity, without a warning of NumPy."""
-    library = _library(x)
-    if library is not None:
-        return getattr(library, name)(x)
+def _elementary(name: str, meaning: str) -> Callable[[Value], Value]:
+    """A function of the library of its operand; of a number outside its domain NaN or infinity, without a warning."""
     low, high = _DOMAINS[name]
-    if low <= x <= high:
-        return float(getattr(np, name)(x))
-    with np.errstate(all="ignore"):  # takes several times as long as the function
-        return float(getattr(np, name)(x))
+    of_number = getattr(np, name)
+
+    def function(x: Value) -> Value:
+        library = _library(x)
+        if library is not None:
+            return getattr(library, name)(x)
+        if low <= x <= high:
+            return float(of_number(x))
+        with np.errstate(all="ignore"):  # takes several times as long as the function
+            return float(of_number(x))
+
+    function.__name__ = function.__qualname__ = name
+    function.__doc__ = meaning
+    return function
 
 
 def sqrt(x: Value) -> Value:
     """Square root; NaN below zero."""
     if type(x) is float and x >= 0.0:
         return math.sqrt(x)
-    return _unary("sqrt", x)
+    return _general_sqrt(x)
 
 
-def exp(x: Value) -> Value:
-    """Exponential function."""
-    return _unary("exp", x)
-
-
-def log(x: Value) -> Value:
-    """Natural logarithm; NaN below zero."""
-    return _unary("log", x)
-
-
-def expm1(x: Value) -> Value:
-    """exp(x) - 1, accurate for small `x`."""
-    return _unary("expm1", x)
-
-
-def log1p(x: Value) -> Value:
-    """Natural logarithm of 1 + x, accurate for small `x`; NaN below -1."""
-    return _unary("log1p", x)
-
-
-def sin(x: Value) -> Value:
-    """Sine of an angle in radians."""
-    return _unary("sin", x)
-
-
-def cos(x: Value) -> Value:
-    """Cosine of an angle in radians."""
-    return _unary("cos", x)
-
-
-def tan(x: Value) -> Value:
-    """Tangent of an angle in radians."""
-    return _unary("tan", x)
-
-
-def sinh(x: Value) -> Value:
-    """Hyperbolic sine."""
-    return _unary("sinh", x)
-
-
-def cosh(x: Value) -> Value:
-    """Hyperbolic cosine."""
-    return _unary("cosh", x)
-
-
-def tanh(x: Value) -> Value:
-    """Hyperbolic tangent."""
-    return _unary("tanh", x)
-
-
-def arcsin(x: Value) -> Value:
-    """Inverse sine, in radians; NaN outside of -1 to 1."""
-    return _unary("arcsin", x)
-
-
-def arccos(x: Value) -> Value:
-    """Inverse cosine, in radians; NaN outside of -1 to 1."""
-    return _unary("arccos", x)
-
-
-def arctan(x: Value) -> Value:
-    """Inverse tangent, in radians."""
-    return _unary("arctan", x)
-
-
-def arcsinh(x: Value) -> Value:
-    """Inverse hyperbolic sine."""
-    return _unary("arcsinh", x)
+_general_sqrt = _elementary("sqrt", "Square root of any operand.")
+floor = _elementary("floor", "Greatest integer that is not above `x`; its derivative is 0.")
+exp = _elementary("exp", "Exponential function.")
+log = _elementary("log", "Natural logarithm; NaN below zero.")
+expm1 = _elementary("expm1", "exp(x) - 1, accurate for small `x`.")
+log1p = _elementary("log1p", "Natural logarithm of 1 + x, accurate for small `x`; NaN below -1.")
+sin = _elementary("sin", "Sine of an angle in radians.")
+cos = _elementary("cos", "Cosine of an angle in radians.")
+tan = _elementary("tan", "Tangent of an angle in radians.")
+sinh = _elementary("sinh", "Hyperbolic sine.")
+cosh = _elementary("cosh", "Hyperbolic cosine.")
+tanh = _elementary("tanh", "Hyperbolic tangent.")
+arcsin = _elementary("arcsin", "Inverse sine, in radians; NaN outside of -1 to 1.")
+arccos = _elementary("arccos", "Inverse cosine, in radians; NaN outside of -1 to 1.")
+arctan = _elementary("arctan", "Inverse tangent, in radians.")
+arcsinh = _elementary("arcsinh", "Inverse hyperbolic sine.")
