@@ -139,12 +139,19 @@ class ControlLoop(ShortRepr):
     def units(self, known: Mapping[str, str]) -> dict[str, str]:
         """The units of the columns that the loop adds to a recording, from those of the plant's columns."""
         known = {**named_signal_units(self.controller), **{name: unit for name, unit in known.items() if unit}}
-        kinds = (
-            (SETPOINT, self.controller.setpoints),
-            (MEASURED, self.controller.measured_columns),
-            (COMMAND, self.controller.inputs),
-        )
-        return {f"{kind}{name}": known.get(name, "") for kind, names in kinds for name in names}
+        names = [name for each in self.signals.values() for name in each]
+        return {column: known.get(name, "") for column, name in zip(self.column_names, names, strict=True)}
+
+    @property
+    def signals(self) -> dict[str, tuple[str, ...]]:
+        """Names of set points, measured columns and commanded inputs, by the prefixes of their columns."""
+        controller = self.controller
+        return {SETPOINT: controller.setpoints, MEASURED: controller.measured_columns, COMMAND: controller.inputs}
+
+    @property
+    def column_names(self) -> tuple[str, ...]:
+        """The columns that the loop adds to a recording."""
+        return tuple(f"{prefix}{name}" for prefix, names in self.signals.items() for name in names)
 
     def describe(self, units: Mapping[str, str]) -> str:
         """Controller, sample time, controlled and manipulated variables; `units` by the names of columns and inputs."""

@@ -43,18 +43,24 @@ class BoundIntegrator:
 
     def __init__(self, binding: Binding, sizes: ArraySizes) -> None:
         self.state, self._progress = np.zeros(sizes.states), np.zeros(7, dtype=np.int64)
-        self._clock, self._count = self._progress[:3].view(np.float64), self._progress[3:]
+        self.clock: Array = self._progress[:3].view(np.float64)
+        """Time, next step, start of the current segment."""
+        self.count = self._progress[3:]
+        """Segment, next row, steps, rejected steps."""
         self._duration = 1.0
-        self._end, self._inputs, slopes = np.ones(1), np.zeros((1, sizes.inputs)), np.zeros((1, sizes.inputs))
+        self._end, inputs, slopes = np.ones(1), np.zeros((1, sizes.inputs)), np.zeros((1, sizes.inputs))
+        self.held: Array = inputs[0]
+        """The inputs (m,) of `proceed`."""
         no_rows = np.zeros(0), np.zeros((0, sizes.states))
         work = np.zeros(max(binding.work, 1))
-        run = (self.state, self._end, self._inputs, slopes, *no_rows)
-        end = (self._clock, self._count, INTERRUPT_CHECK_STEPS, work)
+        run = (self.state, self._end, inputs, slopes, *no_rows)
+        end = (self.clock, self.count, INTERRUPT_CHECK_STEPS, work)
         self._bound_values = (*binding.leading, *binding.trailing)
         self._kernel = binding.kernel.bind(*binding.leading, *run, *binding.trailing, *end)
         self._run, self._first = self._kernel.runner, len(binding.leading) + 1
-        self._clock_view, self._count_view = flat_view(self._clock), flat_view(self._count)
-        self._slots: list[int] = self.places.tolist()
+        self._clock_view, self._count_view = flat_view(self.clock), flat_view(self.count)
+        self.places = np.array([self._kernel.slot_of(self._first + i) for i in range(5)], dtype=np.int64)
+        """The places in the slots of ends, values and slopes of segments, and of times and rows (5,)."""
         self._words = None if self._kernel.entry_address is None else flat_view(self._kernel.slots)
         self._budget = len(binding.leading) + len(run) + len(binding.trailing) + 2
 
@@ -83,7 +89,7 @@ class BoundIntegrator:
     def hold(self, state: Array, inputs: Array, duration: float) -> Status:
         """Advance `state` (n,) in place by `duration` [s] with the inputs (m,) held. Not to be mixed with `run`."""
         self.state[:] = state
-        self._inputs[0] = inputs
+        self.held[:] = inputs
         status = self.proceed(duration)
         state[:] = self.state
         return status
@@ -98,15 +104,9 @@ class BoundIntegrator:
             status = self._continue(status, MAX_STEPS)
         return Status.DONE if status == 0 else Status(status)
 
-    @property
-    def held(self) -> Array:
-        """The inputs (m,) of `proceed`."""
-        held: Array = self._inputs[0]
-        return held
-
     def run_part(self) -> Status:
         """Go on through the segments and rows in the slots, for a kernel that cannot call this one itself."""
-        a, b, c, d, e = self._slots
+        a, b, c, d, e = self.places.tolist()
         if self._words is None:
             slots = self.slots.tolist()
             self._kernel.point(self._first, (slots[a], slots[b], slots[c]), slots[a + 1])
@@ -127,26 +127,6 @@ class BoundIntegrator:
     def slots(self) -> Any:
         """The slots of the kernel's arguments."""
         return self._kernel.slots
-
-    @property
-    def places(self) -> Any:
-        """The places in the slots of ends, values and slopes of segments, and of times and rows (5,)."""
-        return np.array([self._kernel.slot_of(self._first + i) for i in range(5)], dtype=np.int64)
-
-    @property
-    def clock(self) -> Array:
-        """Time, next step, start of the current segment."""
-        return self._clock
-
-    @property
-    def count(self) -> Any:
-        """Segment, next row, steps, rejected steps."""
-        return self._count
-
-    @property
-    def step_counts(self) -> tuple[int, int]:
-        """Accepted and rejected steps since the counts were last reset."""
-        return int(self._count[2]), int(self._count[3])
 
     def _solve(
         self, start: float, rows: Array, max_steps: int, check: Callable[[Array, float], Status] | None
@@ -173,7 +153,7 @@ class BoundIntegrator:
         while status == _PAUSED:
             if check is not None and (outcome := check(self.state, self._clock_view[0])) != Status.DONE:
                 return outcome.value
-            left = max_steps - int(self._count[2])
+            left = max_steps - int(self.count[2])
             if left <= 0:
                 return _TOO_MANY
             self._kernel.replace(self._budget, min(INTERRUPT_CHECK_STEPS, left))

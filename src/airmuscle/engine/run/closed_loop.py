@@ -12,12 +12,11 @@ import numpy as np
 
 from ...core import Array, Diagnostic, DiagnosticCode, Status, tree
 from ...recording.columns import column_units
-from ..loop import COMMAND, MEASURED, SETPOINT, ControlLaw, ControlLoop, ControlLoopState, PiecewiseLinear, Schedule
-from .bound_integrator import RawSolution
+from ..loop import ControlLaw, ControlLoop, ControlLoopState, Schedule
 from .compiled_law import parameters_of
 from .compiled_loop import CompiledLoop, CompiledRun
 from .problem import Problem
-from .sampled_loop import SampledLoop, prepare_loop
+from .sampled_loop import prepare_loop
 from .solution import Solution, Statistics, make_recording, recorded_rows, truncate_at_invalid_row
 
 
@@ -33,19 +32,14 @@ def solve_closed_loop(problem: Problem) -> Solution:
     control_state = problem.control_state or loop.init(problem.start_time)  # type: ignore[union-attr]
     run = kept_run(problem, form, control_state)
     if run is None:
-        run = start_run(problem, prepare_loop(problem, control_state), control_state)
+        assert problem.integrator is not None
+        prepared = CompiledLoop(problem.compiled, prepare_loop(problem, control_state))
+        run = CompiledRun(prepared, problem.compiled, problem.integrator, problem.initial_vector, control_state)
     run.integrate()
     solution = _solution(problem, run)
     if form is not None and run.status == Status.DONE:
         keep_run(problem, form, run)
     return solution
-
-
-def start_run(problem: Problem, prepared: SampledLoop, control_state: ControlLoopState) -> CompiledRun:
-    """A run of the loop in one kernel."""
-    assert problem.integrator is not None
-    loop = CompiledLoop(problem.compiled, prepared)
-    return CompiledRun(loop, problem.compiled, problem.integrator, problem.initial_vector, control_state)
 
 
 def _solution(problem: Problem, run: CompiledRun) -> Solution:
@@ -54,12 +48,7 @@ def _solution(problem: Problem, run: CompiledRun) -> Solution:
     assert isinstance(loop, ControlLoop)
     segments, (times, states) = run.signal, run.rows
     times, states = times.copy(), states.copy()  # the next run may be in the same arrays
-    begun = len(run.measured) > 0
-    at, state = (run.stopped_at, run.bound.state.copy()) if begun else (run.time, run.state)
-    raw = RawSolution(states, times.size, at, state, run.status, *run.bound.step_counts)
-    if not segments.ends.size:  # the run ended before its first interval
-        shape = (1, compiled.sizes.inputs)
-        segments = PiecewiseLinear(np.array([problem.end_time]), np.zeros(shape), np.zeros(shape))
+    raw = run.raw(states)
     table = recorded_rows(compiled, states, times, segments, problem.start_time)
     raw, table = truncate_at_invalid_row(compiled, raw, table, times)
     way = "compiled with the plant" if run.loop.law is not None else "called from Python at each sample"
@@ -80,17 +69,12 @@ def _solution(problem: Problem, run: CompiledRun) -> Solution:
 
 def _controller_columns(run: CompiledRun, times: Array) -> dict[str, Array]:
     """Set points in time; measurements and commands of the last sample at every row."""
-    prepared, controller, count = run.prepared, run.prepared.loop.controller, times.size
+    prepared, count = run.prepared, times.size
     at, setpoints = prepared.at(times) if prepared.loop.drivers else prepared.at_times  # drivers add rows
     intervals, setpoints = np.minimum(at[:count], max(len(run.measured) - 1, 0)), setpoints[:count]
     measured, commanded = (values.take(intervals, axis=0) for values in (run.measured, run.commanded))
-    columns: dict[str, Array] = {}
-    for values, prefix, names in (
-        (setpoints, SETPOINT, controller.setpoints), (measured, MEASURED, controller.measured_columns),
-        (commanded, COMMAND, controller.inputs),
-    ):  # fmt: skip
-        columns |= {f"{prefix}{name}": column for name, column in zip(names, values.T, strict=True)}
-    return columns
+    columns = (*setpoints.T, *measured.T, *commanded.T)
+    return dict(zip(prepared.loop.column_names, columns, strict=True))
 
 
 MAX_KEPT_ROWS = 100_000

@@ -13,7 +13,7 @@ from ..compile.cache import kernel
 from ..compile.kernel_layout import Progress, Waiting
 from ..compile.program import CompiledSystem
 from ..loop import ControlLaw, ControlLoopState, PiecewiseLinear
-from .bound_integrator import INTERRUPT_CHECK_STEPS, MAX_STEPS
+from .bound_integrator import INTERRUPT_CHECK_STEPS, MAX_STEPS, RawSolution
 from .compiled_law import compiled_sample, parameters_of
 from .driver_table import DriverTable, are_called, greatest_capacity
 from .integrators import Integrator
@@ -69,7 +69,7 @@ class CompiledRun:
         self, loop: CompiledLoop, compiled: CompiledSystem, integrator: Integrator, initial_state: Array,
         control_state: ControlLoopState, parameters: Array | None = None,
     ) -> None:  # fmt: skip
-        self.loop, self._begin_state = loop, control_state
+        self.loop, self.prepared, self._begin_state = loop, loop.prepared, control_state
         self._integrator, self._precomputed = integrator, compiled.precomputed
         self.bound = integrator.bind(compiled)
         self.bound.state[:] = initial_state
@@ -97,8 +97,8 @@ class CompiledRun:
             self._begin_state, self._begin_memory = control_state, self.loop.memory_of(control_state)
         self.bound.rebind(self._integrator.binding(compiled))
         self._precomputed[:], self._parameters[:] = compiled.precomputed, parameters
-        state, inputs = self._begin_state, self.loop.prepared.inputs
-        self.bound.state[:] = self._kept[:] = initial_state
+        state, inputs = self._begin_state, self.prepared.inputs
+        self.bound.state[:] = self.state[:] = initial_state
         self.bound.count[:] = 0
         self.progress.fill(0)
         self._kernel.replace(self._budget, INTERRUPT_CHECK_STEPS)
@@ -111,24 +111,20 @@ class CompiledRun:
         self.status, self.stopped_at = Status.DONE, float(self.loop.edges[0])
 
     @property
-    def prepared(self) -> SampledLoop:
-        """The prepared loop."""
-        return self.loop.prepared
-
-    @property
     def room(self) -> int:
         """Rows for which this run has arrays."""
         return len(self._rows)
 
     def _make_arrays(self, n: int, m: int) -> None:
-        prepared, state = self.loop.prepared, self._begin_state
+        prepared, state = self.prepared, self._begin_state
         inputs, intervals = prepared.inputs, self.loop.edges.size - 1
         self.progress = np.zeros(len(Progress), dtype=np.int64)
         self._begin_memory = self.loop.memory_of(state)
         self._memory = np.array([self._begin_memory] * 2, dtype=float)
         self._measured, self._command = np.array(state.measured, dtype=float), np.array(state.commanded, dtype=float)
         self._applied = np.array(state.applied_inputs or inputs.values[0], dtype=float)
-        self._kept, self._kept_inputs = self.bound.state.copy(), self._applied.copy()
+        self.state, self._kept_inputs = self.bound.state.copy(), self._applied.copy()
+        """The state (n,) at the end of the last completed interval."""
         self._samples = np.empty((intervals, self._measured.size))
         self._commands = np.empty((intervals, self._command.size))
         self._inputs = inputs.ends, inputs.values.copy(), inputs.slopes
@@ -149,7 +145,7 @@ class CompiledRun:
             loop.sample_address, parameters, *loop.commanding, *loop.intervals, *self._inputs, loop.offsets,
             *loop.grid, drivers.kinds, drivers.settings, drivers.states, drivers.columns, drivers.counts,
             drivers.scratch, drivers.begins, compiled.description.lower_bounds, self._applied, self._memory,
-            self._measured, self._command, self._kept, self._kept_inputs, drivers.kept, *self._segments, self._times,
+            self._measured, self._command, self.state, self._kept_inputs, drivers.kept, *self._segments, self._times,
             self._rows, self._samples, self._commands, self.progress, INTERRUPT_CHECK_STEPS,
         )  # fmt: skip
 
@@ -190,7 +186,7 @@ class CompiledRun:
 
     def _call_drivers(self, interval: int) -> None:
         """Pass the signals of an interval through drivers of the user, and make room for what they return."""
-        prepared, progress, drivers = self.loop.prepared, self.progress, self._drivers
+        prepared, progress, drivers = self.prepared, self.progress, self._drivers
         count = drivers.call(interval, float(self.loop.edges[interval]))
         self._kernel.replace(self._columns, drivers.columns)
         rows = count + int(prepared.first_rows[interval + 1] - prepared.first_rows[interval])
@@ -228,17 +224,12 @@ class CompiledRun:
             progress[Progress.SEGMENTS] = progress[Progress.FIRST_SEGMENT]
             progress[Progress.ROWS] = progress[Progress.FIRST_ROW]
         progress[Progress.SAMPLES] = progress[Progress.INTERVAL]
-        self.stopped_at, self.bound.state[:] = self.time, self._kept
+        self.stopped_at, self.bound.state[:] = self.time, self.state
 
     @property
     def time(self) -> float:
         """The end of the last completed interval [s]."""
         return float(self.loop.edges[self.progress[Progress.INTERVAL]])
-
-    @property
-    def state(self) -> Array:
-        """The state (n,) at the end of the last completed interval."""
-        return self._kept
 
     @property
     def measured(self) -> Array:
@@ -252,8 +243,11 @@ class CompiledRun:
 
     @property
     def signal(self) -> PiecewiseLinear:
-        """The segments of all inputs of the intervals that have begun."""
+        """The segments of all inputs of the intervals that have begun; without any, one of zeros."""
         count = int(self.progress[Progress.SEGMENTS])
+        if not count:
+            none = np.zeros((1, self._applied.size))
+            return PiecewiseLinear(self.loop.edges[-1:], none, none)
         return PiecewiseLinear(*(array[:count] for array in self._segments))
 
     @property
@@ -261,6 +255,11 @@ class CompiledRun:
         """Times (N,) and states (N, n) of the rows that were reached."""
         count = int(self.progress[Progress.ROWS])
         return self._times[:count], self._rows[:count]
+
+    def raw(self, rows: Array) -> RawSolution:
+        """The result of the integrator, of which these rows (N, n) are taken."""
+        state = self.bound.state.copy() if len(self.measured) else self.state
+        return RawSolution(rows, len(rows), self.stopped_at, state, self.status, *self.bound.count[2:].tolist())
 
     @property
     def control_state(self) -> ControlLoopState:
@@ -272,7 +271,7 @@ class CompiledRun:
             controller=self._controller_memory(done),
             origin=begun.origin,
             time=self.time,
-            sample_count=begun.sample_count + done - (0 if self.loop.prepared.sampled else 1),
+            sample_count=begun.sample_count + done - (0 if self.prepared.sampled else 1),
             measured=tuple(self._samples[done - 1].tolist()),
             commanded=tuple(self._commands[done - 1].tolist()),
             applied_inputs=tuple(self._kept_inputs.tolist()),

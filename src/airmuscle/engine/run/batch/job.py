@@ -17,7 +17,6 @@ from ....core import Array, Status
 from ...compile.program import CompiledSystem
 from ...loop.inputs import PiecewiseLinear
 from ..bound_integrator import RawSolution
-from ..compiled_loop import CompiledRun
 from ..integrators import Integrator
 from ..solution import RowRecorder
 from .loops import LoopBatch
@@ -56,7 +55,7 @@ class BatchJob:
     def names(self) -> tuple[str, ...]:
         """All columns that can be stored: states, then outputs, then inputs."""
         known = self.compiled.description
-        of_loop = () if self.loops is None else self.loops.column_names
+        of_loop = () if self.loops is None else self.loops.loops[0].column_names
         return (*known.state_names, *known.output_names, *known.input_names, *of_loop)
 
     @functools.cached_property
@@ -83,17 +82,11 @@ class BatchJob:
         """Simulate a control loop and write its results."""
         run = loops.run(index, one, self.initial_states[index])
         times, rows = run.rows
-        if not isinstance(run, CompiledRun) or run.prepared.loop.drivers:  # there may be further rows
+        if run.prepared.loop.drivers:  # there may be further rows
             at = np.searchsorted(times, self.times - 1e-9 * loops.template.duration)
             rows = rows[at[at < times.size]]
-        state = run.bound.state.copy() if len(run.measured) else run.state
-        raw = RawSolution(rows, len(rows), run.stopped_at, state, run.status, *run.bound.step_counts)
-        signal = run.signal
-        if not signal.ends.size:
-            inputs = np.zeros((1, self.compiled.sizes.inputs))
-            signal = PiecewiseLinear(self.times[-1:], inputs, inputs)
         more = loops.columns(index, self.columns, run, len(rows)) if len(run.measured) else {}
-        self._write(index, one, self._truncate(raw), signal, more)
+        self._write(index, one, self._truncate(run.raw(rows)), run.signal, more)
         loops.release(run)
 
     def _truncate(self, raw: RawSolution) -> RawSolution:

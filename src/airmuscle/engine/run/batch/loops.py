@@ -1,7 +1,6 @@
 """Control loops of a batch: one for all plants or one for each, and controllers whose parameters differ."""
 
 import dataclasses
-import functools
 import threading
 from collections.abc import Collection, Mapping, Sequence
 from typing import Any
@@ -10,12 +9,12 @@ import numpy as np
 import numpy.typing as npt
 
 from ....core import Array, ParameterError, System
-from ...compile.program import CompiledSystem
-from ...loop import COMMAND, MEASURED, SETPOINT, ControlLaw, ControlLoop, designed_loop
+from ...compile.program import CompiledSystem, Pool
+from ...loop import ControlLaw, ControlLoop, designed_loop
 from ..compiled_loop import CompiledLoop, CompiledRun
 from ..integrators import Integrator
 from ..problem import Problem
-from ..sampled_loop import SampledLoop, first_rows_of, prepare_loop
+from ..sampled_loop import SampledLoop, first_rows_of, intervals_of, prepare_loop
 from .variations import Variations, variations_of
 
 CONTROLLER = "controller."
@@ -37,7 +36,7 @@ class LoopBatch:
     times: Array
     _prepared: dict[int, CompiledLoop] = dataclasses.field(default_factory=dict)
     _preparing: Any = dataclasses.field(default_factory=threading.Lock)
-    _idle: dict[int, list[CompiledRun]] = dataclasses.field(default_factory=dict)
+    _idle: Pool = dataclasses.field(default_factory=Pool)
     _at_rows: dict[int, tuple[npt.NDArray[np.intp], Array]] = dataclasses.field(default_factory=dict)
 
     @classmethod
@@ -50,17 +49,6 @@ class LoopBatch:
         template = Problem(plant, loops[0], duration, start_time=start, integrator=integrator)
         return cls(template, loops, laws, times)
 
-    @functools.cached_property
-    def column_names(self) -> tuple[str, ...]:
-        """The columns that loops add to those of the plant."""
-        controller = self.loops[0].controller
-        kinds = (
-            (SETPOINT, controller.setpoints),
-            (MEASURED, controller.measured_columns),
-            (COMMAND, controller.inputs),
-        )
-        return tuple(f"{prefix}{name}" for prefix, names in kinds for name in names)
-
     def loop_of(self, index: int) -> ControlLoop:
         """The loop of one plant."""
         return self.loops[index if len(self.loops) > 1 else 0]
@@ -71,11 +59,9 @@ class LoopBatch:
 
     def place_of(self, column: str) -> tuple[int, int]:
         """Whether a column that loops add is a set point (0), measurement (1) or command (2), and its number."""
-        prefix, name = column.split(".", 1)
-        kind = (SETPOINT, MEASURED, COMMAND).index(f"{prefix}.")
-        controller = self.loops[0].controller
-        names = (controller.setpoints, controller.measured_columns, controller.inputs)[kind]
-        return kind, names.index(name)
+        signals = self.loops[0].signals
+        prefix = next(each for each in signals if column.startswith(each))
+        return list(signals).index(prefix), signals[prefix].index(column.removeprefix(prefix))
 
     def setpoints_of(self, loop: ControlLoop) -> Array:
         """Set points (T, s) of a loop at the rows."""
@@ -85,65 +71,45 @@ class LoopBatch:
         """The interval of each row (T,), and the set points (T, s) there."""
         key = id(loop)
         if key not in self._at_rows:
-            at = np.maximum(np.searchsorted(prepared.instants, self.times, side="right") - 1, 0)
+            at = intervals_of(self.times, prepared.instants)
             self._at_rows[key] = at, prepared.setpoint_signal.inputs_at(self.times, self.template.start_time)
         return self._at_rows[key]
 
     def run(self, index: int, compiled: CompiledSystem, state: Array) -> CompiledRun:
         """The loop of one plant, integrated from its initial state (n,)."""
-        loop = self._loop(self.loop_of(index))
+        loop, start = self._loop(self.loop_of(index)), self.template.start_time
         parameters = loop.parameters.copy() if self.laws is None else self.laws.parameters(index)
-        run = self._compiled(loop, compiled, state, parameters)
+        run: CompiledRun | None = self._idle.borrow(id(loop))
+        if run is None:
+            assert self.template.integrator is not None
+            control_state = loop.prepared.loop.init(start)
+            run = CompiledRun(loop, compiled, self.template.integrator, state, control_state, parameters)
+        else:  # a controller of the user may have changed its first memory, although a memory is a value
+            run.restart(compiled, state, parameters, loop.prepared.loop.init(start) if loop.law is None else None)
         run.integrate()
-        return run
-
-    def _compiled(
-        self, prepared: CompiledLoop, compiled: CompiledSystem, state: Array, parameters: Array
-    ) -> CompiledRun:
-        """A run in the arrays of one that is not needed any more, or a new one."""
-        loop, start = prepared.prepared.loop, self.template.start_time
-        idle = self._idle.setdefault(id(prepared), [])
-        try:
-            run = idle.pop()
-        except IndexError:
-            integrator = self.template.integrator
-            assert integrator is not None
-            return CompiledRun(prepared, compiled, integrator, state, loop.init(start), parameters)
-        # a controller of the user may have changed its first memory, although a memory is a value
-        run.restart(compiled, state, parameters, loop.init(start) if prepared.law is None else None)
         return run
 
     def release(self, run: CompiledRun) -> None:
         """State that nothing of a run is needed any more; its arrays serve another one."""
-        self._idle[id(run.loop)].append(run)
+        self._idle.give_back(id(run.loop), run)
 
     def _loop(self, loop: ControlLoop) -> CompiledLoop:
         """A loop prepared for its runs, once for all plants that share it."""
         with self._preparing:
             if id(loop) not in self._prepared:
                 problem = dataclasses.replace(self.template, input=loop)
-                prepared = self._at_times(prepare_loop(problem, loop.init(problem.start_time)))
+                prepared = prepare_loop(problem, loop.init(problem.start_time))
+                rows = first_rows_of(self.times, prepared.instants)
+                prepared = dataclasses.replace(prepared, times=self.times, first_rows=rows)
                 self._prepared[id(loop)] = CompiledLoop(problem.compiled, prepared)
         return self._prepared[id(loop)]
 
-    def _at_times(self, prepared: SampledLoop) -> SampledLoop:
-        """The same loop with rows at the times of the batch alone."""
-        rows = first_rows_of(self.times, prepared.instants)
-        return dataclasses.replace(prepared, times=self.times, first_rows=rows)
-
     def columns(self, index: int, wanted: Collection[str], run: CompiledRun, count: int) -> dict[str, Array]:
         """The wanted ones of set points, measurements and commands at the first rows (R,) of one plant."""
-        controller = self.loops[0].controller
         intervals, setpoints = self._rows_of(self.loop_of(index), run.prepared)
         intervals = np.minimum(intervals[:count], max(len(run.measured) - 1, 0))
-        columns: dict[str, Array] = {}
-        for values, rows, prefix, names in (
-            (setpoints, slice(count), SETPOINT, controller.setpoints),
-            (run.measured, intervals, MEASURED, controller.measured_columns),
-            (run.commanded, intervals, COMMAND, controller.inputs),
-        ):
-            columns |= {f"{prefix}{n}": values[rows, i] for i, n in enumerate(names) if f"{prefix}{n}" in wanted}
-        return columns
+        columns = (*setpoints[:count].T, *run.measured[intervals].T, *run.commanded[intervals].T)
+        return {n: column for n, column in zip(self.loops[0].column_names, columns, strict=True) if n in wanted}
 
 
 def loops_of(given: Any, system: System) -> tuple[ControlLoop, ...] | None:
@@ -159,19 +125,13 @@ def loops_of(given: Any, system: System) -> tuple[ControlLoop, ...] | None:
         raise ParameterError("simulate_batch: the inputs are control loops and signals; give one kind for all plants.")
     distinct = {id(loop): designed_loop(loop, system) for loop in loops}
     loops = tuple(distinct[id(loop)] for loop in loops)
-    first = _names(loops[0])
     for row, loop in enumerate(loops):
-        if _names(loop) != first:
+        if loop.signals != loops[0].signals:
             raise ParameterError(
                 f"inputs, row {row}: {type(loop.controller).__name__} measures or commands other columns than that of "
                 "row 0; all loops of a batch need the same measured columns, set points and commanded inputs."
             )
     return loops
-
-
-def _names(loop: ControlLoop) -> tuple[tuple[str, ...], ...]:
-    controller = loop.controller
-    return controller.measured_columns, controller.setpoints, controller.inputs
 
 
 def vary(
