@@ -2,8 +2,8 @@
 
 import abc
 import dataclasses
-from collections.abc import Callable
-from typing import Any
+from collections.abc import Callable, Sequence
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -21,25 +21,53 @@ ALIGNMENT = 64
 class LaneBlock:
     """The arrays of one thread for a block of lanes; it owns them as long as a kernel uses their addresses."""
 
-    def __init__(self, job: BatchJob, precision: "Precision") -> None:
+    def __init__(self, job: BatchJob, precision: "Precision", table: "SegmentTable") -> None:
         number, sizes = precision.number, job.compiled.sizes
-        self.dtype = np.float64 if number.bits == 64 else np.float32
+        self.job, self.table, self.dtype = job, table, precision.dtype
         assert isinstance(job.integrator, ExplicitRungeKutta)
+        self.step = job.integrator.step
         self.addresses, precomputed = job.compiled.program.lanes(job.integrator.tableau(), number)
         n, m, width = sizes.states, sizes.inputs, number.lanes
         lengths = (sizes.parameters, precomputed, n, n, m, m, m, 1, sizes.outputs)
         self.arrays = aligned_arrays(lengths, width, self.dtype)
-        self.kept = np.concatenate([job.kept, _bounded_states(job)])
+        self.bounded = np.flatnonzero(np.isfinite(job.lower_bounds)).astype(np.int64)
+        """States with a lower bound; their rows are checked after the run and not stored."""
+        self.kept = np.concatenate([job.kept, self.bounded])
         self.rows = np.empty((self.kept.size, width, job.times.size), self.dtype)
         self.final = np.empty((width, n), self.dtype)
         self.status = np.empty(width, dtype=np.int64)
         self.counters = (np.empty(width, np.int64), np.empty(width, np.int64), *(np.empty(width) for _ in range(3)))
         self.width = width
 
+    def run(self, plants: npt.NDArray[np.intp], lane: npt.NDArray[np.intp], stop: npt.NDArray[np.int64]) -> None:
+        """Simulate one block of plants, of which `lane` names one for each lane."""
+        job, table = self.job, self.table
+        load_plants(job, self.arrays, lane)
+        ended = lanes(
+            *self.addresses, *self.arrays, table.ends, table.values, table.slopes, table.first[lane], table.last[lane],
+            job.start_time, self.step, job.times, self.kept, self.rows, self.final, self.status, stop,
+            *self.counters,
+        )  # fmt: skip
+        if ended == Status.INTERRUPTED:
+            return
+        for j, column in enumerate(job.columns.values()):
+            column[plants] = self.rows[j, : plants.size]
+        job.final[plants] = self.final[: plants.size]
+        job.status[plants], job.reached[plants] = self.status[: plants.size], job.times.size
+        bounds = job.lower_bounds
+        below: npt.NDArray[np.bool_] = np.any(job.final[plants] < bounds, axis=1)
+        for rows, i in zip(self.rows[len(job.columns) :], self.bounded, strict=True):
+            below |= np.any(rows[: plants.size] < bounds[i], axis=1)
+        for index, negative in zip(plants, below, strict=True):
+            if negative or job.status[index]:
+                retry_alone(job, int(index), self.dtype, Status.NEGATIVE_AIR_MASS if negative else Status.NOT_FINITE)
 
-def _bounded_states(job: BatchJob) -> npt.NDArray[np.int64]:
-    """States with a lower bound; their rows are checked after the run and not stored."""
-    return np.flatnonzero(np.isfinite(job.lower_bounds)).astype(np.int64)
+
+def load_plants(job: BatchJob, arrays: Sequence[npt.NDArray[Any]], lane: npt.NDArray[np.intp]) -> None:
+    """Write parameters and initial states of one plant a lane into the first and third array of a block."""
+    arrays[0][:] = job.compiled.parameters[:, None]
+    arrays[0][job.variations.places] = job.variations.values[lane].T
+    arrays[2][:] = job.initial_states[lane].T
 
 
 def aligned_arrays(lengths: tuple[int, ...], width: int, dtype: Any) -> list[npt.NDArray[Any]]:
@@ -67,50 +95,25 @@ class SegmentTable:
         self.first, self.last = np.append(0, ends)[own], ends[own]
 
 
-def lane_workers(
-    job: BatchJob, precision: "Precision", active: npt.NDArray[np.intp], cores: int
+def block_workers(
+    make: Callable[[], Any], active: npt.NDArray[np.intp], cores: int
 ) -> tuple[Queue, list[Callable[[int], Any]], int]:
-    """The queue of blocks of the active plants, one worker per core, and the number of plants in a block."""
-    table, first = SegmentTable(job), LaneBlock(job, precision)
+    """The queue of blocks of the active plants, one worker per core, and the number of plants in a block.
+
+    `make` makes a block, such as a `LaneBlock`. Unused lanes repeat its last plant.
+    """
+    first = make()
     count = -(-active.size // first.width)
     queue = Queue(count)
-    blocks = [first, *(LaneBlock(job, precision) for _ in range(min(cores, count) - 1))]
 
-    def worker(block: LaneBlock) -> Callable[[int], Any]:
-        return lambda i: _run(job, table, block, active[i * block.width : (i + 1) * block.width], queue.stop)
+    def worker(block: Any) -> Callable[[int], Any]:
+        def run(i: int) -> None:
+            plants = active[i * block.width : (i + 1) * block.width]
+            block.run(plants, np.pad(plants, (0, block.width - plants.size), "edge"), queue.stop)
 
-    return queue, [worker(block) for block in blocks], first.width
+        return run
 
-
-def _run(
-    job: BatchJob, table: SegmentTable, block: LaneBlock, plants: npt.NDArray[np.intp], stop: npt.NDArray[np.int64]
-) -> None:
-    """Simulate one block. Unused lanes repeat its last plant."""
-    integrator, variations = job.integrator, job.variations
-    assert isinstance(integrator, ExplicitRungeKutta)
-    lane = np.concatenate([plants, np.full(block.width - plants.size, plants[-1], dtype=np.intp)])
-    p, y = block.arrays[0], block.arrays[2]
-    p[:] = job.compiled.parameters[:, None]
-    p[variations.places] = variations.values[lane].T
-    y[:] = job.initial_states[lane].T
-    ended = lanes(
-        *block.addresses, *block.arrays, table.ends, table.values, table.slopes, table.first[lane], table.last[lane],
-        job.start_time, integrator.step, job.times, block.kept, block.rows, block.final, block.status, stop,
-        *block.counters,
-    )  # fmt: skip
-    if ended == Status.INTERRUPTED:
-        return
-    for j, column in enumerate(job.columns.values()):
-        column[plants] = block.rows[j, : plants.size]
-    job.final[plants] = block.final[: plants.size]
-    job.status[plants], job.reached[plants] = block.status[: plants.size], job.times.size
-    bounds = job.lower_bounds
-    below: npt.NDArray[np.bool_] = np.any(job.final[plants] < bounds, axis=1)
-    for rows, i in zip(block.rows[len(job.columns) :], _bounded_states(job), strict=True):
-        below |= np.any(rows[: plants.size] < bounds[i], axis=1)
-    for index, negative in zip(plants, below, strict=True):
-        if negative or job.status[index]:
-            retry_alone(job, int(index), block.dtype, Status.NEGATIVE_AIR_MASS if negative else Status.NOT_FINITE)
+    return queue, [worker(block) for block in (first, *(make() for _ in range(min(cores, count) - 1)))], first.width
 
 
 def retry_alone(job: BatchJob, index: int, dtype: Any, status: Status) -> None:
@@ -123,9 +126,9 @@ def retry_alone(job: BatchJob, index: int, dtype: Any, status: Status) -> None:
 
 def check_precision(precision: "Precision", integrator: object, *, loops: bool) -> None:
     """Raise ParameterError for a precision in which an integrator or control loops cannot be computed."""
-    if precision.number.bits != 64 and loops:
+    if precision.bits != 64 and loops:
         raise ParameterError("simulate_batch: control loops are computed in double precision; omit the precision.")
-    if precision.number.bits != 64 and not isinstance(integrator, ExplicitRungeKutta):
+    if precision.bits != 64 and not isinstance(integrator, ExplicitRungeKutta):
         raise ParameterError(
             f"simulate_batch: {type(integrator).__name__} chooses its steps in double precision; {precision} requires "
             "an integrator of fixed step, such as RungeKutta4(1e-3)."
@@ -139,38 +142,31 @@ BITS = 1024
 class Precision(abc.ABC):
     """The floating-point format of a batch in lanes."""
 
-    @property
-    @abc.abstractmethod
-    def number(self) -> LlvmType:
-        """The LLVM type of a vector of lanes."""
+    bits: ClassVar[int]
+    note: ClassVar[str] = ""
+    """A remark for the reader of the results; empty where there is none."""
 
     @property
-    @abc.abstractmethod
-    def note(self) -> str:
-        """A remark for the reader of the results; empty where there is none."""
+    def number(self) -> LlvmType:
+        """The LLVM type of a vector of lanes."""
+        return LlvmType(self.bits, BITS // self.bits)
+
+    @property
+    def dtype(self) -> Any:
+        """The type of the numbers of an array."""
+        return np.float64 if self.bits == 64 else np.float32
 
 
 @dataclasses.dataclass(frozen=True)
 class Double(Precision):
     """Double precision, sixteen digits; the default."""
 
-    @property
-    def number(self) -> LlvmType:
-        return LlvmType(64, BITS // 64)
-
-    @property
-    def note(self) -> str:
-        return ""
+    bits: ClassVar[int] = 64
 
 
 @dataclasses.dataclass(frozen=True)
 class Single(Precision):
     """Single precision, seven digits: half the memory and about twice as fast, for integrators of fixed step."""
 
-    @property
-    def number(self) -> LlvmType:
-        return LlvmType(32, BITS // 32)
-
-    @property
-    def note(self) -> str:
-        return "single precision: rounding errors accumulate over a run; expect about four correct digits"
+    bits: ClassVar[int] = 32
+    note: ClassVar[str] = "single precision: rounding errors accumulate over a run; expect about four correct digits"

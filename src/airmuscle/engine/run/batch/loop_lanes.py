@@ -1,8 +1,5 @@
 """Control loops in lanes: blocks of loops with common sampling instants through one vectorised step and sample."""
 
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
 import numpy.typing as npt
 
@@ -11,8 +8,9 @@ from ...compile.cache.kernel import loop_lanes
 from ...loop.control_law import ControlLaw
 from ..compiled_law import parameters_of, sample_in_lanes
 from ..integrators import ExplicitRungeKutta
-from .job import BatchJob, Queue
-from .lanes import Double, aligned_arrays, retry_alone
+from ..sampled_loop import intervals_of
+from .job import BatchJob
+from .lanes import Double, aligned_arrays, load_plants, retry_alone
 from .loops import LoopBatch
 
 NUMBER = Double().number
@@ -46,8 +44,10 @@ class LoopLaneBlock:
     """The arrays of one thread for a block of loops; it owns them as long as a kernel uses their addresses."""
 
     def __init__(self, job: BatchJob, loops: LoopBatch) -> None:
+        self.job, self.loops = job, loops
         sizes, width = job.compiled.sizes, NUMBER.lanes
         assert isinstance(job.integrator, ExplicitRungeKutta)
+        self.step = job.integrator.step
         addresses, held = job.compiled.program.lanes(job.integrator.tableau(), NUMBER)
         law, self.prepared = loops.loops[0].controller, loops.prepared(loops.loops[0])
         assert isinstance(law, ControlLaw)
@@ -74,13 +74,11 @@ class LoopLaneBlock:
         self.row_segment = np.maximum(rows, 0).astype(np.int64)
         self.status, self.width = np.empty(width, dtype=np.int64), width
 
-    def load(self, job: BatchJob, loops: LoopBatch, lane: npt.NDArray[np.intp]) -> None:
+    def _load(self, lane: npt.NDArray[np.intp]) -> None:
         """Take over parameters, initial states, set points and inputs of one plant a lane."""
-        p, _, y, _, u, *_ = self.arrays
+        loops, u = self.loops, self.arrays[4]
+        load_plants(self.job, self.arrays, lane)
         parameters, memory, _, _, _, _, low, high, period = self.arrays[9:]
-        p[:] = job.compiled.parameters[:, None]
-        p[job.variations.places] = job.variations.values[lane].T
-        y[:] = job.initial_states[lane].T
         for i, plant in enumerate(lane.tolist()):
             loop = loops.loop_of(plant)
             prepared, law = loops.prepared(loop), loop.controller
@@ -93,57 +91,35 @@ class LoopLaneBlock:
             low[:, i], high[:, i] = ranges.T
         period[:], u[:] = loops.loops[0].sample_time, self.values[0]
 
-    def run(self, job: BatchJob, stop: npt.NDArray[np.int64]) -> int:
-        """Run the loops; a status."""
-        prepared = self.prepared
-        assert isinstance(job.integrator, ExplicitRungeKutta)
-        return loop_lanes(
+    def run(self, plants: npt.NDArray[np.intp], lane: npt.NDArray[np.intp], stop: npt.NDArray[np.int64]) -> None:
+        """Simulate one block of loops, of which `lane` names one for each lane."""
+        job, prepared = self.job, self.prepared
+        self._load(lane)
+        status = loop_lanes(
             *self.addresses, *self.arrays, prepared.instants, self.setpoints, prepared.first_segments, self.starts,
-            prepared.inputs.ends, self.values, self.slopes, job.integrator.step, self.measured_at, self.commanded_at,
+            prepared.inputs.ends, self.values, self.slopes, self.step, self.measured_at, self.commanded_at,
             job.lower_bounds, job.times, self.row_segment, self.kept, self.rows, self.samples, self.commands,
             self.status, stop,
         )  # fmt: skip
+        if status != Status.INTERRUPTED:
+            self._write(plants)
 
-    def write(self, job: BatchJob, loops: LoopBatch, plants: npt.NDArray[np.intp]) -> None:
+    def _write(self, plants: npt.NDArray[np.intp]) -> None:
         """Write the results of a block; a loop that failed is run again alone, for its rows and its reason."""
-        kept = iter(self.rows)
-        at = np.maximum(np.searchsorted(self.prepared.instants, job.times, side="right") - 1, 0)
-        at = np.minimum(at, len(self.samples) - 1)
+        job, kept = self.job, iter(self.rows)
+        at = np.minimum(intervals_of(job.times, self.prepared.instants), len(self.samples) - 1)
         for name, place in zip(job.columns, job.kept.tolist(), strict=True):
             column = job.columns[name]
-            column[plants] = next(kept)[: plants.size] if place < self.plain else self._of_loop(loops, name, at, plants)
+            column[plants] = next(kept)[: plants.size] if place < self.plain else self._of_loop(name, at, plants)
         job.final[plants] = self.arrays[2].T[: plants.size]
         job.status[plants], job.reached[plants] = self.status[: plants.size], job.times.size
         for i in np.flatnonzero(self.status[: plants.size]):
             retry_alone(job, int(plants[i]), np.float64, Status(int(self.status[i])))
 
-    def _of_loop(
-        self, loops: LoopBatch, name: str, at: npt.NDArray[np.intp], plants: npt.NDArray[np.intp]
-    ) -> Array:  # fmt: skip
+    def _of_loop(self, name: str, at: npt.NDArray[np.intp], plants: npt.NDArray[np.intp]) -> Array:
         """A column (R, T) of the set points, measurements or commands of plants."""
+        loops = self.loops
         kind, index = loops.place_of(name)
         if kind:
             return np.asarray((self.samples if kind == 1 else self.commands)[at, index, : plants.size].T)
         return np.array([loops.setpoints_of(loops.loop_of(int(plant)))[:, index] for plant in plants])
-
-
-def loop_lane_workers(
-    job: BatchJob, loops: LoopBatch, active: npt.NDArray[np.intp], cores: int
-) -> tuple[Queue, list[Callable[[int], Any]], int]:
-    """The queue of blocks of the active plants, one worker per core, and the number of plants in a block."""
-    first = LoopLaneBlock(job, loops)
-    count = -(-active.size // first.width)
-    queue = Queue(count)
-    blocks = [first, *(LoopLaneBlock(job, loops) for _ in range(min(cores, count) - 1))]
-
-    def worker(block: LoopLaneBlock) -> Callable[[int], Any]:
-        def run(item: int) -> None:
-            plants = active[item * block.width : (item + 1) * block.width]
-            unused = np.full(block.width - plants.size, plants[-1], dtype=np.intp)
-            block.load(job, loops, np.concatenate([plants, unused]))
-            if block.run(job, queue.stop) != Status.INTERRUPTED:
-                block.write(job, loops, plants)
-
-        return run
-
-    return queue, [worker(block) for block in blocks], first.width

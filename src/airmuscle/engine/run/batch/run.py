@@ -16,8 +16,8 @@ from ..integrators import ExplicitRungeKutta, Integrator, default_integrator
 from ..output_times import output_times as times_of
 from ..problem import check_input_range
 from .job import NOT_RUN, BatchJob, Queue, progress, run_workers
-from .lanes import Double, Precision, check_precision, lane_workers
-from .loop_lanes import loop_lane_workers, run_in_lanes
+from .lanes import Double, LaneBlock, Precision, SegmentTable, block_workers, check_precision
+from .loop_lanes import LoopLaneBlock, run_in_lanes
 from .loops import LoopBatch, loops_of, vary
 from .solution import BatchSolution, InMemory, OnDisk
 from .variations import Variations, check_states, count_of_states, default_states, given_states
@@ -190,11 +190,8 @@ def _job(
     given = (compiled, varied, integrator, states, segments, start, duration, times)
     job = BatchJob(*given, {}, final, status, reached, reasons, nominal, loops)
     names = job.names if keep is None else _kept(keep, job.names)
-    dtype = np.float64 if precision.number.bits == 64 else np.float32
-    if into is None:
-        storage = InMemory(names, count, times.size, dtype)
-    else:
-        storage = OnDisk(into, names, count, times.size, dtype)
+    shape = (names, count, times.size, precision.dtype)
+    storage = InMemory(*shape) if into is None else OnDisk(into, *shape)
     job.columns.update(storage.columns)
     return job, storage
 
@@ -212,9 +209,11 @@ def _run(job: BatchJob, precision: Precision, cores: int) -> None:
     if not active.size:
         return
     if job.loops is not None and run_in_lanes(job, active):
-        queue, workers, each = loop_lane_workers(job, job.loops, active, cores)
+        loops = job.loops
+        queue, workers, each = block_workers(lambda: LoopLaneBlock(job, loops), active, cores)
     elif isinstance(job.integrator, ExplicitRungeKutta) and job.loops is None:
-        queue, workers, each = lane_workers(job, precision, active, cores)
+        table = SegmentTable(job)
+        queue, workers, each = block_workers(lambda: LaneBlock(job, precision, table), active, cores)
     else:
         job.run_single(int(active[0]))  # what compiles, compiles here, before threads need it at once
         queue, each = Queue(active.size - 1), 1

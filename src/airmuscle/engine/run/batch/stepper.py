@@ -52,7 +52,7 @@ class BatchStepper:
         compiled, number = compile_system(plant), precision.number
         self.plant, self.count, self.width = plant, count, number.lanes
         self._options = {"integrator": integrator, "precision": precision, "cores": cores}
-        self.dtype: Any = np.float64 if number.bits == 64 else np.float32
+        self.dtype: Any = precision.dtype
         self.blocks = -(-count // self.width)
         (prepare, *functions), held = compiled.program.lanes(integrator.tableau(), number)
         self._program, self._prepare = compiled.program, _PREPARE(prepare)
