@@ -151,8 +151,9 @@ class _Step:
             given["in", 1, i] = self._input(i, sum(row))
         for operand, place in self.held.items():
             given[operand] = self._load(f"c{stage}", place)
-        values = emission.run(self.block, self.items, (), {}, given)
-        by_index = {i: emission.value_of(self.block, operand, (), {}, values) for _, i, operand in self.outputs}
+        at = emission.Emission(self.block, (), {}, given)
+        at.run(self.items)
+        by_index = {i: at.value_of(operand) for _, i, operand in self.outputs}
         return [by_index[i] for i in range(self.states)]
 
     def _load(self, array: str, index: int) -> str:

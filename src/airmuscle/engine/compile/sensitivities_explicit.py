@@ -19,24 +19,20 @@ class _Stage:
     """
 
     def __init__(
-        self,
-        rates: Values,
-        along: DirectionalDerivative,
-        printer: Printer,
-        block: FunctionBody,
-        given: dict[Operand, str],
-        v: Sequence[LlvmValue],
-    ) -> None:
-        self.rates, self.along, self.block, self.values, self.v = rates, along, block, given, v
+        self, rates: Values, along: DirectionalDerivative, printer: Printer, block: FunctionBody,
+        given: dict[Operand, str], v: Sequence[LlvmValue],
+    ) -> None:  # fmt: skip
+        self.rates, self.along, self.block, self.v = rates, along, block, v
         wanted = tuple((0, i, operand) for i, operand in enumerate([*rates.results, *along.parts]))
-        code, self.held = printer.set_apart(finished(Code(tuple(rates.tape.body), wanted)), POINT)
+        code, held = printer.set_apart(finished(Code(tuple(rates.tape.body), wanted)), POINT)
+        self.at = emission.Emission(block, POINT, held, given)
         needed = set(rates.results)
         for line in reversed(code.body):
             if line.result in needed:
                 needed.update(line.arguments)
         self.first: list[Item] = []
         self.second: list[Item] = []
-        for item in emission.with_gates(code, POINT, self.held, frozenset(needed)):
+        for item in emission.with_gates(code, POINT, held, frozenset(needed)):
             early = (item if isinstance(item, Instruction) else item.body[0]).result in needed
             (self.first if early else self.second).append(item)
 
@@ -44,21 +40,16 @@ class _Stage:
         """The rates of this stage, and in between the derivatives of the one before."""
         done, ahead = 0, 0 if before is None else len(before.second)
         for number, line in enumerate(self.first, 1):
-            emission.append(self.block, line, POINT, self.held, self.values)
+            self.at.run([line])
             if before is not None:
                 upto = ahead * number // len(self.first)
-                before.print_derivatives(done, upto)
+                before.at.run(before.second[done:upto])
                 done = upto
         if before is not None:
-            before.print_derivatives(done, ahead)
-
-    def print_derivatives(self, begin: int = 0, end: int | None = None) -> None:
-        """The derivatives of this stage, or some of their instructions."""
-        for line in self.second[begin:end]:
-            emission.append(self.block, line, POINT, self.held, self.values)
+            before.at.run(before.second[done:])
 
     def _value(self, operand: Operand) -> LlvmValue:
-        return LlvmValue(self.block, emission.value_of(self.block, operand, POINT, self.held, self.values))
+        return LlvmValue(self.block, self.at.value_of(operand))
 
     def slopes(self) -> list[LlvmValue]:
         """The rates."""
@@ -110,7 +101,7 @@ def explicit_module(t: TangentSystem, a: Sequence[Sequence[float]], b: Sequence[
         if before is not None:
             columns.append(before.columns(_after(rows[number - 1], s, columns, h)))
         before = stage
-    stage.print_derivatives()
+    stage.at.run(stage.second)
     columns.append(stage.columns(_after(rows[-1], s, columns, h)))
     stored(_after(b, states, slopes, h) + _after(b, s, columns, h), "y")
     printer.end("step", ["x", "u", PARAMETERS, "w", "h"], ["y"], block)

@@ -1,7 +1,8 @@
 """Emission of instructions into functions of a target language: straight-line code, and branches around blocks."""
 
 import abc
-from collections.abc import Callable, Mapping, Sequence
+import functools
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 from ....core import TraceError
@@ -98,8 +99,9 @@ def computed(
     `inputs` are the names of the arrays, `held` the indices of precomputed operands in `c`, `given` the names of known
     values.
     """
-    values = run(block, with_gates(code, inputs, held), inputs, held, given)
-    return {(o, i): value_of(block, operand, inputs, held, values) for o, i, operand in code.outputs}
+    emission = Emission(block, inputs, held, given)
+    emission.run(with_gates(code, inputs, held))
+    return {(o, i): emission.value_of(operand) for o, i, operand in code.outputs}
 
 
 def with_gates(
@@ -113,65 +115,49 @@ def with_gates(
     return skipping(code, level, early)
 
 
-def run(
-    block: FunctionBlock,
-    body: Sequence[Item],
-    inputs: Sequence[str],
-    held: Mapping[Operand, int],
-    given: Mapping[Operand, str] | None = None,
-) -> dict[Operand, str]:
-    """Append instructions to a block; return the names of their results and of the operands in `given`."""
-    values = dict(given or {})
-    for line in body:
-        append(block, line, inputs, held, values)
-    return values
+class Emission:
+    """Instructions appended to a block, and the names of their results, `values`; arguments as of `computed`."""
 
+    def __init__(
+        self, block: FunctionBlock, inputs: Sequence[str], held: Mapping[Operand, int], given: Mapping[Operand, str]
+    ) -> None:
+        self.block, self.inputs, self.held, self.values = block, inputs, held, dict(given)
 
-def append(
-    block: FunctionBlock, line: Item, inputs: Sequence[str], held: Mapping[Operand, int], values: dict[Operand, str]
-) -> None:
-    """Append an instruction or a conditional block, and add the names of its results to `values`."""
-    if isinstance(line, ConditionalBlock):
-        instead = {operand: value_of(block, value, inputs, held, values) for operand, value in line.instead}
-        gates = [value_of(block, gate, inputs, held, values) for gate in line.gates]
-        values |= block.unless_zero(gates, lambda: run(block, line.body, inputs, held, values), instead)
-        return
-    arguments = [value_of(block, a, inputs, held, values) for a in line.arguments]
-    values[line.result] = block.operate(line.operation, arguments)
+    def run(self, body: Iterable[Item]) -> dict[Operand, str]:
+        """Append instructions and conditional blocks; the names of all values."""
+        for line in body:
+            if isinstance(line, ConditionalBlock):
+                instead = {operand: self.value_of(value) for operand, value in line.instead}
+                inside = Emission(self.block, self.inputs, self.held, self.values)
+                compute = functools.partial(inside.run, line.body)
+                self.values |= self.block.unless_zero([self.value_of(gate) for gate in line.gates], compute, instead)
+            else:
+                self.values[line.result] = self.block.operate(line.operation, list(map(self.value_of, line.arguments)))
+        return self.values
 
-
-def value_of(
-    block: FunctionBlock,
-    operand: Operand,
-    inputs: Sequence[str],
-    held: Mapping[Operand, int],
-    values: Mapping[Operand, str],
-) -> str:
-    """The name of the value of an operand, which is loaded if it is an array element."""
-    if operand in values:
-        return values[operand]
-    if operand in held:
-        return block.load("c", held[operand])
-    if operand[0] == "c":
-        return block.constant(float(operand[1]))
-    return block.load(inputs[operand[1]], operand[2])
+    def value_of(self, operand: Operand) -> str:
+        """The name of the value of an operand, which is loaded if it is an array element."""
+        if operand in self.values:
+            return self.values[operand]
+        if operand in self.held:
+            return self.block.load("c", self.held[operand])
+        if operand[0] == "c":
+            return self.block.constant(float(operand[1]))
+        return self.block.load(self.inputs[operand[1]], operand[2])
 
 
 def hand_over(
-    block: FunctionBlock,
-    once: Sequence[Instruction],
-    handed: Sequence[Operand],
-    inputs: Sequence[str],
+    block: FunctionBlock, once: Sequence[Instruction], handed: Sequence[Operand], inputs: Sequence[str],
     places: dict[str, int],
-) -> dict[Operand, int]:
+) -> dict[Operand, int]:  # fmt: skip
     """Append the part of a function that depends on parameters only; return the indices of its results in `c`.
 
     `places` contains the indices of values that are stored already, so that functions share equal values.
     """
-    values = run(block, once, inputs, {})
-    held = {}
+    emission, held = Emission(block, inputs, {}, {}), {}
+    emission.run(once)
     for operand in handed:
-        value = value_of(block, operand, inputs, {}, values)
+        value = emission.value_of(operand)
         if value not in places:
             places[value] = len(places)
             block.store("c", places[value], value)

@@ -1,12 +1,13 @@
 """Function body in a language of expressions: each value is named once, choices are conditional expressions."""
 
 import abc
+import dataclasses
 import math
 import re
 from collections.abc import Callable, Collection, Mapping, Sequence
-from typing import NamedTuple
+from typing import ClassVar, NamedTuple
 
-from ..ir.emission import FunctionBlock, unknown_operation
+from ..ir.emission import FunctionBlock, TargetLanguage, unknown_operation
 from ..ir.instructions import Operand, Operation
 
 _BINARY = {
@@ -182,3 +183,14 @@ class TextBody(FunctionBlock, abc.ABC):
         self.lines[begin:] = [f"  {line}" for line in self.lines[begin:]]
         self.lines += [self.end_branch] if self.end_branch else []
         return joined
+
+
+@dataclasses.dataclass(frozen=True)
+class TextLanguage(TargetLanguage):
+    """A language of expressions, whose functions have bodies of one class."""
+
+    body_type: ClassVar[Callable[[Sequence[str]], TextBody]]
+    labels: Labels = dataclasses.field(default_factory=dict, hash=False, kw_only=True)
+
+    def body(self, scalars: Sequence[str] = ()) -> TextBody:
+        return type(self).body_type(scalars)

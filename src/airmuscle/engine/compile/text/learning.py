@@ -3,9 +3,9 @@
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 
-from ..ir.emission import FunctionBlock, TargetLanguage
+from ..ir.emission import FunctionBlock
 from ..ir.instructions import Operand
-from .body import Labels, TextBody
+from .body import TextBody, TextLanguage
 
 _OWN = ("asinh", "log1p", "expm1")
 """Functions that Warp does not have; the module defines them."""
@@ -43,16 +43,13 @@ class TorchBody(TextBody):
 
 
 @dataclasses.dataclass(frozen=True)
-class TorchLanguage(TargetLanguage):
+class TorchLanguage(TextLanguage):
     """Functions of a Python module in which `torch` and `stacked` are defined; arrays are sequences of tensors.
 
     A function returns what `stacked` makes of the list of tensors of its array.
     """
 
-    labels: Labels = dataclasses.field(default_factory=dict, hash=False)
-
-    def body(self, scalars: Sequence[str] = ()) -> TorchBody:
-        return TorchBody(scalars)
+    body_type = TorchBody
 
     def function(self, name: str, inputs: Sequence[str], outputs: Sequence[str], body: FunctionBlock) -> str:
         assert isinstance(body, TorchBody)
@@ -91,13 +88,10 @@ class WarpBody(TextBody):
 
 
 @dataclasses.dataclass(frozen=True)
-class WarpLanguage(TargetLanguage):
+class WarpLanguage(TextLanguage):
     """Kernels of a Python module in which `wp`, the type `real` and the functions of _OWN are defined."""
 
-    labels: Labels = dataclasses.field(default_factory=dict, hash=False)
-
-    def body(self, scalars: Sequence[str] = ()) -> WarpBody:
-        return WarpBody(scalars)
+    body_type = WarpBody
 
     def function(self, name: str, inputs: Sequence[str], outputs: Sequence[str], body: FunctionBlock) -> str:
         assert isinstance(body, WarpBody)

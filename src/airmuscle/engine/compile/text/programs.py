@@ -4,8 +4,8 @@ import dataclasses
 import struct
 from collections.abc import Sequence
 
-from ..ir.emission import FunctionBlock, TargetLanguage
-from .body import Labels, TextBody
+from ..ir.emission import FunctionBlock
+from .body import TextBody, TextLanguage
 
 COMPLEX = ("sqrt", "log", "log1p", "asin", "acos", "pow")
 """Functions that return complex numbers outside their real domain; here the result is NaN there."""
@@ -50,7 +50,7 @@ class CBody(TextBody):
 
 
 @dataclasses.dataclass(frozen=True)
-class CLanguage(TargetLanguage):
+class CLanguage(TextLanguage):
     """C99 without memory allocation: void functions of arrays.
 
     number  "double" or "float"
@@ -61,8 +61,6 @@ class CLanguage(TargetLanguage):
     number: str = "double"
     prefix: str = ""
     public: frozenset[str] | None = frozenset()
-
-    labels: Labels = dataclasses.field(default_factory=dict, hash=False)
 
     def body(self, scalars: Sequence[str] = ()) -> CBody:
         return CBody(scalars, self.number)
@@ -100,7 +98,7 @@ class JavaScriptBody(TextBody):
 
 
 @dataclasses.dataclass(frozen=True)
-class JavaScriptLanguage(TargetLanguage):
+class JavaScriptLanguage(TextLanguage):
     """An ECMAScript module whose functions write into the arrays that they are given.
 
     prefix    beginning of the name of every function
@@ -110,10 +108,7 @@ class JavaScriptLanguage(TargetLanguage):
     prefix: str = ""
     exported: bool = True
 
-    labels: Labels = dataclasses.field(default_factory=dict, hash=False)
-
-    def body(self, scalars: Sequence[str] = ()) -> JavaScriptBody:
-        return JavaScriptBody(scalars)
+    body_type = JavaScriptBody
 
     def function(self, name: str, inputs: Sequence[str], outputs: Sequence[str], body: FunctionBlock) -> str:
         head = f"{'export ' if self.exported else ''}function {self.prefix}{name}({', '.join([*inputs, *outputs])}) {{"
@@ -157,7 +152,7 @@ class MatlabBody(TextBody):
 
 
 @dataclasses.dataclass(frozen=True)
-class MatlabLanguage(TargetLanguage):
+class MatlabLanguage(TextLanguage):
     """Functions of one MATLAB file; what they compute is returned, `[f, J] = jac(x, u, c)`.
 
     prefix  beginning of the name of every function
@@ -165,10 +160,7 @@ class MatlabLanguage(TargetLanguage):
 
     prefix: str = ""
 
-    labels: Labels = dataclasses.field(default_factory=dict, hash=False)
-
-    def body(self, scalars: Sequence[str] = ()) -> MatlabBody:
-        return MatlabBody(scalars)
+    body_type = MatlabBody
 
     def function(self, name: str, inputs: Sequence[str], outputs: Sequence[str], body: FunctionBlock) -> str:
         assert isinstance(body, MatlabBody)
