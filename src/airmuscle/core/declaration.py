@@ -7,6 +7,7 @@ Any other field is structure: another model, a tuple of models, an integer or a 
 import dataclasses
 import functools
 import math
+import operator
 import warnings
 from collections.abc import Iterator
 from typing import Any, TypeVar, dataclass_transform
@@ -83,6 +84,11 @@ def model(cls: type[T]) -> type[T]:
     if "__post_init__" not in cls.__dict__:
         cls.__post_init__ = _validate  # type: ignore[attr-defined]
     return dataclasses.dataclass(frozen=True, repr=not issubclass(cls, ShortRepr))(cls)
+
+
+def forwarded(path: str) -> Any:
+    """A property that is that of a part: `forwarded("inner.states")`."""
+    return property(operator.attrgetter(path), doc=f"That of `{path.rpartition('.')[0]}`.")
 
 
 def parameters(obj: Any) -> tuple[Parameter, ...]:

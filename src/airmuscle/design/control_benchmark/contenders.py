@@ -90,7 +90,7 @@ class SensedController(Controller):
 
     @property
     def measured_columns(self) -> tuple[str, ...]:
-        return self.sensors.measured_columns
+        return self.sensors.law.measured_columns
 
     @property
     def setpoints(self) -> tuple[str, ...]:

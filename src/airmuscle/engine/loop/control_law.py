@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from ...core import ParameterError, Reference, Value, model, ops, parameter, published, select_prefix, with_prefix
+from ...core.declaration import forwarded
 from .controller import Controller, Measurement
 
 Memory = Mapping[str, Value]
@@ -74,22 +75,11 @@ class EnclosingLaw(ControlLaw):
         def law(self) -> ControlLaw:
             """The law inside."""
 
-    @property
-    def measured_columns(self) -> tuple[str, ...]:
-        return self.law.measured_columns
-
-    @property
-    def setpoints(self) -> tuple[str, ...]:
-        return self.law.setpoints
-
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        return self.law.inputs
-
-    @property
-    def initial_memory(self) -> Mapping[str, float]:
-        """That of the law, unless the enclosing law stores further values."""
-        return self.law.initial_memory
+    measured_columns = forwarded("law.measured_columns")
+    setpoints = forwarded("law.setpoints")
+    inputs = forwarded("law.inputs")
+    initial_memory = forwarded("law.initial_memory")
+    """That of the law, unless the enclosing law stores further values."""
 
 
 def rebuilt(part: Any, change: Callable[[Any], Any]) -> Any:

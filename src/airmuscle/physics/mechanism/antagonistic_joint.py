@@ -3,8 +3,8 @@
 import abc
 from collections.abc import Sequence
 
-from ...core import STANDARD_GRAVITY, ParameterError, Value, Values, check_structure, model, ops, parameter
-from .base import Coordinate, Mechanism
+from ...core import ParameterError, Value, Values, check_structure, model, ops, parameter
+from .base import Coordinate, Mechanism, angle_limit, gravity_parameter
 
 SAMPLES = 101
 """Number of angles at which a profile is checked (chosen)."""
@@ -124,12 +124,8 @@ class AntagonisticJoint(Mechanism):
         "rad", "theta_g", "angle of the weight from its hanging position at angle 0", bounds=(-10.0, 10.0),
         fitted=False, default=0.0,
     )  # fmt: skip
-    min_angle: float = parameter(
-        "rad", "theta_min", "lower limit of the angle", bounds=(-10.0, 10.0), fitted=False, default=-ops.pi
-    )
-    max_angle: float = parameter(
-        "rad", "theta_max", "upper limit of the angle", bounds=(-10.0, 10.0), fitted=False, default=ops.pi
-    )
+    min_angle: float = angle_limit("theta_min", "lower limit of the angle", -ops.pi)
+    max_angle: float = angle_limit("theta_max", "upper limit of the angle", ops.pi)
     profile: PulleyProfile = ConstantRadius()
 
     def check(self) -> None:
@@ -152,9 +148,7 @@ class AntagonisticJoint(Mechanism):
             self.offset + self.radius * self.profile.integral(-angle) / second,
         )
 
-    def generalised_forces(
-        self, q: Values, tensions: Sequence[Value], resting_lengths: Sequence[Value]
-    ) -> dict[str, Value]:
+    def generalised_forces(self, q: Values, tensions: Sequence[Value], resting_lengths: Sequence[Value]) -> Values:
         first, second = (self.profile.ratio(angle) for angle in (q["angle"], -q["angle"]))
         return {"angle": self.radius * (first * tensions[0] - second * tensions[1])}
 
@@ -193,9 +187,7 @@ class Lever(Mechanism):
     offsets: tuple[float, ...] = parameter(
         "1", "eps_0i", "contraction of each muscle at angle 0", bounds=(-0.5, 0.9), default=()
     )
-    gravity: float = parameter(
-        "m/s^2", "g", "acceleration of gravity", bounds=(0.0, 20.0), fitted=False, default=STANDARD_GRAVITY
-    )
+    gravity: float = gravity_parameter()
 
     def check(self) -> None:
         if not self.arms or len(self.offsets) not in (0, len(self.arms)):

@@ -3,10 +3,23 @@
 import abc
 import dataclasses
 from collections.abc import Mapping, Sequence
+from typing import Any
 
-from ...core import Input, StateVariable, Value, Values, autodiff
+from ...core import STANDARD_GRAVITY, Input, StateVariable, Value, Values, autodiff, parameter
 
 INFINITY = float("inf")
+
+
+def gravity_parameter() -> Any:
+    """Declare the acceleration of gravity of a mechanism."""
+    return parameter(
+        "m/s^2", "g", "acceleration of gravity", bounds=(0.0, 20.0), fitted=False, default=STANDARD_GRAVITY
+    )
+
+
+def angle_limit(symbol: str, meaning: str, default: float) -> Any:
+    """Declare a limit of an angle [rad], which is not fitted."""
+    return parameter("rad", symbol, meaning, bounds=(-10.0, 10.0), fitted=False, default=default)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -86,9 +99,7 @@ class Mechanism(abc.ABC):
         )
         return tuple(length * rate for length, rate in zip(resting_lengths, rates, strict=True))
 
-    def generalised_forces(
-        self, q: Values, tensions: Sequence[Value], resting_lengths: Sequence[Value]
-    ) -> dict[str, Value]:
+    def generalised_forces(self, q: Values, tensions: Sequence[Value], resting_lengths: Sequence[Value]) -> Values:
         """Generalised force on each coordinate from the muscle tensions [N], by virtual work: J^T F.
 
         J is the Jacobian of the muscle shortenings by the coordinates, from `contractions`. Units: [N] for a coordinate
@@ -139,9 +150,7 @@ class Translation(Mechanism, abc.ABC):
     def contractions(self, q: Values, resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
         return tuple(q["position"] / length for length in resting_lengths)
 
-    def generalised_forces(
-        self, q: Values, tensions: Sequence[Value], resting_lengths: Sequence[Value]
-    ) -> dict[str, Value]:
+    def generalised_forces(self, q: Values, tensions: Sequence[Value], resting_lengths: Sequence[Value]) -> Values:
         return {"position": sum(tensions, 0.0)}
 
     def kinetic_energy(self, q: Values, v: Values) -> Value:

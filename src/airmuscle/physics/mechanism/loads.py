@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
-from ...core import STANDARD_GRAVITY, Input, ParameterError, Value, Values, model, parameter
-from .base import Coordinate, Mechanism, Translation
+from ...core import Input, ParameterError, Value, Values, model, parameter
+from .base import Coordinate, Mechanism, Translation, gravity_parameter
 
 SHORTENING, SHORTENING_SPEED = "shortening", "shortening_speed"
 """Names of the inputs of one muscle."""
@@ -53,9 +53,7 @@ class HangingMass(Translation):
     """Hanging mass: m y'' = F - m g, with y upwards from the position at the resting length of the muscle."""
 
     mass: float = parameter("kg", "m", "mass of the load", bounds=(1e-4, 1e5))
-    gravity: float = parameter(
-        "m/s^2", "g", "acceleration of gravity", bounds=(0.0, 20.0), fitted=False, default=STANDARD_GRAVITY
-    )
+    gravity: float = gravity_parameter()
 
     def acceleration(self, q: Values, v: Values, forces: Values, inputs: Values) -> Values:
         return {"position": forces["position"] / self.mass - self.gravity}
@@ -102,9 +100,7 @@ class Pulley(Translation):
     ratio: float = parameter("1", "i", "load displacement per muscle displacement", bounds=(1e-3, 1e3), default=1.0)
     inertia: float = parameter("kg m^2", "J", "moment of inertia of the pulley", bounds=(0.0, 1e4), default=0.0)
     damping: float = parameter("N s/m", "d", "viscous friction of the bearing", bounds=(0.0, 1e6), default=0.0)
-    gravity: float = parameter(
-        "m/s^2", "g", "acceleration of gravity", bounds=(0.0, 20.0), fitted=False, default=STANDARD_GRAVITY
-    )
+    gravity: float = gravity_parameter()
 
     def _inertial_mass(self) -> Value:
         return self.inertia / self.radius**2 + self.ratio**2 * self.mass
@@ -124,7 +120,7 @@ class Pulley(Translation):
 
 
 @model
-class PrescribedMotion(Mechanism):
+class PrescribedMotion(Translation):
     """Prescribed motion: y'' = a(t), independent of the muscle forces; the drive absorbs the power F y'.
 
     y position relative to that at the resting length of the muscle, a the input. Input signals may be piecewise linear,
@@ -133,26 +129,17 @@ class PrescribedMotion(Mechanism):
     """
 
     @property
-    def coordinates(self) -> tuple[Coordinate, ...]:
-        return (Coordinate("position", "speed", "m", 0.01, 0.1),)
-
-    @property
     def inputs(self) -> tuple[Input, ...]:
         return (Input("prescribed_acceleration", "m/s^2", -1e5, 1e5, "acceleration prescribed by the drive"),)
-
-    def contractions(self, q: Values, resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
-        return tuple(q["position"] / length for length in resting_lengths)
-
-    def generalised_forces(
-        self, q: Values, tensions: Sequence[Value], resting_lengths: Sequence[Value]
-    ) -> dict[str, Value]:
-        return {"position": sum(tensions, 0.0)}
 
     def acceleration(self, q: Values, v: Values, forces: Values, inputs: Values) -> Values:
         return {"position": inputs["prescribed_acceleration"]}
 
     def dissipated_power(self, q: Values, v: Values, forces: Values, inputs: Values) -> Value:
         return forces["position"] * v["speed"]
+
+    def kinetic_energy(self, q: Values, v: Values) -> Value:
+        return 0.0
 
 
 @model
@@ -212,9 +199,7 @@ class ExternalLoad(Mechanism):
     def contraction_speeds(self, q: Values, v: Values, resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
         return tuple(v.get(f"{prefix}{SHORTENING_SPEED}", 0.0) for prefix in self._prefixes)
 
-    def generalised_forces(
-        self, q: Values, tensions: Sequence[Value], resting_lengths: Sequence[Value]
-    ) -> dict[str, Value]:
+    def generalised_forces(self, q: Values, tensions: Sequence[Value], resting_lengths: Sequence[Value]) -> Values:
         """Tension [N] of each muscle, by the name of its shortening."""
         return {f"{prefix}{SHORTENING}": tension for prefix, tension in zip(self._prefixes, tensions, strict=True)}
 

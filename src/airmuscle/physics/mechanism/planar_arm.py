@@ -4,9 +4,9 @@ import abc
 from collections.abc import Sequence
 from typing import Any
 
-from ...core import STANDARD_GRAVITY, ParameterError, Value, Values, check_structure, model, ops, parameter
+from ...core import ParameterError, Value, Values, check_structure, model, ops, parameter
 from .antagonistic_joint import ConstantRadius, PulleyProfile
-from .base import Coordinate, Mechanism
+from .base import Coordinate, Mechanism, angle_limit, gravity_parameter
 
 Matrix = list[list[Value]]
 
@@ -129,12 +129,8 @@ class ArmLink:
         "kg m^2", "I_c", "moment of inertia about the centre of mass", bounds=(0.0, 1e5), default=0.0
     )
     damping: float = parameter("N m s/rad", "b", "viscous friction of the joint", bounds=(0.0, 1e5), default=0.0)
-    min_angle: float = parameter(
-        "rad", "theta_min", "lower limit of the joint angle", bounds=(-10.0, 10.0), fitted=False, default=-ops.pi
-    )
-    max_angle: float = parameter(
-        "rad", "theta_max", "upper limit of the joint angle", bounds=(-10.0, 10.0), fitted=False, default=ops.pi
-    )
+    min_angle: float = angle_limit("theta_min", "lower limit of the joint angle", -ops.pi)
+    max_angle: float = angle_limit("theta_max", "upper limit of the joint angle", ops.pi)
 
     def check(self) -> None:
         if not self.inertia + self.mass * self.centre**2 > 0.0:
@@ -158,9 +154,7 @@ class PlanarArm(Arm):
     links: tuple[ArmLink, ...]
     routes: tuple[MuscleRoute, ...]
     payload: float = parameter("kg", "m_p", "point mass at the tip", bounds=(0.0, 1e5), default=0.0)
-    gravity: float = parameter(
-        "m/s^2", "g", "acceleration of gravity", bounds=(0.0, 20.0), fitted=False, default=STANDARD_GRAVITY
-    )
+    gravity: float = gravity_parameter()
 
     def mass_matrix(self, q: Values) -> Matrix:
         """Mass matrix M [kg m^2] in the joint angles, n rows of n values; symmetric and positive definite."""

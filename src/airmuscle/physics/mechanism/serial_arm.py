@@ -2,7 +2,8 @@
 
 from typing import NamedTuple
 
-from ...core import STANDARD_GRAVITY, ParameterError, Value, Values, model, ops, parameter
+from ...core import ParameterError, Value, Values, model, ops, parameter
+from .base import angle_limit, gravity_parameter
 from .planar_arm import Arm, Matrix, MuscleRoute, solve_positive_definite
 
 Vector = tuple[Value, Value, Value]
@@ -40,12 +41,8 @@ class SpatialLink:
         "rad", "theta_0", "joint angle at which both frames have the same directions", bounds=(-10.0, 10.0),
         default=0.0,
     )  # fmt: skip
-    min_angle: float = parameter(
-        "rad", "theta_min", "lower limit of the joint angle", bounds=(-10.0, 10.0), fitted=False, default=-ops.pi
-    )
-    max_angle: float = parameter(
-        "rad", "theta_max", "upper limit of the joint angle", bounds=(-10.0, 10.0), fitted=False, default=ops.pi
-    )
+    min_angle: float = angle_limit("theta_min", "lower limit of the joint angle", -ops.pi)
+    max_angle: float = angle_limit("theta_max", "upper limit of the joint angle", ops.pi)
 
     def check(self) -> None:
         if self.axis not in AXES:
@@ -82,9 +79,7 @@ class SerialArm(Arm):
 
     links: tuple[SpatialLink, ...]
     routes: tuple[MuscleRoute, ...]
-    gravity: float = parameter(
-        "m/s^2", "g", "acceleration of gravity", bounds=(0.0, 20.0), fitted=False, default=STANDARD_GRAVITY
-    )
+    gravity: float = gravity_parameter()
 
     def mass_matrix(self, q: Values) -> Matrix:
         return self._mass_matrix(self._posture(q))

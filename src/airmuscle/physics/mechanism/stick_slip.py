@@ -174,9 +174,7 @@ class WithStickSlip(MechanismWrapper):
         }
         return {**self.inner.inner_rates(q, v, forces), **own}
 
-    def generalised_forces(
-        self, q: Values, tensions: Sequence[Value], resting_lengths: Sequence[Value]
-    ) -> dict[str, Value]:
+    def generalised_forces(self, q: Values, tensions: Sequence[Value], resting_lengths: Sequence[Value]) -> Values:
         """Those of the inner mechanism, and for each angle the load of its friction [N m]; with the residual."""
         forces = dict(self.inner.generalised_forces(q, tensions, resting_lengths))
         for c, element in zip(self._angles, self.elements, strict=True):

@@ -3,9 +3,9 @@
 import itertools
 from collections.abc import Mapping, Sequence
 
-from ...core import Input, ParameterError, StateVariable, Value, Values, check_structure, model, ops, parameter
-from ...core.units import STANDARD_GRAVITY
-from .base import Coordinate, Mechanism
+from ...core import Input, ParameterError, Value, Values, check_structure, model, ops, parameter
+from ...core.declaration import forwarded
+from .base import Coordinate, Mechanism, gravity_parameter
 
 
 class MechanismWrapper(Mechanism):
@@ -13,21 +13,10 @@ class MechanismWrapper(Mechanism):
 
     inner: Mechanism
 
-    @property
-    def coordinates(self) -> tuple[Coordinate, ...]:
-        return self.inner.coordinates
-
-    @property
-    def inputs(self) -> tuple[Input, ...]:
-        return self.inner.inputs
-
-    @property
-    def muscle_count(self) -> int | None:
-        return self.inner.muscle_count
-
-    @property
-    def inner_states(self) -> tuple[StateVariable, ...]:
-        return self.inner.inner_states
+    coordinates = forwarded("inner.coordinates")
+    inputs = forwarded("inner.inputs")
+    muscle_count = forwarded("inner.muscle_count")
+    inner_states = forwarded("inner.inner_states")
 
     def inner_rates(self, q: Values, v: Values, forces: Values) -> Mapping[str, Value]:
         return self.inner.inner_rates(q, v, forces)
@@ -38,9 +27,7 @@ class MechanismWrapper(Mechanism):
     def contraction_speeds(self, q: Values, v: Values, resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
         return self.inner.contraction_speeds(q, v, resting_lengths)
 
-    def generalised_forces(
-        self, q: Values, tensions: Sequence[Value], resting_lengths: Sequence[Value]
-    ) -> dict[str, Value]:
+    def generalised_forces(self, q: Values, tensions: Sequence[Value], resting_lengths: Sequence[Value]) -> Values:
         return self.inner.generalised_forces(q, tensions, resting_lengths)
 
     def acceleration(self, q: Values, v: Values, forces: Values, inputs: Values) -> Values:
@@ -209,9 +196,7 @@ class MusclesInSeries(MechanismWrapper):
     inner: Mechanism
     node_masses: tuple[float, ...] = parameter("kg", "m_i", "mass of each node", bounds=(1e-4, 1e4))
     damping: float = parameter("N s/m", "d", "damping coefficient of each node", bounds=(0.0, 1e6), default=0.0)
-    gravity: float = parameter(
-        "m/s^2", "g", "acceleration of gravity", bounds=(0.0, 20.0), fitted=False, default=STANDARD_GRAVITY
-    )
+    gravity: float = gravity_parameter()
 
     def check(self) -> None:
         check_structure(self)
@@ -250,9 +235,7 @@ class MusclesInSeries(MechanismWrapper):
         speeds += self.inner.contraction_speeds(q, v, [sum(resting_lengths)])
         return tuple(after - before for before, after in itertools.pairwise(speeds))
 
-    def generalised_forces(
-        self, q: Values, tensions: Sequence[Value], resting_lengths: Sequence[Value]
-    ) -> dict[str, Value]:
+    def generalised_forces(self, q: Values, tensions: Sequence[Value], resting_lengths: Sequence[Value]) -> Values:
         nodes = {node.name: tensions[i] - tensions[i + 1] for i, node in enumerate(self.nodes)}
         return {**nodes, **self.inner.generalised_forces(q, tensions[-1:], [sum(resting_lengths)])}
 

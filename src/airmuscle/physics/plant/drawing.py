@@ -106,15 +106,12 @@ class JointScene(Scene):
     """Two muscles side by side below a pulley, whose angle a pointer shows."""
 
     mechanism: AntagonisticJoint
+    coordinate = "angle"
 
     @property
     def limits(self) -> tuple[float, float, float, float]:
         half = max(0.62 * self.length, 2.05 * self.spacing)
         return -half, half, -1.45 * self.length, 0.62 * self.length
-
-    @property
-    def coordinate(self) -> str:
-        return "angle"
 
     def draw(self, row: Row) -> Drawing:
         base, radius, angle = -1.35 * self.length, self.mechanism.radius, row["angle"]
@@ -132,13 +129,11 @@ class JointScene(Scene):
 class LiftScene(Scene):
     """A muscle that hangs from a ceiling, with the load below it."""
 
+    coordinate = "position"
+
     @property
     def limits(self) -> tuple[float, float, float, float]:
         return -0.5 * self.length, 0.5 * self.length, -1.5 * self.length, 0.1 * self.length
-
-    @property
-    def coordinate(self) -> str:
-        return "position"
 
     def draw(self, row: Row) -> Drawing:
         ceiling = Shape(_box(0.0, 0.3 * self.length, 0.0, 0.03 * self.length))

@@ -3,7 +3,8 @@
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
-from ...core import ColumnLimit, Columns, Diagnostic, Input, StateVariable, System, Value, Values, model
+from ...core import StateVariable, System, Value, Values, model
+from ...core.declaration import forwarded
 from ..muscle import ElasticSeriesElement, Muscle
 from ..muscle.friction import NoFriction
 from .muscle_state import MuscleState, PlantEvaluation
@@ -51,15 +52,15 @@ class WithEnergyMeters(System):
         """The plant's states, then the meters."""
         return (*self.plant.states, *self.meters)
 
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        """The plant's inputs."""
-        return self.plant.inputs
-
-    @property
-    def input_variables(self) -> tuple[Input, ...]:
-        """The plant's inputs."""
-        return self.plant.input_variables
+    inputs = forwarded("plant.inputs")
+    input_variables = forwarded("plant.input_variables")
+    positive_outputs = forwarded("plant.positive_outputs")
+    column_limits = forwarded("plant.column_limits")
+    constants = forwarded("plant.constants")
+    check_state = forwarded("plant.check_state")
+    describe = forwarded("plant.describe")
+    diagnose = forwarded("plant.diagnose")
+    failure_hint = forwarded("plant.failure_hint")
 
     @property
     def output_units(self) -> Mapping[str, str]:
@@ -72,21 +73,6 @@ class WithEnergyMeters(System):
         """The bounds of the plant; meters have none."""
         return [*self.plant.state_lower_bounds, *(-float("inf") for _ in self.meters)]
 
-    @property
-    def positive_outputs(self) -> Sequence[str]:
-        """The plant's volumes."""
-        return self.plant.positive_outputs
-
-    @property
-    def column_limits(self) -> Sequence[ColumnLimit]:
-        """The limits of the plant."""
-        return self.plant.column_limits
-
-    @property
-    def constants(self) -> Mapping[str, float | str]:
-        """The plant's constants."""
-        return self.plant.constants
-
     def default_state(self) -> dict[str, float]:
         """The default initial state of the plant with every meter at zero."""
         return self.extend_state(self.plant.default_state())
@@ -94,22 +80,6 @@ class WithEnergyMeters(System):
     def extend_state(self, state: Mapping[str, float]) -> dict[str, float]:
         """A state of the plant with every meter at zero."""
         return {**state, **{meter.name: 0.0 for meter in self.meters}}
-
-    def check_state(self, state: Mapping[str, float]) -> None:
-        """Raise the errors of the plant's `check_state`."""
-        self.plant.check_state(state)
-
-    def describe(self) -> tuple[Diagnostic, ...]:
-        """The assumptions of the plant."""
-        return self.plant.describe()
-
-    def diagnose(self, columns: Columns) -> list[Diagnostic]:
-        """The diagnostics of the plant."""
-        return self.plant.diagnose(columns)
-
-    def failure_hint(self, state: Mapping[str, float]) -> str:
-        """The remedy of the plant."""
-        return self.plant.failure_hint(state)
 
     def rates(self, state: Values, inputs: Values) -> dict[str, Value]:
         """The plant's rates, and the power that each meter integrates."""

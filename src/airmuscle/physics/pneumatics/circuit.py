@@ -6,6 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, ClassVar, TypeVar
 
 from ...core import ParameterError, Reference, Value, Values, check_structure, model, ops
+from ...core.declaration import forwarded
 from ...core.system import Input, StateVariable, add_prefix, select_prefix, with_prefix
 from .gas import NO_FLOW, Air, Ambient, Flow
 from .supply import AirSource, SharedSupply, Supply
@@ -93,20 +94,12 @@ class CircuitWrapper(Circuit, abc.ABC):
 
     circuit: Circuit
 
-    @property
-    def supply(self) -> AirSource:  # type: ignore[override]  # forwarded, not stored
-        return self.circuit.supply
-
-    @property
-    def port_count(self) -> int:
-        return self.circuit.port_count
+    supply = forwarded("circuit.supply")
+    port_count = forwarded("circuit.port_count")
+    inputs = forwarded("circuit.inputs")
 
     def validity_warnings(self, columns: Mapping[str, Any], ambient: Ambient) -> dict[str, str]:
         return self.circuit.validity_warnings(columns, ambient)
-
-    @property
-    def inputs(self) -> tuple[Input, ...]:
-        return self.circuit.inputs
 
 
 def port_prefix(number: int) -> str:

@@ -4,6 +4,7 @@ import abc
 from typing import Any, ClassVar, NamedTuple, Self
 
 from ....core import Reference, StateVariable, Value, Values, model, ops, parameter, published
+from ....core.declaration import forwarded
 from .path import LoopScales
 
 
@@ -101,22 +102,10 @@ class FrictionWrapper(Friction):
 
     inner: Friction
 
-    @property
-    def rate_independent(self) -> bool:  # type: ignore[override]
-        """Whether the force depends on the path only, not on the speed."""
-        return self.inner.rate_independent
-
-    @property
-    def states(self) -> tuple[StateVariable, ...]:
-        return self.inner.states
-
-    @property
-    def presliding_distance(self) -> float:
-        return self.inner.presliding_distance
-
-    @property
-    def identified_range(self) -> IdentifiedRange | None:
-        return self.inner.identified_range
+    rate_independent = forwarded("inner.rate_independent")
+    states = forwarded("inner.states")
+    presliding_distance = forwarded("inner.presliding_distance")
+    identified_range = forwarded("inner.identified_range")
 
     def pressure_factor(self, pressure: Value) -> Value:
         return self.inner.pressure_factor(pressure)
