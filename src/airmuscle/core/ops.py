@@ -6,7 +6,7 @@ symbols are traced, JAX arrays are passed to jax.numpy. Models are written with 
 
 import math
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from types import ModuleType
 from typing import Any
 
@@ -122,6 +122,14 @@ def either(a: Value, b: Value) -> Value:
 def hypot(x: Value, y: Value) -> Value:
     """Square root of x^2 + y^2; v/hypot(v, v_0) is a smooth sign of a speed v whose transition is v_0 wide."""
     return sqrt(x * x + y * y)
+
+
+def polynomial(coefficients: Sequence[Value], x: Value) -> Value:
+    """Sum of coefficients[i] x^i, by Horner's method."""
+    total: Value = 0.0
+    for coefficient in reversed(coefficients):
+        total = total * x + coefficient
+    return total
 
 
 def _elementary(name: str, meaning: str) -> Callable[[Value], Value]:

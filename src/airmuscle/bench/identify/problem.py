@@ -123,8 +123,8 @@ class FitProblem:
     def labels(self) -> tuple[str, ...]:
         """A short label for each free parameter: its term in a polynomial, else its symbol, else its path."""
         terms = getattr(self.law, "term_labels", ())
-        field = getattr(self.law, "linear_in", None)
-        texts = {f"{field}[{i}]": f"a({term})" for i, term in enumerate(terms)}
+        fields = getattr(self.law, "linear_in", ())
+        texts = {f"{field}[{i}]": f"a({term})" for field in fields for i, term in enumerate(terms)}
         symbols = [self.leaves[i].declared.symbol for i in self.free]
         paths = [self.leaves[i].path for i in self.free]
         names = (s if symbols.count(s) == 1 else path for s, path in zip(symbols, paths, strict=True))

@@ -87,19 +87,15 @@ class Muscle(NotebookDisplay):
 
     def check(self) -> None:
         kinds = {"contractile": Characteristic, "geometry": Geometry, "spring": Spring, "damper": Damper, "wall": Wall,
-                 "friction": Friction, "series": SeriesElement, "stop": Stop, "creep": CreepElements}  # fmt: skip
+                 "friction": Friction, "series": SeriesElement, "stop": Stop, "creep": CreepElements,
+                 "validity_range": ValidityRange, "ratings": Ratings}  # fmt: skip
         for field, kind in kinds.items():
-            part = getattr(self, field)
-            if not isinstance(part, kind):
-                raise ParameterError(f"Muscle: {field} is {abridged(part)}; it must be a {kind.__name__}.")
+            part, optional = getattr(self, field), field in ("validity_range", "ratings")
+            if not (isinstance(part, kind) or (optional and part is None)):
+                what = f"{kind.__name__} or None" if optional else kind.__name__
+                raise ParameterError(f"Muscle: {field} is {abridged(part)}; it must be a {what}.")
         if not isinstance(self.name, str) or not self.name:
             raise ParameterError(f"Muscle: name is {abridged(self.name)}; it must be a non-empty text, such as 'left'.")
-        if not isinstance(self.validity_range, ValidityRange | None):
-            raise ParameterError(
-                f"Muscle: validity_range is {abridged(self.validity_range)}; it must be a ValidityRange or None."
-            )
-        if not isinstance(self.ratings, Ratings | None):
-            raise ParameterError(f"Muscle: ratings is {abridged(self.ratings)}; it must be a Ratings or None.")
         if isinstance(self.series, ElasticSeriesElement):
             self._check_series_elements()
         self._check_lengths()

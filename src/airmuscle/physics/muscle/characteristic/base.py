@@ -11,7 +11,7 @@ from typing import Any, ClassVar, NamedTuple, Self
 
 from ....core import IdentificationError, Reference, Value, autodiff, model, ops, parameter
 from ..quantity_arguments import accept_quantities_in
-from .solve import describe_range, find_first_root, warn_above_whole_length
+from .solve import describe_range, solve_direction, warn_above_whole_length
 from .validity_range import MeasuredPoints
 
 _UNITS = {
@@ -141,22 +141,16 @@ class ForceLaw(Characteristic):
         return self.force(pressure, contraction)
 
     def contraction(self, pressure: Value, force: Value) -> Value:
-        def residual(contraction: Value, p: Value, load: Value) -> Value:
-            return load - self.force(p, contraction)
-
-        def message(p: float, load: float, low: float, high: float) -> str:
-            return self._no_contraction_message(p, load) + _describe_force_limits(load - high, load - low)
-
-        return find_first_root(residual, self.contraction_range, (pressure, force), message)
+        return solve_direction(
+            lambda contraction, p, _: self.force(p, contraction), self.contraction_range, (pressure, force), 1,
+            self._no_contraction_message, "Available force", "N", falling=True,
+        )  # fmt: skip
 
     def pressure(self, contraction: Value, force: Value) -> Value:
-        def residual(pressure: Value, c: Value, load: Value) -> Value:
-            return self.force(pressure, c) - load
-
-        def message(c: float, load: float, low: float, high: float) -> str:
-            return self._no_pressure_message(c, load) + _describe_force_limits(low + load, high + load)
-
-        return find_first_root(residual, self.pressure_range, (contraction, force), message)
+        return solve_direction(
+            lambda pressure, c, _: self.force(pressure, c), self.pressure_range, (contraction, force), 1,
+            self._no_pressure_message, "Available force", "N",
+        )  # fmt: skip
 
     def slopes(self, pressure: Value, contraction: Value) -> Slopes:
         return Slopes(
@@ -183,24 +177,16 @@ class ContractionLaw(Characteristic):
     """Characteristic given as eps(p, F)."""
 
     def force(self, pressure: Value, contraction: Value) -> Value:
-        def residual(force: Value, p: Value, c: Value) -> Value:
-            return c - self.contraction(p, force)
-
-        def message(p: float, c: float, low: float, high: float) -> str:
-            limits = describe_range(100 * (c - high), 100 * (c - low), "%")
-            return f"{self._no_force_message(p, c)}Available contraction at this pressure: {limits}."
-
-        return find_first_root(residual, self.force_range, (pressure, contraction), message)
+        return solve_direction(
+            lambda force, p, _: self.contraction(p, force), self.force_range, (pressure, contraction), 1,
+            self._no_force_message, "Available contraction at this pressure", "%", falling=True,
+        )  # fmt: skip
 
     def pressure(self, contraction: Value, force: Value) -> Value:
-        def residual(pressure: Value, c: Value, load: Value) -> Value:
-            return self.contraction(pressure, load) - c
-
-        def message(c: float, load: float, low: float, high: float) -> str:
-            limits = describe_range(100 * (low + c), 100 * (high + c), "%")
-            return f"{self._no_pressure_message(c, load)}Available contraction at this load: {limits}."
-
-        return find_first_root(residual, self.pressure_range, (contraction, force), message)
+        return solve_direction(
+            lambda pressure, _, load: self.contraction(pressure, load), self.pressure_range, (contraction, force), 0,
+            self._no_pressure_message, "Available contraction at this load", "%",
+        )  # fmt: skip
 
     def slopes(self, pressure: Value, contraction: Value) -> Slopes:
         force = self.force(pressure, contraction)
@@ -213,24 +199,16 @@ class PressureLaw(Characteristic):
     """Characteristic given as p(eps, F)."""
 
     def force(self, pressure: Value, contraction: Value) -> Value:
-        def residual(force: Value, p: Value, c: Value) -> Value:
-            return self.pressure(c, force) - p
-
-        def message(p: float, c: float, low: float, high: float) -> str:
-            limits = describe_range((low + p) / 1e3, (high + p) / 1e3, "kPa")
-            return f"{self._no_force_message(p, c)}Required pressure at this contraction: {limits}."
-
-        return find_first_root(residual, self.force_range, (pressure, contraction), message)
+        return solve_direction(
+            lambda force, _, c: self.pressure(c, force), self.force_range, (pressure, contraction), 0,
+            self._no_force_message, "Required pressure at this contraction", "kPa",
+        )  # fmt: skip
 
     def contraction(self, pressure: Value, force: Value) -> Value:
-        def residual(contraction: Value, p: Value, load: Value) -> Value:
-            return self.pressure(contraction, load) - p
-
-        def message(p: float, load: float, low: float, high: float) -> str:
-            limits = describe_range((low + p) / 1e3, (high + p) / 1e3, "kPa")
-            return f"{self._no_contraction_message(p, load)}Required pressure at this load: {limits}."
-
-        return find_first_root(residual, self.contraction_range, (pressure, force), message)
+        return solve_direction(
+            lambda contraction, _, load: self.pressure(contraction, load), self.contraction_range, (pressure, force), 0,
+            self._no_contraction_message, "Required pressure at this load", "kPa",
+        )  # fmt: skip
 
     def slopes(self, pressure: Value, contraction: Value) -> Slopes:
         force = self.force(pressure, contraction)

@@ -41,7 +41,7 @@ class PlaneCurve:
 
     def exponent(self, pressure: Value) -> Value:
         """Exponent [1] at a gauge pressure [Pa]."""
-        return _horner(self.coefficients, pressure / bar)
+        return ops.polynomial(self.coefficients, pressure / bar)
 
     def contraction(self, pressure: Value) -> Value:
         """Contraction [1] at a gauge pressure [Pa]."""
@@ -169,8 +169,8 @@ class _PolynomialSurface(ContractionLaw):
         for start in range(len(self.coefficients) - width, -1, -width):
             row = self.coefficients[start : start + width]
             by_p = by_p * p + value
-            value = value * p + _horner(row, f)
-            by_f = by_f * p + _horner(tuple(j * a for j, a in enumerate(row))[1:], f)
+            value = value * p + ops.polynomial(row, f)
+            by_f = by_f * p + ops.polynomial(tuple(j * a for j, a in enumerate(row))[1:], f)
         return value, by_p, by_f
 
 
@@ -201,11 +201,3 @@ class BorzikovaExponential(_PolynomialSurface):
 
     def contraction(self, pressure: Value, force: Value) -> Value:
         return self.saturation * (1.0 - ops.exp(self.polynomial(pressure, force)))
-
-
-def _horner(coefficients: tuple[float, ...], x: Value) -> Value:
-    """Sum of coefficients[i] x^i."""
-    value: Value = 0.0
-    for a in reversed(coefficients):
-        value = value * x + a
-    return value

@@ -33,7 +33,7 @@ class ContractileSurface(ForceLaw):
     """
 
     references: ClassVar[tuple[Reference, ...]] = (HOSOVSKY_HILL,)
-    linear_in: ClassVar[str] = "coefficients"
+    linear_in: ClassVar[tuple[str, ...]] = ("coefficients",)
     """The parameters in which the model is linear; a fit solves for them by linear least squares."""
 
     coefficients: tuple[float, ...] = parameter(

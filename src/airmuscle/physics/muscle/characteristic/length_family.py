@@ -13,8 +13,48 @@ _RANGE_FACTOR = 2.0
 """Factor by which the contraction range of the inner surface exceeds that of the whole muscle (chosen)."""
 
 
+class LengthLaw(ForceLaw):
+    """Law of a muscle of a stated length that is made of other laws, its `parts` (base class)."""
+
+    parts: ClassVar[tuple[str, ...]] = ("inner",)
+    """The fields of the other laws."""
+
+    @property
+    def linear_in(self) -> tuple[str, ...]:
+        """The parameters in which all parts are linear, else none; lengths are not among them."""
+        fields = {part: getattr(getattr(self, part), "linear_in", ()) for part in self.parts}
+        if not all(fields.values()):
+            return ()
+        return tuple(f"{part}.{name}" for part, names in fields.items() for name in names)
+
+    def with_resting_length(self, resting_length: float) -> Self:
+        """Return the model of a muscle of the same type with this resting length [m]."""
+        return self._with(resting_length=resting_length)
+
+    def with_validity_range(self, pressure: tuple[float, float], contraction: tuple[float, float]) -> Self:
+        """Return the model with its surfaces on another validity range."""
+        return self._on_range("with_validity_range", pressure, contraction)
+
+    def rescaled(self, pressure: tuple[float, float], contraction: tuple[float, float]) -> Self:
+        """Return the same force law with its surfaces on another validity range."""
+        return self._on_range("rescaled", pressure, contraction)
+
+    def _on_range(self, method: str, pressure: tuple[float, float], contraction: tuple[float, float]) -> Self:
+        laws = {name: getattr(self, name) for name in self.parts}
+        limits = pressure, self._range_of_parts(contraction)
+        return self._with(**{name: getattr(law, method)(*limits) for name, law in laws.items() if hasattr(law, method)})
+
+    def _range_of_parts(self, contraction: tuple[float, float]) -> tuple[float, float]:
+        """The range of the contraction of the parts for this one of the whole muscle."""
+        return contraction
+
+    def _with(self, **changed: Any) -> Self:
+        law: Any = self
+        return dataclasses.replace(law, **changed)  # type: ignore[no-any-return]
+
+
 @model
-class EffectiveLength(ForceLaw):
+class EffectiveLength(LengthLaw):
     """Force law of the active length: F = F_inner(p, (eps L_0 + d)/(L_0 - l_d)).
 
     eps: contraction of the whole muscle; L_0: length between the fittings; l_d: length of the ends, which do not
@@ -53,29 +93,10 @@ class EffectiveLength(ForceLaw):
         length, active = self.resting_length, self.resting_length - self.dead_length
         return ((low * active - self.end_shift) / length, (high * active - self.end_shift) / length)
 
-    @property
-    def linear_in(self) -> tuple[str, ...]:
-        """The parameters in which the inner model is linear; the lengths are not among them."""
-        fields = getattr(self.inner, "linear_in", ())
-        return tuple(f"inner.{field}" for field in ((fields,) if isinstance(fields, str) else fields))
-
-    def with_resting_length(self, resting_length: float) -> "EffectiveLength":
-        """Return the model of a muscle of the same type with this resting length [m]."""
-        return dataclasses.replace(self, resting_length=resting_length)
-
-    def with_validity_range(self, pressure: tuple[float, float], contraction: tuple[float, float]) -> "EffectiveLength":
-        """Return the model with another validity range; that of the inner surface is wider in contraction."""
-        inner: Any = self.inner
-        if not hasattr(inner, "with_validity_range"):
-            return self
-        return dataclasses.replace(self, inner=inner.with_validity_range(pressure, _widen(contraction)))
-
-    def rescaled(self, pressure: tuple[float, float], contraction: tuple[float, float]) -> "EffectiveLength":
-        """Return the same force law on another validity range; that of the inner surface is wider in contraction."""
-        inner: Any = self.inner
-        if not hasattr(inner, "rescaled"):
-            return self
-        return dataclasses.replace(self, inner=inner.rescaled(pressure, _widen(contraction)))
+    def _range_of_parts(self, contraction: tuple[float, float]) -> tuple[float, float]:
+        low, high = contraction
+        margin = (_RANGE_FACTOR - 1) * (high - low) / 2
+        return low - margin, high + margin
 
     def force(self, pressure: Value, contraction: Value) -> Value:
         return self.inner.force(pressure, self._active_contraction(contraction))
@@ -89,21 +110,15 @@ class EffectiveLength(ForceLaw):
         return shortening / (self.resting_length - self.dead_length)
 
 
-def _widen(contraction: tuple[float, float]) -> tuple[float, float]:
-    """The validity range of the inner surface for this range of the whole muscle."""
-    low, high = contraction
-    margin = (_RANGE_FACTOR - 1) * (high - low) / 2
-    return low - margin, high + margin
-
-
 @model
-class LengthFamily(ForceLaw):
+class LengthFamily(LengthLaw):
     """Base class: F = max(0, F_inner(p, eps) + s(L_0) F_change(p, eps)), with s = 0 at the reference length.
 
     L_0: length between the fittings; s: length factor, defined by the subclass. Force limits of the inner models are
     not applied.
     """
 
+    parts: ClassVar[tuple[str, ...]] = ("inner", "change")
     term: ClassVar[str]
     """The length factor as a text, in the names of `variants`."""
 
@@ -128,33 +143,6 @@ class LengthFamily(ForceLaw):
     @property
     def contraction_range(self) -> tuple[float, float]:
         return self.inner.contraction_range
-
-    @property
-    def linear_in(self) -> tuple[str, ...]:
-        """The coefficients of both models if both are linear in them, else none."""
-        inner, change = _linear_fields(self.inner), _linear_fields(self.change)
-        if not (inner and change):
-            return ()
-        return (*(f"inner.{field}" for field in inner), *(f"change.{field}" for field in change))
-
-    def with_resting_length(self, resting_length: float) -> Self:
-        """Return the model of a muscle of the same type with this resting length [m]."""
-        return dataclasses.replace(self, resting_length=resting_length)
-
-    def with_validity_range(self, pressure: tuple[float, float], contraction: tuple[float, float]) -> Self:
-        """Return the model with its surfaces on another validity range."""
-        return self._on_range("with_validity_range", pressure, contraction)
-
-    def rescaled(self, pressure: tuple[float, float], contraction: tuple[float, float]) -> Self:
-        """Return the same force law with its surfaces on another validity range."""
-        return self._on_range("rescaled", pressure, contraction)
-
-    def _on_range(self, method: str, pressure: tuple[float, float], contraction: tuple[float, float]) -> Self:
-        models: dict[str, Any] = {"inner": self.inner, "change": self.change}
-        surfaces = {
-            name: getattr(law, method)(pressure, contraction) for name, law in models.items() if hasattr(law, method)
-        }
-        return dataclasses.replace(self, **surfaces)
 
     def force(self, pressure: Value, contraction: Value) -> Value:
         return ops.maximum(self.unclamped_force(pressure, contraction), 0.0)
@@ -197,12 +185,6 @@ class LogarithmicLength(LengthFamily):
 
     def length_factor(self) -> Value:
         return ops.log(self.resting_length / self.reference_length)
-
-
-def _linear_fields(law: ForceLaw) -> tuple[str, ...]:
-    """The fields in which a law is linear."""
-    fields: str | tuple[str, ...] = getattr(law, "linear_in", ())
-    return (fields,) if isinstance(fields, str) else fields
 
 
 @model

@@ -1,7 +1,5 @@
 """Reduced force law: linear in pressure, polynomials of the contraction, for muscles of unknown size."""
 
-from collections.abc import Sequence
-
 from ....core import ParameterError, Value, model, ops, parameter
 from .base import ForceLaw
 
@@ -35,12 +33,5 @@ class LinearInPressure(ForceLaw):
 
     def force(self, pressure: Value, contraction: Value) -> Value:
         x = contraction - self.reference
-        net = pressure * _polynomial(self.area, x) + _polynomial(self.passive_force, x)
+        net = pressure * ops.polynomial(self.area, x) + ops.polynomial(self.passive_force, x)
         return 0.5 * (net + ops.sqrt(net**2 + self.slack_width**2))
-
-
-def _polynomial(coefficients: Sequence[Value], x: Value) -> Value:
-    total: Value = 0.0
-    for coefficient in reversed(coefficients):
-        total = total * x + coefficient
-    return total

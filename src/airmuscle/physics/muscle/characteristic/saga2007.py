@@ -12,7 +12,7 @@ from ..geometry.meridian_shapes import Parabola
 from ..geometry.straight_fibre import FibreSum, HalfShellFibreSum, StraightFibre
 from .base import PressureLaw
 from .rubber import AxialIntegral, RubberIntegral, RubberLine
-from .solve import check_solution, describe_range, find_first_root
+from .solve import check_solution, solve_direction
 
 LINE_A = RubberLine(slope=0.1263e6, intercept=0.3e6)
 """Rubber as printed in the text; 0.68 MPa at strain 3. The unit MPa is inferred from Fig. 4."""
@@ -109,16 +109,12 @@ class Saga2007(PressureLaw):
         return (pressure * shell - rubber) / ops.maximum(lever, _MIN_SLOPE)
 
     def contraction(self, pressure: Value, force: Value) -> Value:
-        def residual(contraction: Value, p: Value, load: Value) -> Value:
-            return self.equilibrium_pressure(contraction, load) - p
-
-        def message(p: float, load: float, low: float, high: float) -> str:
-            limits = describe_range((low + p) / 1e3, (high + p) / 1e3, "kPa")
-            return f"{self._no_contraction_message(p, load)}Required pressure at this load: {limits}."
-
         above_threshold = (self.threshold_pressure, float("inf"))
         check_solution(pressure + 0.0 * force, above_threshold, (pressure, force), self._below_threshold_message)
-        return find_first_root(residual, self.contraction_range, (pressure, force), message)
+        return solve_direction(
+            lambda contraction, _, load: self.equilibrium_pressure(contraction, load), self.contraction_range,
+            (pressure, force), 0, self._no_contraction_message, "Required pressure at this load", "kPa",
+        )  # fmt: skip
 
     def equilibrium_pressure(self, contraction: Value, force: Value) -> Value:
         """Equation (19) [Pa] at any contraction below 1 without a check of its range; negative beyond the pole."""

@@ -114,6 +114,32 @@ def find_first_root(
     return float(roots[0]) if first.ndim == 0 else roots.reshape(first.shape)
 
 
+_SCALES = {"N": 1.0, "%": 100.0, "kPa": 1e-3}
+"""Factors from SI of the units in messages."""
+
+
+def solve_direction(
+    response: Callable[[Any, Any, Any], Any], bounds: tuple[float, float], given: tuple[Any, Any], wanted: int,
+    message: Callable[[float, float], str], available: str, unit: str, *, falling: bool = False,
+) -> Any:  # fmt: skip
+    """The smallest x within `bounds` at which `response(x, a, b)` is number `wanted` of the given values a and b.
+
+    The response rises with x unless it is `falling`. `message(a, b)` begins the text of the SolveError where there is
+    no solution; it ends with the range of the response in a unit, called `available`.
+    """
+
+    def residual(x: Any, *values: Any) -> Any:
+        target = values[wanted]
+        return target - response(x, *values) if falling else response(x, *values) - target
+
+    def text(a: float, b: float, low: float, high: float) -> str:
+        target, scale = (a, b)[wanted], _SCALES[unit]
+        ends = (target - high, target - low) if falling else (low + target, high + target)
+        return f"{message(a, b)}{available}: {describe_range(scale * ends[0], scale * ends[1], unit)}."
+
+    return find_first_root(residual, bounds, given, text)
+
+
 def _sign_function(function: Callable[[Any, Any, Any], Any]) -> Callable[[Any, Any, Any], Any]:
     """Return the sign of a function, so that the search finds the edge of a plateau at zero (a clamped force)."""
     return lambda x, a, b: np.where(np.asarray(function(x, a, b)) >= 0, 1.0, -1.0)

@@ -3,7 +3,6 @@
 import abc
 import functools
 import math
-from collections.abc import Sequence
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -78,21 +77,13 @@ TERMS = 18
 _COEFFICIENTS = tuple(tuple(1.0 / math.factorial(m + 2 * n) for n in range(TERMS)) for m in range(6))
 
 
-def power_series(coefficients: Sequence[float], w: Value) -> Value:
-    """Sum of coefficients[n] w^n by Horner's method."""
-    total: Value = coefficients[-1]
-    for a in reversed(coefficients[:-1]):
-        total = total * w + a
-    return total
-
-
 def stumpff(order: int, w: Value) -> Value:
     """Stumpff function S_m(w) = Sum_n w^n / (m + 2 n)! of an order m from 0 to 5.
 
     S_0 = cosh u, S_1 = sinh(u)/u, S_2 = (cosh u - 1)/u^2, S_3 = (sinh u - u)/u^3 with w = u^2, and accordingly for cos
     and sin with w = -psi^2, without the cancellation of sines and cosines in the formulas of a flat arc.
     """
-    return power_series(_COEFFICIENTS[order], w)
+    return ops.polynomial(_COEFFICIENTS[order], w)
 
 
 def double_angle_term(w: Value) -> Value:
