@@ -9,6 +9,7 @@ from ...core import ParameterError, Value, Values, check_known, model, parameter
 from ...core.system import Input, StateVariable, System, select_prefix, with_prefix
 from ..mechanism import ExternalLoad, Mechanism
 from ..muscle import Muscle
+from ..muscle.muscle import MuscleForce
 from .muscle_state import states_of_muscle
 from .plant import Plant
 
@@ -67,19 +68,24 @@ class PressureDriven(System):
     def inputs(self) -> tuple[str, ...]:
         return tuple(i.name for i in self.input_variables)
 
-    def rates(self, state: Values, inputs: Values) -> dict[str, Value]:
+    def _pulls(self, state: Values) -> list[tuple[Value, MuscleForce, dict[str, Value]]]:
+        """The contraction, the forces and the own states of every muscle."""
         contractions = self.mechanism.contractions(state, self.resting_lengths)
         speeds = self.mechanism.contraction_speeds(state, state, self.resting_lengths)
-        rates: dict[str, Value] = {}
-        tensions: list[Value] = []
-        for prefix, muscle, lag, eps, v in zip(
-            self.prefixes, self.muscle, self.lags, contractions, speeds, strict=True
-        ):
+        pulls = []
+        for prefix, muscle, eps, v in zip(self.prefixes, self.muscle, contractions, speeds, strict=True):
             own, pressure = select_prefix(prefix, state), state[f"{prefix}pressure"]
-            pull = muscle.compute_force(pressure, muscle.inner_contraction(eps, own), eps, v, own)
-            tensions.append(pull.tension)
+            force = muscle.compute_force(pressure, muscle.inner_contraction(eps, own), eps, v, own)
+            pulls.append((eps, force, own))
+        return pulls
+
+    def rates(self, state: Values, inputs: Values) -> dict[str, Value]:
+        rates, pulls = dict[str, Value](), self._pulls(state)
+        for prefix, muscle, lag, (_, pull, own) in zip(self.prefixes, self.muscle, self.lags, pulls, strict=True):
+            pressure = state[f"{prefix}pressure"]
             rates |= with_prefix(prefix, muscle.rates(own, pressure, pull.inner_speed))
             rates[f"{prefix}pressure"] = (inputs[f"{prefix}measured_pressure"] - pressure) / lag
+        tensions = [pull.tension for _, pull, _ in pulls]
         forces = self.mechanism.generalised_forces(state, tensions, self.resting_lengths)
         accelerations = self.mechanism.acceleration(state, state, forces, inputs)
         for c in self.mechanism.coordinates:
@@ -88,13 +94,9 @@ class PressureDriven(System):
 
     def outputs(self, state: Values, inputs: Values) -> dict[str, Value]:
         """Contraction and tension of every muscle."""
-        contractions = self.mechanism.contractions(state, self.resting_lengths)
-        speeds = self.mechanism.contraction_speeds(state, state, self.resting_lengths)
         outputs: dict[str, Value] = {}
-        for prefix, muscle, eps, v in zip(self.prefixes, self.muscle, contractions, speeds, strict=True):
-            own, pressure = select_prefix(prefix, state), state[f"{prefix}pressure"]
-            pull = muscle.compute_force(pressure, muscle.inner_contraction(eps, own), eps, v, own)
-            outputs |= with_prefix(prefix, {"contraction": eps, "force": pull.tension})
+        for prefix, (eps, pull, _) in zip(self.prefixes, self._pulls(state), strict=True):
+            outputs |= {f"{prefix}contraction": eps, f"{prefix}force": pull.tension}
         return outputs
 
     def state_at(self, pressures: Sequence[float], **values: float) -> dict[str, float]:
