@@ -116,14 +116,10 @@ def _rasterise_markers(figure: Any) -> None:
 def legend_outside(axes: Any, **options: Any) -> Any:
     """Add a legend to the right of the axes, where it covers no data; inside those of a caller without a layout, of
     whose figure it would be cut off."""
-    style = {
-        "fontsize": 8,
-        "title_fontsize": 8,
-        "frameon": False,
-    }  # the shared style applies only while the figure is created
+    style = {"fontsize": 8, "title_fontsize": 8, "frameon": False, **options}  # the shared style ends with `new_figure`
     if axes.get_figure(root=True).get_layout_engine() is None:
-        return axes.legend(loc="best", **{**style, **options})
-    return axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0, **{**style, **options})
+        return axes.legend(loc="best", **style)
+    return axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0, **style)
 
 
 def legend_below(figure: Any, axes: Any, columns: int = 2) -> Any:

@@ -17,7 +17,7 @@ from .compiled_law import parameters_of
 from .compiled_loop import CompiledLoop, CompiledRun
 from .problem import Problem
 from .sampled_loop import prepare_loop
-from .solution import Solution, Statistics, make_recording, recorded_rows, truncate_at_invalid_row
+from .solution import Solution, make_solution, recorded_rows, truncate_at_invalid_row
 
 
 def solve_closed_loop(problem: Problem) -> Solution:
@@ -44,7 +44,7 @@ def solve_closed_loop(problem: Problem) -> Solution:
 
 def _solution(problem: Problem, run: CompiledRun) -> Solution:
     """The rows of all intervals as one solution."""
-    compiled, loop, integrator = problem.compiled, problem.input, problem.integrator
+    compiled, loop = problem.compiled, problem.input
     assert isinstance(loop, ControlLoop)
     segments, (times, states) = run.signal, run.rows
     times, states = times.copy(), states.copy()  # the next run may be in the same arrays
@@ -59,12 +59,7 @@ def _solution(problem: Problem, run: CompiledRun) -> Solution:
     notes = loop.controller.notes(control_state.controller)
     remarks = (remark, *(Diagnostic(DiagnosticCode.CONTROLLER, remark.subject, text) for text in notes))
     more = _controller_columns(run, times[: raw.reached])
-    recording, diagnostics = make_recording(
-        compiled, raw, table, times, integrator, problem.end_time, problem.references, more, remarks
-    )
-    final = dict(zip(compiled.description.state_names, run.state.tolist(), strict=True))
-    statistics = Statistics(raw.steps, raw.rejected)
-    return Solution(problem, recording, raw.status, statistics, diagnostics, run.time, final, control_state)
+    return make_solution(problem, raw, table, times, (run.time, run.state), more, remarks, control_state)
 
 
 def _controller_columns(run: CompiledRun, times: Array) -> dict[str, Array]:

@@ -18,9 +18,8 @@ from .integrators import Integrator, default_integrator
 from .problem import Problem, check_input_range, plain_numbers
 from .solution import (
     Solution,
-    Statistics,
     early_end,
-    make_recording,
+    make_solution,
     recorded_rows,
     status_of_state,
     truncate_at_invalid_row,
@@ -52,12 +51,7 @@ def _solve_open_loop(problem: Problem) -> Solution:
     raw, table = truncate_at_invalid_row(compiled, raw, table, times)
     if raw.status not in _AT_POSSIBLE_STATE and raw.reached > 0 and raw.steps < INTERRUPT_CHECK_STEPS:  # a short run
         raw = _end_between_rows(problem, raw)
-    recording, diagnostics = make_recording(
-        compiled, raw, table, times, integrator, problem.end_time, problem.references, {}
-    )
-    final = dict(zip(compiled.description.state_names, raw.state.tolist(), strict=True))
-    statistics = Statistics(raw.steps, raw.rejected)
-    return Solution(problem, recording, raw.status, statistics, diagnostics, raw.time, final)
+    return make_solution(problem, raw, table, times, (raw.time, raw.state), {})
 
 
 def _end_between_rows(problem: Problem, raw: RawSolution) -> RawSolution:

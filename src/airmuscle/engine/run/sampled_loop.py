@@ -50,12 +50,6 @@ class SampledLoop:
     ranges: Mapping[str, tuple[float, float]]
 
     @functools.cached_property
-    def setpoints(self) -> list[list[float]]:
-        """The set points as numbers."""
-        numbers: list[list[float]] = self.setpoint_values.tolist()
-        return numbers
-
-    @functools.cached_property
     def at_times(self) -> tuple[npt.NDArray[np.int64], Array]:
         """The interval (N,) and the set points (N, s) of each output time; nobody can write to them."""
         intervals, setpoints = self.at(self.times)
@@ -180,7 +174,7 @@ class CalledController:
         self._controller, self._sample_time, self._ranges = loop.controller, loop.sample_time, prepared.ranges
         self._columns, self._names = loop.controller.measured_columns, loop.controller.setpoints
         self._inputs = tuple(prepared.ranges)
-        self._rows = prepared.setpoints
+        self._rows: list[list[float]] = prepared.setpoint_values.tolist()
         self._last: tuple[list[float], dict[str, float]] = [], {}
 
     def step(self, memory: Any, measured: Sequence[float], interval: int) -> tuple[list[float], Any]:

@@ -135,16 +135,17 @@ def status_of_state(
     return truncate_at_invalid_row(compiled, raw, table, times)[0].status
 
 
-def make_recording(
-    compiled: CompiledSystem, raw: RawSolution, table: RowTable, times: Array, integrator: Integrator | None,
-    end: float, references: tuple[Reference, ...], more: dict[str, Array], before: tuple[Diagnostic, ...] = (),
-) -> tuple[Recording, tuple[Diagnostic, ...]]:  # fmt: skip
-    """The recording of the rows that were reached, with its diagnostics as notes.
+def make_solution(
+    problem: Problem, raw: RawSolution, table: RowTable, times: Array, end: tuple[float, Array],
+    more: dict[str, Array], before: tuple[Diagnostic, ...] = (), control_state: ControlLoopState | None = None,
+) -> "Solution":  # fmt: skip
+    """The solution of a problem from the rows that were reached, with its diagnostics as notes of the recording.
 
-    references  sources of the models, of the integrator and of the controller
-    more        further columns
-    before      diagnostics that come first
+    end     final time [s] and state (n,)
+    more    further columns
+    before  diagnostics that come first
     """
+    compiled = problem.compiled
     known, reached = compiled.description, raw.reached
     states = raw.rows
     if reached < times.size:
@@ -154,7 +155,7 @@ def make_recording(
     values = times, *states.T, *table.outputs.T, *table.inputs.T
     columns: dict[str, Array] = dict(zip(known.recorded_names, values, strict=True))
     columns.update(more)
-    text = f"simulated by {_name(integrator)}: {raw.steps} steps, {raw.rejected} rejected"
+    text = f"simulated by {_name(problem.integrator)}: {raw.steps} steps, {raw.rejected} rejected"
     diagnostics = [*before, Diagnostic(DiagnosticCode.INTEGRATOR, "integrator", text)]
     notes = [*(diagnostic.message for diagnostic in diagnostics), *known.remark_texts]
     diagnostics += known.remarks
@@ -162,10 +163,12 @@ def make_recording(
     if reached:
         later += compiled.system.diagnose(Columns(columns, known.range_places, table.lower, table.upper))
     if raw.status != Status.DONE:
-        later.append(early_end(compiled, raw, end))
+        later.append(early_end(compiled, raw, problem.end_time))
     notes += [diagnostic.message for diagnostic in later]
-    recording = Recording.from_arrays(columns, "simulation", known.constants, tuple(notes), references)
-    return recording, (*diagnostics, *later)
+    recording = Recording.from_arrays(columns, "simulation", known.constants, tuple(notes), problem.references)
+    final = dict(zip(known.state_names, end[1].tolist(), strict=True))
+    statistics, remarks = Statistics(raw.steps, raw.rejected), (*diagnostics, *later)
+    return Solution(problem, recording, raw.status, statistics, remarks, end[0], final, control_state)
 
 
 @functools.lru_cache(maxsize=32)

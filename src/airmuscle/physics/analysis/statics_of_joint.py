@@ -258,9 +258,8 @@ def _draw_region(axes: Any, statics: JointStatics, load: float) -> None:
     axes.fill_between(np.degrees(angle), low, high, color=BLUE, alpha=0.2, linewidth=0.0)
     for limit in (low, high):
         axes.plot(np.degrees(angle), limit, color=BLUE)
-    axes.set_xlabel("angle [deg]")
-    axes.set_ylabel("stiffness at constant pressure [N m/rad]")
-    axes.set_title(f"Reachable region, load {load:.4g} N m")
+    title = f"Reachable region, load {load:.4g} N m"
+    axes.set(xlabel="angle [deg]", ylabel="stiffness at constant pressure [N m/rad]", title=title)
 
 
 def _draw_plane(axes: Any, statics: JointStatics, load: float) -> None:
@@ -283,6 +282,5 @@ def _draw_plane(axes: Any, statics: JointStatics, load: float) -> None:
     ):
         lines = axes.contour(grid, grid, table(values), levels=7, colors=[colour], linestyles=style, linewidths=1.0)
         axes.clabel(lines, fmt=text, fontsize=7)
-    axes.set_xlabel(f"pressure of {first_name} [bar]")
-    axes.set_ylabel(f"pressure of {second_name} [bar]")
+    axes.set(xlabel=f"pressure of {first_name} [bar]", ylabel=f"pressure of {second_name} [bar]")
     axes.set_title("Solid: stiffness [N m/rad], dashed: angle")

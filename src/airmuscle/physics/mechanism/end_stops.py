@@ -54,12 +54,14 @@ class EndStops(MechanismWrapper):
     inner: Mechanism
     contact: HuntCrossley
     coordinate: str
+    lower_stop: float
+    upper_stop: float
     unit: ClassVar[str]
 
     @property
-    @abc.abstractmethod
     def stop_positions(self) -> tuple[Value, Value]:
         """Values of the coordinate at which the lower and the upper contact begin."""
+        return self.lower_stop, self.upper_stop
 
     @property
     @abc.abstractmethod
@@ -124,13 +126,7 @@ class WithEndStops(EndStops):
     """Name of the coordinate with end stops; required if several coordinates have this unit."""
     unit: ClassVar[str] = "m"
 
-    @property
-    def stop_positions(self) -> tuple[Value, Value]:
-        return self.lower_stop, self.upper_stop
-
-    @property
-    def lever_arm(self) -> Value:
-        return 1.0
+    lever_arm = 1.0
 
 
 @model
@@ -145,10 +141,6 @@ class JointWithEndStops(EndStops):
     coordinate: str = ""
     """Name of the coordinate with end stops; required if several coordinates have this unit."""
     unit: ClassVar[str] = "rad"
-
-    @property
-    def stop_positions(self) -> tuple[Value, Value]:
-        return self.lower_stop, self.upper_stop
 
     @property
     def lever_arm(self) -> Value:

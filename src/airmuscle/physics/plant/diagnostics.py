@@ -9,7 +9,6 @@ from ...core import Array, ParameterError, Value, describe_model, select_prefix
 from ...core.diagnostics import ColumnLimit, Columns, Diagnostic, DiagnosticCode
 from ..muscle import INNER_CONTRACTION, ElasticSeriesElement, Muscle
 from ..muscle.friction import NoFriction
-from ..pneumatics import Circuit
 
 MARGIN = 1e-3
 """Fraction of the contraction range of a geometry within which a muscle is at its limit (chosen)."""
@@ -55,13 +54,12 @@ def column_limits(muscles: Sequence[Muscle], prefixes: Sequence[str]) -> tuple[C
 
 def with_tolerance(limits: Sequence[ColumnLimit]) -> tuple[tuple[ColumnLimit, float, float], ...]:
     """Each limit of a column, with the bounds that the column may reach through rounding."""
-    return tuple((limit, *_widened(*limit.bounds)) for limit in limits)
-
-
-def _widened(low: float, high: float) -> tuple[float, float]:
-    span = high - low if np.isfinite(high - low) else abs(high if np.isfinite(high) else low)
-    slack = _TOLERANCE * span
-    return low - slack, high + slack
+    widened = []
+    for limit in limits:
+        low, high = limit.bounds
+        slack = _TOLERANCE * (high - low if np.isfinite(high - low) else abs(high if np.isfinite(high) else low))
+        widened.append((limit, low - slack, high + slack))
+    return tuple(widened)
 
 
 def extrapolation(limits: Sequence[tuple[ColumnLimit, float, float]], columns: Columns) -> list[Diagnostic]:
@@ -97,17 +95,16 @@ def _limits(muscle: Muscle, prefix: str) -> Iterator[tuple[DiagnosticCode, str, 
 
 def _excess(time: Array, values: Array, limit: ColumnLimit) -> Diagnostic:
     """The diagnostic of a column of pressure, speed or contraction that exceeds its limits."""
-    subject, code, _, quantity, (low, high) = limit
+    low, high = limit.bounds
     excess = np.maximum(low - values, values - high)
-    scale, unit = _shown_unit(quantity)
+    scale, unit = _shown_unit(limit.quantity)
     worst, rows = int(np.argmax(excess)), int(np.count_nonzero(excess > 0))
-    where, meaning = _MEANINGS[code]
+    where, meaning = _outside(limit)
     text = (
-        f"{subject} was outside {where} in {quantity.replace('_', ' ')} ({_span(low / scale, high / scale)} "
-        f"{unit}) in {percent_of_rows(rows / values.size)} of the rows, by at most {excess[worst] / scale:.4g} {unit} "
-        f"at {time[worst]:.4g} s; {meaning}"
+        f"{limit.subject} was {where} in {percent_of_rows(rows / values.size)} of the rows, by at most "
+        f"{excess[worst] / scale:.4g} {unit} at {time[worst]:.4g} s; {meaning}"
     )
-    return Diagnostic(code, subject, text, rows)
+    return Diagnostic(limit.code, limit.subject, text, rows)
 
 
 def percent_of_rows(share: float) -> str:
@@ -117,13 +114,14 @@ def percent_of_rows(share: float) -> str:
 
 def describe_limit(limit: ColumnLimit) -> str:
     """Text that says which range a column has left; without the values of a run."""
-    scale, unit = _shown_unit(limit.quantity)
-    where, meaning = _MEANINGS[limit.code]
-    low, high = limit.bounds
-    return (
-        f"{limit.subject}: outside {where} in {limit.quantity.replace('_', ' ')} ({_span(low / scale, high / scale)} "
-        f"{unit}); {meaning}"
-    )
+    return f"{limit.subject}: {'; '.join(_outside(limit))}"
+
+
+def _outside(limit: ColumnLimit) -> tuple[str, str]:
+    """Text that says which range is left, and what that means."""
+    (scale, unit), (where, meaning) = _shown_unit(limit.quantity), _MEANINGS[limit.code]
+    span = _span(*(end / scale for end in limit.bounds))
+    return f"outside {where} in {limit.quantity.replace('_', ' ')} ({span} {unit})", meaning
 
 
 def _shown_unit(quantity: str) -> tuple[float, str]:
@@ -145,15 +143,6 @@ def rated_temperature(muscles: Sequence[Muscle], ambient_temperature: float) -> 
         if muscle.ratings
         for text in muscle.ratings.excesses(temperature=ambient_temperature)
     ]
-
-
-class Checks(NamedTuple):
-    """What the rows of a run are compared with: diagnostics that every run has, limits of columns as in
-    `with_tolerance`, and the circuits with a validity range, by the prefixes of their names."""
-
-    constant: list[Diagnostic]
-    limits: tuple[tuple[ColumnLimit, float, float], ...]
-    circuits: tuple[tuple[str, Circuit], ...]
 
 
 def components(remarks: Mapping[str, str]) -> list[Diagnostic]:
@@ -232,8 +221,3 @@ def _is_singular(muscle: Muscle, contraction: float, margin: float) -> bool:
     with np.errstate(all="ignore"):
         there, near = (float(abs(muscle.contractile.force(1e5, each))) for each in (contraction, inside))
     return not there <= SINGULAR_FACTOR * max(near, 1.0)
-
-
-def first_hint(given: Sequence[Enclosure]) -> str:
-    """Remedy for the first muscle that is at a limit of its geometry; empty if none is."""
-    return next(filter(None, map(geometry_limit_hint, given)), "")

@@ -6,7 +6,17 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Any, ClassVar
 
-from ...core import ColumnLimit, Columns, Diagnostic, DiagnosticCode, GeometryLimitError, Value, Values, model
+from ...core import (
+    ColumnLimit,
+    Columns,
+    Diagnostic,
+    DiagnosticCode,
+    GeometryLimitError,
+    Value,
+    Values,
+    check_known,
+    model,
+)
 from ...core.system import Input, StateVariable, add_prefix, select_prefix, with_prefix
 from ..equilibrium.equilibrium import equilibria_at_ambient_pressure, equilibrium_at_ambient_pressure
 from ..equilibrium.statics import StaticPlant
@@ -25,7 +35,7 @@ from .muscle_state import (
     settle_muscles,
     states_of_muscle,
 )
-from .validation import as_quantity, check_free, check_parts, check_pressures, check_unique, convert_pressures
+from .validation import as_quantity, check_parts, check_pressures, check_unique, convert_pressures
 
 _AIR_STATES = ("air_mass", "internal_energy")
 _ROUNDING = 1e-3
@@ -223,7 +233,7 @@ class Plant(PlantDisplay, StaticPlant):
         muscles = zip(self.prefixes, self.muscles, strict=True)
         air = {f"{p}{s.name}" for p, m in muscles for s in air_states(m, self.gas, self.ambient)}
         units = {s.name: s.unit for s in self.states if s.name not in air}
-        check_free(values, list(units))
+        check_known("Plant: no coordinate", values, list(units))
         given = {n: as_quantity(f"Plant: the {n} of a state", v, units[n], self.ambient) for n, v in values.items()}
         state: dict[str, Value] = {n: 0.0 for c in self.mechanism.coordinates for n in (c.name, c.speed)} | given
         contractions = self.mechanism.contractions(state, self.resting_lengths)
@@ -270,11 +280,11 @@ class Plant(PlantDisplay, StaticPlant):
         return [*rated, *diagnostics.extrapolation(limits, columns), *diagnostics.components(remarks)]
 
     @functools.cached_property
-    def _checks(self) -> diagnostics.Checks:
-        """What `diagnose` compares a run with."""
+    def _checks(self) -> tuple[list[Diagnostic], Any, list[tuple[str, Circuit]]]:
+        """Diagnostics of every run, and the limits of columns and the circuits that `diagnose` compares a run with."""
         rated = diagnostics.rated_temperature(self.muscles, self.ambient.temperature)
-        circuits = tuple(each for each in self._circuits() if each[1].has_validity_range)
-        return diagnostics.Checks(rated, diagnostics.with_tolerance(self.column_limits), circuits)
+        circuits = [each for each in self._circuits() if each[1].has_validity_range]
+        return rated, diagnostics.with_tolerance(self.column_limits), circuits
 
     @functools.cached_property
     def column_limits(self) -> tuple[ColumnLimit, ...]:
@@ -284,6 +294,7 @@ class Plant(PlantDisplay, StaticPlant):
     def failure_hint(self, state: Mapping[str, float]) -> str:
         """Remedy for the first muscle that is at, or beyond, a limit of its geometry."""
         try:
-            return diagnostics.first_hint(self._enclosures(state))
+            hints = map(diagnostics.geometry_limit_hint, self._enclosures(state))
+            return next(filter(None, hints), "")
         except GeometryLimitError as error:
             return str(error)

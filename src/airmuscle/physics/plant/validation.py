@@ -1,13 +1,12 @@
 """Validation of the parts of a plant: types, numbers, names, closed-form laws."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from ...core import ParameterError, TraceError, at_ambient, check_above_vacuum, one_line, quantity, with_ambient
 from ...core.declaration import as_finite_float, check_structure, parameters
-from ...core.errors import check_known
 from ..mechanism import Mechanism
 from ..muscle import Muscle
 from ..muscle.characteristic.validity_range import ValidityRange
@@ -99,11 +98,6 @@ def _check_counts(muscles: Sequence[Muscle], circuit: Any, circuits: Sequence[Ci
         raise ParameterError("Plant: give a circuit that feeds several muscles alone, not in a tuple.")
     if len(set(names)) < len(names):
         raise ParameterError(f"Plant: muscles need different names; they are {names}.")
-
-
-def check_free(values: Iterable[str], free: Sequence[str]) -> None:
-    """Raise ParameterError for a name that is not a state, or for a state of the air, which the pressure determines."""
-    check_known("Plant: no coordinate", values, free)
 
 
 def as_quantity(where: str, value: Any, unit: str, ambient: Ambient) -> float:
