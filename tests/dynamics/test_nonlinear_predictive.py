@@ -78,7 +78,7 @@ def test_the_plan_is_the_best_under_the_equations_of_the_plant():
     state = np.array([*(REST[name] for name in STATES), 0.0])
     wanted = np.array([REST["position"] + 3e-3])
     plan, variables = LAW.plan(state, wanted, np.zeros(1), np.ones(1))
-    program = LAW._programs[0].program
+    program = LAW._programs[0]
     aim = variables[:4]
     step = program.step_function()
 

@@ -27,10 +27,6 @@ class Innovation(NamedTuple):
         return float(self.difference @ np.linalg.solve(self.covariance, self.difference))
 
 
-FilterArrays = tuple[Array, Array, Array, Array, Array, Array]
-"""The first six arrays of a BoundFilter."""
-
-
 class BoundFilter(NamedTuple):
     """The compiled prediction and correction of a filter with the arrays that they read and write."""
 
@@ -41,12 +37,12 @@ class BoundFilter(NamedTuple):
     difference: Array
     difference_covariance: Array
     transition: Array
-    predict: Any
-    correct: Any
-    outputs: Any
-    output_values: Array
     variances: Array
     slopes: Array
+    outputs: Any
+    output_values: Array
+    predict: Any = None
+    correct: Any = None
 
 
 class MeasuredRows(NamedTuple):

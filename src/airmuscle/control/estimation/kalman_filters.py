@@ -71,21 +71,19 @@ class ExtendedKalmanFilter(StateEstimator):
         kept = [mean for mean, each in zip(reversed(means), passes, strict=True) if each.row is not None]
         return {"time": rows.time, **self.table(np.array(kept), rows.held)}
 
-    def _bind(self) -> BoundFilter:
-        functions, total, p = self._functions, len(self.states), len(self.measured)
-        n, h, variances = self._compiled.sizes.states, float(self.sample_time), self.variances
-        x, u, covariance = np.zeros(total), np.zeros(self._compiled.sizes.inputs), np.zeros((total, total))
-        transition, values, difference, s = np.zeros((total, total)), np.zeros(p), np.zeros(p), np.zeros((p, p))
-        slopes = np.zeros((p, total))
+    def _kernels(self, at: BoundFilter) -> tuple[Any, Any]:
+        functions, n, (p, total) = self._functions, self._compiled.sizes.states, at.slopes.shape
         predict = _predict_extended.bind(
-            functions.rates, functions.constants, self.magnitudes, h, self.noise, x, u, covariance, transition,
-            np.zeros(n), np.zeros((n, total)), np.zeros((5, n, total + 1)), np.zeros((total, total)),
+            functions.rates, functions.constants, self.magnitudes, float(self.sample_time), self.noise, at.mean,
+            at.inputs, at.covariance, at.transition, np.zeros(n), np.zeros((n, total)), np.zeros((5, n, total + 1)),
+            np.zeros((total, total)),
         )  # fmt: skip
         correct = _correct_extended.bind(
-            functions.measured, functions.constants, variances, x, u, covariance, values, difference, s,
-            np.zeros((p, p)), slopes, np.zeros((total, p)), np.zeros((total, total)), np.zeros((total, total)),
+            functions.measured, functions.constants, at.variances, at.mean, at.inputs, at.covariance, at.values,
+            at.difference, at.difference_covariance, np.zeros((p, p)), at.slopes, np.zeros((total, p)),
+            np.zeros((total, total)), np.zeros((total, total)),
         )  # fmt: skip
-        return self._bound((x, covariance, u, values, difference, s), transition, variances, predict, correct, slopes)
+        return predict, correct
 
 
 def normalised_error_squared(estimate: StateEstimate, state: Any) -> float:
@@ -149,21 +147,18 @@ class UnscentedKalmanFilter(StateEstimator):
         centre = 1.0 - len(self.states) / gamma_squared
         return centre, centre + 1.0 - self.alpha**2 + self.beta, 0.5 / gamma_squared
 
-    def _bind(self) -> BoundFilter:
-        functions, total, p = self._functions, len(self.states), len(self.measured)
-        n, h, variances = self._compiled.sizes.states, float(self.sample_time), self.variances
+    def _kernels(self, at: BoundFilter) -> tuple[Any, Any]:
+        functions, n, (p, total) = self._functions, self._compiled.sizes.states, at.slopes.shape
         spread, weights = float(0.5 / self.weights[2]) ** 0.5, np.array(self.weights)
-        x, u, covariance = np.zeros(total), np.zeros(self._compiled.sizes.inputs), np.zeros((total, total))
-        values, difference, s = np.zeros(p), np.zeros(p), np.zeros((p, p))
         points, root = np.zeros((2 * total + 1, total)), np.zeros((total, total))
         predict = _predict_unscented.bind(
-            functions.rates, functions.constants, self.magnitudes, h, spread, weights, self.noise, x, u, covariance,
-            points, root, np.zeros(n), np.zeros((n, total)), np.zeros((5, n, total + 1)),
+            functions.rates, functions.constants, self.magnitudes, float(self.sample_time), spread, weights,
+            self.noise, at.mean, at.inputs, at.covariance, points, root, np.zeros(n), np.zeros((n, total)),
+            np.zeros((5, n, total + 1)),
         )  # fmt: skip
         correct = _correct_unscented.bind(
-            functions.measured, functions.constants, spread, weights, variances, x, u, covariance, values,
-            difference, s, np.zeros((p, p)), points, root, np.zeros((2 * total + 1, p)), np.zeros((p, total)),
-            np.zeros((total, p)), np.zeros((total, p)),
+            functions.measured, functions.constants, spread, weights, at.variances, at.mean, at.inputs, at.covariance,
+            at.values, at.difference, at.difference_covariance, np.zeros((p, p)), points, root,
+            np.zeros((2 * total + 1, p)), np.zeros((p, total)), np.zeros((total, p)), np.zeros((total, p)),
         )  # fmt: skip
-        arrays, none = (x, covariance, u, values, difference, s), np.zeros((0, 0))
-        return self._bound(arrays, none, variances, predict, correct, none)
+        return predict, correct

@@ -13,7 +13,7 @@ from ...physics.analysis.linear_model import linearise
 from ...physics.analysis.sampled_model import held
 from ..laws.linear_model_predictive import RAWLINGS2017
 from .estimates import StateEstimate
-from .predictive_program import MAX_HORIZON, PredictiveProgram, Programs, check_limits
+from .predictive_program import MAX_HORIZON, PredictiveProgram, check_limits
 from .riccati import check_numbers, check_sample_time, regulator
 from .state_estimator import StateEstimator
 
@@ -75,7 +75,7 @@ class NonlinearModelPredictive(ShortRepr, MultivariableController):
     slack_weight: float = 1e4
     horizon: int = within(1, MAX_HORIZON, default=20)
     substeps: int = within(1, MAX_HORIZON, default=2)
-    _programs: list[Programs] = dataclasses.field(init=False, repr=False, default_factory=list)
+    _programs: list[PredictiveProgram] = dataclasses.field(init=False, repr=False, default_factory=list)
 
     def __post_init__(self) -> None:
         check_field_types(self)
@@ -147,7 +147,7 @@ class NonlinearModelPredictive(ShortRepr, MultivariableController):
         values = {**self.operating_inputs, **dict(zip(self.commanded, commanded.tolist(), strict=True))}
         return [float(values.get(name, 0.0)) for name in names]
 
-    def _built(self) -> Programs:
+    def _built(self) -> PredictiveProgram:
         estimator, ready = self.estimator, compile_system(self.estimator.plant)
         states = ready.description.state_names
         inputs = dict(zip(ready.description.input_names, self._all_inputs(self.init().applied), strict=True))
@@ -159,9 +159,8 @@ class NonlinearModelPredictive(ShortRepr, MultivariableController):
         linear = linearise(estimator.plant, point, inputs).select(inputs=list(self.commanded))
         a, b = held(linear.A * scale / scale[:, None], linear.B * sizes / scale[:, None], estimator.sample_time)
         weights = np.diag([1.0 if name in self.permitted else 0.0 for name in states])
-        owner, costs = "NonlinearModelPredictive", np.eye(sizes.size)
-        _, terminal = regulator(owner, a, b, weights, costs)
+        _, terminal = regulator("NonlinearModelPredictive", a, b, weights, np.eye(sizes.size))
         return PredictiveProgram(
             estimator.plant, estimator.places[1], inputs, self.controlled, self.commanded, scale, sizes, weights,
             terminal, dict(self.limits), float(self.slack_weight), self.horizon, self.substeps, estimator.sample_time,
-        ).programs()  # fmt: skip
+        )  # fmt: skip

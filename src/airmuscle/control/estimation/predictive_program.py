@@ -1,6 +1,7 @@
 """Nonlinear programs of predictive control: target and plan of a plant as CasADi expressions, solved by Ipopt."""
 
 import dataclasses
+import functools
 from collections.abc import Mapping
 from typing import Any
 
@@ -55,8 +56,9 @@ class PredictiveProgram:
     substeps: int
     sample_time: float
 
-    def programs(self) -> "Programs":
-        """The solvers of both programs."""
+    @functools.cached_property
+    def _solvers(self) -> tuple[Any, Any]:
+        """The solvers of target and plan, which hold the numbers of a search: one thread at a time uses them."""
         import casadi
 
         n, m = len(self.scale), len(self.sizes)
@@ -68,9 +70,9 @@ class PredictiveProgram:
             "expand": True, "print_time": False,
             "ipopt": {"print_level": 0, "sb": "yes", "max_iter": MAX_ITERATIONS, "tol": TOLERANCE},
         }  # fmt: skip
-        target = casadi.nlpsol("target", "ipopt", self._target(rates, columns), options)
-        plan = casadi.nlpsol("plan", "ipopt", self._plan(limited), options)
-        return Programs(self, target, plan)
+        programs = {"target": self._target(rates, columns), "plan": self._plan(limited)}
+        target, plan = (casadi.nlpsol(name, "ipopt", program, options) for name, program in programs.items())
+        return target, plan
 
     def _named(self, x: Any, u: Any) -> tuple[dict[str, Any], dict[str, Any]]:
         """States and inputs of the plant by name, from the scaled ones."""
@@ -119,12 +121,10 @@ class PredictiveProgram:
         n, m, slacks = len(self.scale), len(self.sizes), self.slacks
         z = casadi.MX.sym("z", self.horizon * (n + m) + slacks)
         p = casadi.MX.sym("p", 2 * n + m + len(self.disturbed))
-        x, d = p[:n], p[n : n + len(self.disturbed)]
-        x_s, u_s = p[n + len(self.disturbed) : 2 * n + len(self.disturbed)], p[2 * n + len(self.disturbed) :]
+        x, d, x_s, u_s = casadi.vertsplit(p, np.cumsum([0, n, len(self.disturbed), n, m]).tolist())
         s = z[self.horizon * (n + m) :]
         cost = (self.slack_weight if slacks else 0.0) * casadi.sumsqr(s)
-        defects, rows = [], []
-        step = self.step_function()
+        defects, rows, step = [], [], self.step_function()
         for k in range(self.horizon):
             u, later = z[k * (n + m) + n : (k + 1) * (n + m)], z[k * (n + m) : k * (n + m) + n]
             cost += casadi.bilin(self.weights, x - x_s) + casadi.sumsqr(u - u_s)
@@ -155,58 +155,38 @@ class PredictiveProgram:
         """Number of slack variables: one for each limited column; none where limits are hard."""
         return len(self.limits) if np.isfinite(self.slack_weight) else 0
 
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class Programs:
-    """The solvers of target and plan."""
-
-    program: PredictiveProgram
-    target: Any
-    planner: Any
-
     def solve(
         self, state: Array, wanted: Array, low: Array, high: Array, variables: Array | None
     ) -> tuple[Array | None, Array | None]:
         """The planned inputs (N, m), or None, and the variables of target and plan, which begin the next search."""
-        p = self.program
-        n, m = len(p.scale), len(p.sizes)
-        x, d = state[:n] / p.scale, state[n:]
-        bounds, free = (low / p.sizes, high / p.sizes), np.full(n, np.inf)
-        operating = np.array([p.inputs[name] for name in p.commanded]) / p.sizes
+        target, planner = self._solvers
+        n, m, count = len(self.scale), len(self.sizes), self.horizon
+        x, d = state[:n] / self.scale, state[n:]
+        lower = np.concatenate([np.full(n, -np.inf), low / self.sizes])
+        upper = np.concatenate([np.full(n, np.inf), high / self.sizes])
+        operating = np.array([self.inputs[name] for name in self.commanded]) / self.sizes
         guess = np.concatenate([x, operating]) if variables is None else variables[: n + m]
-        solution = self.target(
-            x0=guess, p=np.concatenate([d, wanted]), lbg=0.0, ubg=0.0,
-            lbx=np.concatenate([-free, bounds[0]]), ubx=np.concatenate([free, bounds[1]]),
-        )  # fmt: skip
+        solution = target(x0=guess, p=np.concatenate([d, wanted]), lbg=0.0, ubg=0.0, lbx=lower, ubx=upper)
         aim = np.array(solution["x"]).ravel()
-        if not (self.target.stats()["success"] and np.isfinite(aim).all()):
+        if not (target.stats()["success"] and np.isfinite(aim).all()):
             return None, None
-        start = self._start(x, aim, variables)
-        steps, rows = p.horizon * n, p.horizon * len(p.limits)
-        each = [
-            np.tile(np.concatenate([sign * free, bound]), p.horizon)
-            for sign, bound in zip((-1.0, 1.0), bounds, strict=True)
-        ]
-        slack = np.zeros(p.slacks)
-        under, over = np.tile([-np.inf, 0.0], (p.horizon, 1)), np.tile([1.0, np.inf], (p.horizon, 1))
-        width = len(p.limits)
-        solution = self.planner(
-            x0=start, p=np.concatenate([x, d, aim]),
-            lbx=np.concatenate([each[0], slack]), ubx=np.concatenate([each[1], slack + np.inf]),
-            lbg=np.concatenate([np.zeros(steps), np.repeat(under, width, axis=1).ravel()[: 2 * rows]]),
-            ubg=np.concatenate([np.zeros(steps), np.repeat(over, width, axis=1).ravel()[: 2 * rows]]),
-        )  # fmt: skip
+        slack, steps, width = np.zeros(self.slacks), np.zeros(count * n), len(self.limits)
+        solution = planner(
+            x0=self._start(x, aim, variables),
+            p=np.concatenate([x, d, aim]),
+            lbx=np.concatenate([np.tile(lower, count), slack]),
+            ubx=np.concatenate([np.tile(upper, count), slack + np.inf]),
+            lbg=np.concatenate([steps, np.tile(np.repeat([-np.inf, 0.0], width), count)]),
+            ubg=np.concatenate([steps, np.tile(np.repeat([1.0, np.inf], width), count)]),
+        )
         z = np.array(solution["x"]).ravel()
-        if not (self.planner.stats()["success"] and np.isfinite(z).all()):
+        if not (planner.stats()["success"] and np.isfinite(z).all()):
             return None, None
-        inputs = z[: p.horizon * (n + m)].reshape(p.horizon, n + m)[:, n:]
-        return inputs * p.sizes, np.concatenate([aim, z])
+        return z[: count * (n + m)].reshape(count, n + m)[:, n:] * self.sizes, np.concatenate([aim, z])
 
     def _start(self, x: Array, aim: Array, variables: Array | None) -> Array:
         """The variables from which the search starts: the last ones, moved by one sample, or the target."""
-        p = self.program
         if variables is None:
-            return np.concatenate([np.tile(np.concatenate([x, aim[x.size :]]), p.horizon), np.zeros(p.slacks)])
-        width = aim.size
-        last = variables[width : width + p.horizon * width].reshape(p.horizon, width)
-        return np.concatenate([last[1:].ravel(), last[-1], variables[width + p.horizon * width :]])
+            return np.concatenate([np.tile(np.append(x, aim[x.size :]), self.horizon), np.zeros(self.slacks)])
+        _, *samples, slack = np.split(variables, aim.size * np.arange(1, self.horizon + 2))
+        return np.concatenate([*samples[1:], samples[-1], slack])

@@ -14,7 +14,7 @@ from ...engine.compile.function import AugmentedRates, augmented_rates, states_a
 from ...engine.compile.program import CompiledSystem, compile_system
 from ...engine.loop.control_loop import COMMAND
 from ...recording.recording import Recording
-from .estimates import BoundFilter, FilterArrays, Innovation, MeasuredRows, Pass, StateEstimate
+from .estimates import BoundFilter, Innovation, MeasuredRows, Pass, StateEstimate
 from .riccati import DISTURBANCE, check_numbers
 
 UNKNOWN = 1e30
@@ -83,19 +83,21 @@ class StateEstimator(ShortRepr, abc.ABC):
         self.__post_init__()
 
     @abc.abstractmethod
+    def _kernels(self, at: BoundFilter) -> tuple[Any, Any]:
+        """The compiled prediction and correction, bound to arrays."""
+
     def _bind(self) -> BoundFilter:
         """The compiled filter with new arrays."""
-
-    def _bound(
-        self, arrays: FilterArrays, transition: Array, variances: Array, predict: Any, correct: Any, slopes: Array
-    ) -> BoundFilter:
-        """The compiled filter of arrays, with the function of the outputs; slopes (p, n) of the measured columns."""
-        mean, inputs = arrays[0], arrays[2]
-        values = np.zeros((1, len(self._compiled.output_names)))
-        outputs = evaluate.bind(
-            self._functions.outputs, self._functions.constants, mean.reshape(1, -1), inputs.reshape(1, -1), values
-        )
-        return BoundFilter(*arrays, transition, predict, correct, outputs, values, variances, slopes)
+        functions, n, p = self._functions, len(self.states), len(self.measured)
+        mean, inputs = np.zeros(n), np.zeros(self._compiled.sizes.inputs)
+        columns = np.zeros((1, len(self._compiled.output_names)))
+        bound = BoundFilter(
+            mean, np.zeros((n, n)), inputs, np.zeros(p), np.zeros(p), np.zeros((p, p)), np.zeros((n, n)),
+            self.variances, np.zeros((p, n)),
+            evaluate.bind(functions.outputs, functions.constants, mean[None, :], inputs[None, :], columns), columns,
+        )  # fmt: skip
+        predict, correct = self._kernels(bound)
+        return bound._replace(predict=predict, correct=correct)
 
     @property
     def states(self) -> tuple[str, ...]:

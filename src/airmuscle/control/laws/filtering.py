@@ -20,7 +20,7 @@ from ...core import (
     with_prefix,
     within,
 )
-from ...engine.loop.control_law import Commanded, ControlLaw, EnclosingLaw, Memory, Sampled, SplitRange, inputs_of
+from ...engine.loop.control_law import Commanded, ControlLaw, EnclosingLaw, Memory, Sampled, inputs_of
 from ...engine.loop.controller import Measurement, relative_unit
 from .enclosing import MAX_SAMPLES
 from .state_feedback import FRANKLIN1998
@@ -149,10 +149,8 @@ class SmithPredictor(EnclosingLaw):
         columns = {**measurement.columns, self.column: measurement.columns[self.column] + now - before}
         commands, law = self.law.step(select_prefix("law.", memory), measurement._replace(columns=columns), dt)
         limited = {name: ops.clip(commands[name], *measurement.ranges[name]) for name in commands}
-        if isinstance(self.commanded, SplitRange):
-            applied = limited[self.commanded.positive] - limited[self.commanded.negative]
-        else:
-            applied = limited[self.commanded]
+        positive, *negative = inputs_of(self.commanded)
+        applied = limited[positive] - sum(limited[name] for name in negative)
         kept = ops.exp(-dt / self.time_constant)
         later = {f"response{age + 1}": memory[f"response{age}"] for age in range(self.samples)}
         response = {"response0": kept * now + (1.0 - kept) * self.static_gain * applied}

@@ -1,5 +1,6 @@
 """Compensation of hysteresis: modified Prandtl-Ishlinskii operator, its inverse, and a law behind it."""
 
+import itertools
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar
 
@@ -42,15 +43,15 @@ class HysteresisOperator:
                 f"HysteresisOperator: {len(self.thresholds)} thresholds and {len(self.weights)} weights; give as many, "
                 "one or more."
             )
-        if self.thresholds[0] != 0.0 or any(b <= a for a, b in zip(self.thresholds, self.thresholds[1:], strict=False)):
+        if self.thresholds[0] != 0.0 or any(b <= a for a, b in itertools.pairwise(self.thresholds)):
             raise ParameterError("HysteresisOperator: the thresholds must begin with 0 and increase.")
         if len(self.dead_zones) != len(self.dead_zone_weights) or 0.0 in self.dead_zones:
             raise ParameterError(
                 f"HysteresisOperator: {len(self.dead_zones)} dead zones and {len(self.dead_zone_weights)} weights; "
                 "give one threshold, other than 0, and one weight for each."
             )
-        sums = [*np.cumsum(self.weights), *(w for side in (1, -1) for w in np.cumsum([1.0, *self._side(side)[1]]))]
-        if not all(w > 0.0 for w in sums):
+        sums = [np.cumsum(self.weights), *(np.cumsum([1.0, *self._side(side)[1]]) for side in (1, -1))]
+        if not all(w > 0.0 for w in np.concatenate(sums)):
             raise ParameterError(
                 "HysteresisOperator: every partial sum of the weights of the plays, and 1 plus that of the dead zones "
                 "of either side, must be positive. Otherwise there is no inverse."
@@ -58,11 +59,9 @@ class HysteresisOperator:
 
     def _side(self, sign: float) -> tuple[list[float], list[float]]:
         """Thresholds and weights of the dead zones of one side, from the inner to the outer one."""
-        pairs = sorted(
-            ((d, v) for d, v in zip(self.dead_zones, self.dead_zone_weights, strict=True) if sign * d > 0),
-            key=lambda pair: abs(pair[0]),
-        )
-        return [d for d, _ in pairs], [v for _, v in pairs]
+        pairs = zip(self.dead_zones, self.dead_zone_weights, strict=True)
+        side = sorted((pair for pair in pairs if sign * pair[0] > 0), key=lambda pair: abs(pair[0]))
+        return [d for d, _ in side], [v for _, v in side]
 
     @property
     def inverse(self) -> "InverseHysteresisOperator":
@@ -141,11 +140,8 @@ def superposed(value: Value, thresholds: tuple[Value, ...], weights: tuple[Value
 def _inverted(thresholds: Sequence[float], weights: Sequence[float]) -> tuple[list[float], list[float]]:
     sums = np.cumsum(weights).tolist()
     inverse = [1.0 / weights[0], *(-w / (a * b) for w, a, b in zip(weights[1:], sums[1:], sums, strict=False))]
-    moved = [
-        float(sum(w * (r - s) for w, s in zip(weights[: i + 1], thresholds, strict=False)))
-        for i, r in enumerate(thresholds)
-    ]
-    return moved, inverse
+    pairs = list(zip(weights, thresholds, strict=True))
+    return [float(sum(w * (r - s) for w, s in pairs[: i + 1])) for i, r in enumerate(thresholds)], inverse
 
 
 def _play_along(path: Any, threshold: float) -> list[float]:
@@ -178,10 +174,8 @@ class HysteresisCompensation(EnclosingLaw):
     @property
     def initial_memory(self) -> dict[str, float]:
         """The plays of the inverse, `hysteresis.play0`, and the values of the law with the prefix `law.`."""
-        return {
-            **with_prefix("hysteresis.", self.inverse.initial_memory),
-            **with_prefix("law.", dict(self.law.initial_memory)),
-        }
+        plays = with_prefix("hysteresis.", self.inverse.initial_memory)
+        return {**plays, **with_prefix("law.", self.law.initial_memory)}
 
     def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
         commands, kept = self.law.step(select_prefix("law.", memory), measurement, dt)

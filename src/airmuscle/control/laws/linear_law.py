@@ -145,8 +145,5 @@ def _observed(by_memory: Array, n: int) -> list[int]:
     """The values of the memory on which commands depend, also over later samples."""
     reached = np.any(by_memory[n:] != 0, axis=0)
     for _ in range(n):
-        more = reached | np.any(by_memory[:n][reached] != 0, axis=0)
-        if (more == reached).all():
-            break
-        reached = more
+        reached = reached | np.any(by_memory[:n][reached] != 0, axis=0)
     return np.flatnonzero(reached).tolist()

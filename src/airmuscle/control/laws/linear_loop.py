@@ -67,17 +67,15 @@ def loop_margins(opened: SampledModel) -> Margins:
     if values[-1].real < 0:
         negative.append(float(frequencies[-1]))
     factors = {1.0 / abs(at(f)): f for f in negative if at(f) != 0}
-    above, below = [x for x in factors if x >= 1.0], [x for x in factors if x < 1.0]
     crossings = _zeros(frequencies, np.abs(values) - 1.0, lambda f: abs(at(f)) - 1.0)
     angles = {f: float(np.angle(-at(f))) for f in crossings}
     nearest = min(angles, key=lambda f: abs(angles[f]), default=math.nan)
     delays = [(angle % (2 * math.pi)) / (2 * math.pi * f) for f, angle in angles.items()]
     peak, where = _peak(frequencies, np.abs(1.0 + values), lambda f: abs(1.0 + at(f)))
-    gain = min(above, default=math.inf)
-    return Margins(
-        gain, max(below, default=0.0), factors.get(gain, math.nan), abs(angles.get(nearest, math.inf)), nearest,
-        min(delays, default=math.inf), peak, where,
-    )  # fmt: skip
+    gain = min((x for x in factors if x >= 1.0), default=math.inf)
+    lower = max((x for x in factors if x < 1.0), default=0.0)
+    phase, delay = abs(angles.get(nearest, math.inf)), min(delays, default=math.inf)
+    return Margins(gain, lower, factors.get(gain, math.nan), phase, nearest, delay, peak, where)
 
 
 def _scanned(opened: SampledModel, frequencies: Array) -> npt.NDArray[np.complex128]:
@@ -219,10 +217,7 @@ class LinearLoop:
         if opened is not None:
             back[opened, opened] = 0.0
         seen = back @ plant.C
-        a = np.block([
-            [plant.A + plant.B @ law.D @ seen, plant.B @ law.C],
-            [law.B @ seen, law.A],
-        ])  # fmt: skip
+        a = np.block([[plant.A + plant.B @ law.D @ seen, plant.B @ law.C], [law.B @ seen, law.A]])
         by_plant, by_law = (law.F, law.E) if opened is None else (law.D[:, [opened]], law.B[:, [opened]])
         c = np.hstack([plant.C, np.zeros((len(law.measured), len(law.memory)))])
         names = (*plant.states, *(f"controller.{name}" for name in law.memory))
@@ -256,21 +251,17 @@ def linearise_loop(
             f"linearise_loop: {type(law).__name__} is no ControlLaw, its samples have no derivatives. Write the "
             "controller as a ControlLaw over airmuscle.core.ops."
         )
-    present = control_state and dict(
-        zip((i.name for i in plant.input_variables), control_state.applied_inputs, strict=False)
-    )
-    given = {**(present or {}), **(inputs or {})}
+    present = control_state.applied_inputs if control_state else ()
+    given = {**dict(zip((i.name for i in plant.input_variables), present, strict=False)), **(inputs or {})}
     model = linearise(plant, state, given)
     loop.check_columns(model.outputs, model.inputs)
     measured = [model.output_values[name] for name in law.measured_columns]
     ranges = {i.name: (i.minimum, i.maximum) for i in plant.input_variables} | dict.fromkeys(loop.drivers, (0.0, 1.0))
     limits = np.array([ranges[name] for name in law.inputs])
     memory = law.initial_memory if control_state is None else control_state.controller
-    values = memory.values() if isinstance(memory, Mapping) else memory
-    point = Point(
-        np.array(measured), _setpoints(loop, law, model.output_values, control_state),
-        np.array([float(value) for value in values]), limits[:, 0], limits[:, 1],
-    )  # fmt: skip
+    values = np.array(list(memory.values() if isinstance(memory, Mapping) else memory), dtype=float)
+    setpoints = _setpoints(loop, law, model.output_values, control_state)
+    point = Point(np.array(measured), setpoints, values, limits[:, 0], limits[:, 1])
     sizes = _sizes(plant, law.measured_columns, measured)
     linear = linearise_law(law, loop.sample_time, point, model.input_values, sizes, control_state is not None)
     return LinearLoop(model.select(law.inputs, law.measured_columns).with_delay(delay), linear, loop.sample_time)

@@ -48,8 +48,7 @@ class SetpointCommand(OpenLoopLaw):
         return self.setpoint_names or self.commanded
 
     def command(self, setpoints: Mapping[str, Value]) -> dict[str, Value]:
-        names = zip(self.commanded, self.setpoints, strict=True)
-        return {name: setpoints[setpoint] for name, setpoint in names}
+        return {name: setpoints[point] for name, point in zip(self.commanded, self.setpoints, strict=True)}
 
 
 def check_pair(law: ControlLaw, commanded: tuple[str, ...]) -> None:

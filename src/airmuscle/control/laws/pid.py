@@ -1,11 +1,12 @@
 """Controllers of one column: PID in standard form, two-position control, and a dead zone for two valves."""
 
 import functools
+from collections.abc import Mapping
 from typing import ClassVar
 
 from ...core import ParameterError, Reference, Value, model, ops, parameter, published
 from ...engine.loop import Commanded, Measurement, Memory, Sampled, SisoController, commands, range_of
-from .sliding_mode import sliding_memory, sliding_variable
+from .sliding_mode import SLIDING_MEMORY, sliding_variable
 
 ASTROM_HAGGLUND1995 = published("astrom-hagglund-1995")
 
@@ -47,10 +48,10 @@ class PID(SisoController):
     )
     initial_output: float = parameter("u", "u_0", "first command; without integral action the bias", default=0.0)
 
-    @property
-    def initial_memory(self) -> dict[str, float]:
-        """Whether it has started (0 or 1), I and D [u], and c r - y of the last sample [y]."""
-        return {"started": 0.0, "integral": 0.0, "derivative": 0.0, "weighted_error": 0.0}
+    initial_memory: ClassVar[Mapping[str, float]] = dict.fromkeys(
+        ("started", "integral", "derivative", "weighted_error"), 0.0
+    )
+    """Whether it has started (0 or 1), I and D [u], and c r - y of the last sample [y]."""
 
     def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
         setpoint, measured = measurement.setpoints[self.measured], measurement.columns[self.measured]
@@ -103,10 +104,8 @@ class OnOffController(SisoController):
         "y", "H", "width between switching on and off", bounds=(0.0, float("inf")), default=0.0
     )
 
-    @property
-    def initial_memory(self) -> dict[str, float]:
-        """Whether the maximum is commanded (0 or 1)."""
-        return {"on": 0.0}
+    initial_memory: ClassVar[Mapping[str, float]] = {"on": 0.0}
+    """Whether the maximum is commanded (0 or 1)."""
 
     def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
         error = measurement.columns[self.measured] - measurement.setpoints[self.measured]
@@ -144,10 +143,8 @@ class DeadZoneController(SisoController):
                 "SplitRange('fill', 'discharge')."
             )
 
-    @property
-    def initial_memory(self) -> dict[str, float]:
-        """The position (-1, 0 or 1), whether it has started, the last error and its filtered derivative."""
-        return {**sliding_memory(), "position": 0.0}
+    initial_memory: ClassVar[Mapping[str, float]] = {**SLIDING_MEMORY, "position": 0.0}
+    """The position (-1, 0 or 1), whether it has started, the last error and its filtered derivative."""
 
     def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
         error = measurement.setpoints[self.measured] - measurement.columns[self.measured]

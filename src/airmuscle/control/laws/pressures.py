@@ -152,10 +152,7 @@ class Decentralised(ControlLaw):
     @property
     def initial_memory(self) -> dict[str, float]:
         """The values of all laws, with the prefixes `0.`, `1.`, ..."""
-        memory: dict[str, float] = {}
-        for i, law in enumerate(self.laws):
-            memory |= with_prefix(f"{i}.", law.initial_memory)
-        return memory
+        return {f"{i}.{name}": value for i, law in enumerate(self.laws) for name, value in law.initial_memory.items()}
 
     def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
         commands: dict[str, Value] = {}

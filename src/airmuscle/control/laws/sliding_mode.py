@@ -6,10 +6,8 @@ from typing import ClassVar
 from ...core import Reference, Value, model, ops, parameter, published
 from ...engine.loop import Commanded, Measurement, Memory, Sampled, SisoController, commands, range_of
 
-
-def sliding_memory() -> dict[str, float]:
-    """Whether it has started (0 or 1), the last error and its filtered derivative."""
-    return {"started": 0.0, "error": 0.0, "error_rate": 0.0}
+SLIDING_MEMORY: Mapping[str, float] = {"started": 0.0, "error": 0.0, "error_rate": 0.0}
+"""Whether it has started (0 or 1), the last error and its filtered derivative."""
 
 
 def sliding_variable(
@@ -47,10 +45,8 @@ class SlidingMode(SisoController):
     filter_time: float = parameter("s", "T_f", "time constant of the derivative", bounds=(0.0, 1e3), default=0.0)
     equivalent_output: float = parameter("u", "u_0", "command on the sliding surface", default=0.0)
 
-    @property
-    def initial_memory(self) -> dict[str, float]:
-        """Whether it has started (0 or 1), the last error [y] and its filtered derivative [y/s]."""
-        return sliding_memory()
+    initial_memory: ClassVar[Mapping[str, float]] = SLIDING_MEMORY
+    """Whether it has started (0 or 1), the last error [y] and its filtered derivative [y/s]."""
 
     def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
         error = measurement.setpoints[self.measured] - measurement.columns[self.measured]
@@ -87,10 +83,8 @@ class SuperTwisting(SisoController):
     filter_time: float = parameter("s", "T_f", "time constant of the derivative", bounds=(0.0, 1e3), default=0.0)
     initial_output: float = parameter("u", "u_0", "initial integral", default=0.0)
 
-    @property
-    def initial_memory(self) -> dict[str, float]:
-        """Whether it has started (0 or 1), the last error, its filtered derivative, and the integral w [u]."""
-        return {**sliding_memory(), "integral": 0.0}
+    initial_memory: ClassVar[Mapping[str, float]] = {**SLIDING_MEMORY, "integral": 0.0}
+    """Whether it has started (0 or 1), the last error, its filtered derivative, and the integral w [u]."""
 
     def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
         error = measurement.setpoints[self.measured] - measurement.columns[self.measured]

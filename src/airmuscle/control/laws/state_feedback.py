@@ -80,13 +80,10 @@ class StateFeedback(MultivariableController, ControlLaw):
         at = [self.measured_offset[self.measured.index(name)] for name in self.controlled]
         aims = [measurement.setpoints[name] - z for name, z in zip(self.controlled, at, strict=True)]
         by_setpoint = product(self.setpoint_gain, aims if self.setpoint_gain else [], len(self.commanded))
-        commands: dict[str, Value] = {}
-        limited: Value = 0.0
         parts = zip(self.commanded, self.input_offset, by_setpoint, by_state, by_integral, strict=True)
-        for name, offset, n, a, b in parts:
-            wanted = offset + n - a - b
-            commands[name] = ops.clip(wanted, *measurement.ranges[name])
-            limited = limited + ops.absolute_value(commands[name] - wanted)
+        wanted = {name: offset + n - a - b for name, offset, n, a, b in parts}
+        commands = {name: ops.clip(value, *measurement.ranges[name]) for name, value in wanted.items()}
+        limited = sum((ops.absolute_value(commands[name] - value) for name, value in wanted.items()), 0.0)
         applied = [commands[name] - offset for name, offset in zip(self.commanded, self.input_offset, strict=True)]
         by_input = product(self.input_matrix, applied, len(x))
         later = [a + b for a, b in zip(product(self.transition, x), by_input, strict=True)]
