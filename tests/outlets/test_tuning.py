@@ -399,7 +399,7 @@ def test_bad_cases_are_refused():
     ):
         with pytest.raises(ParameterError, match=message):
             tune(cases, BOUNDS, duration=0.3)
-    with pytest.raises(ParameterError, match=r"LoopCase.plant is .*; give a Plant"):
+    with pytest.raises(ParameterError, match=r"LoopCase: plant must be an instance of Plant; it is "):
         LoopCase("a", SPLIT, LOOP)
 
 

@@ -256,8 +256,7 @@ def linearise_loop(
     model = linearise(plant, state, given)
     loop.check_columns(model.outputs, model.inputs)
     measured = [model.output_values[name] for name in law.measured_columns]
-    ranges = {i.name: (i.minimum, i.maximum) for i in plant.input_variables} | dict.fromkeys(loop.drivers, (0.0, 1.0))
-    limits = np.array([ranges[name] for name in law.inputs])
+    limits = np.array(list(loop.command_ranges(plant).values()))
     memory = law.initial_memory if control_state is None else control_state.controller
     values = np.array(list(memory.values() if isinstance(memory, Mapping) else memory), dtype=float)
     setpoints = _setpoints(loop, law, model.output_values, control_state)

@@ -69,7 +69,8 @@ def run_plot(result: BenchmarkResult, names: Sequence[str], group: Group = Group
     for column, name in enumerate(names):
         upper, lower = axes[:, column]
         task = next(task for task in result.tasks if task.name == name)
-        limit, begin = 0.0, _first_time(task.begin, task.event)
+        first = task.begin if task.event is None else min(task.begin, task.event)
+        limit, begin = 0.0, max(0.0, first - 0.2)  # a little before the event and what is judged
         for i, each in enumerate(shown):
             run = each.runs[RunKey(group, truth, name)]
             if run.recording is None or run.metrics is None:
@@ -88,11 +89,6 @@ def run_plot(result: BenchmarkResult, names: Sequence[str], group: Group = Group
     axes[1, 0].set_ylabel("error [degree]")
     legend_below(figure, axes[0, 0], columns=3)
     return Plot("runs", f"Angle and error over time, {group}, {truth}, first search.", figure)
-
-
-def _first_time(begin: float, event: float | None) -> float:
-    """The time from which a run is drawn: a little before the event and before what is judged."""
-    return max(0.0, (begin if event is None else min(begin, event)) - 0.2)
 
 
 def learning_plot(curves: Sequence[LearningCurve]) -> Plot:

@@ -47,12 +47,9 @@ class TaskSignals(NamedTuple):
     def setpoint(self, names: Sequence[str]) -> SampledSignal:
         """The named signals as set points. Raises ParameterError for a name that a task does not have."""
         known = self._asdict()
-        known.pop("time")
-        points = {}
-        for name in names:
-            check_known("a task has no set point", name, known)
-            points[name] = tuple(zip(self.time.tolist(), known[name].tolist(), strict=True))
-        return SampledSignal(points)
+        time = known.pop("time").tolist()
+        check_known("a task has no set point", names, known)
+        return SampledSignal({name: tuple(zip(time, known[name].tolist(), strict=True)) for name in names})
 
 
 def task_signals(joint: BenchmarkJoint, task: ControlTask) -> TaskSignals:

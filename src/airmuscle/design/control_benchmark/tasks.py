@@ -142,25 +142,17 @@ class ControlTask:
         check_field_types(self)
         if not 0 < self.duration < math.inf:
             raise ParameterError(f"task '{self.name}': duration is {self.duration!r} s; it must be positive, finite.")
-        if not 0 <= self.begin < self.duration:
-            raise ParameterError(
-                f"task '{self.name}': begin is {self.begin:g} s; allowed range: 0 to {self.duration:g} s."
-            )
-        if self.event is not None and not 0 <= self.event < self.duration:
-            raise ParameterError(
-                f"task '{self.name}': event is {self.event:g} s; allowed range: 0 to {self.duration:g} s."
-            )
+        for name, time in (("begin", self.begin), ("event", self.event)):
+            if time is not None and not 0 <= time < self.duration:
+                raise ParameterError(
+                    f"task '{self.name}': {name} is {time:g} s; allowed range: 0 to {self.duration:g} s."
+                )
 
 
 def _sine(frequency: float, amplitude: float) -> ControlTask:
-    periods = SINE_PERIODS if frequency > 0.2 else 2
-    judged = JUDGED_PERIODS if frequency > 0.2 else 1
-    return ControlTask(
-        f"sine {frequency:g} Hz",
-        SineMotion(amplitude * DEGREE, frequency),
-        periods / frequency,
-        begin=(periods - judged) / frequency,
-    )
+    periods, judged = (SINE_PERIODS, JUDGED_PERIODS) if frequency > 0.2 else (2, 1)
+    motion = SineMotion(amplitude * DEGREE, frequency)
+    return ControlTask(f"sine {frequency:g} Hz", motion, periods / frequency, begin=(periods - judged) / frequency)
 
 
 def _pulse(begin: float, width: float, height: float) -> tuple[tuple[float, float], ...]:

@@ -64,13 +64,9 @@ def _summary(result: SizingResult) -> tuple[str, ...]:
 
 def _products(result: SizingResult) -> Table:
     """One row for each product and number of muscles: its best law, and the lengths by all its laws."""
-
-    def key(choice: MuscleChoice) -> tuple[str, int]:
-        return product_of(choice), choice.total_count
-
     groups: dict[tuple[str, int], list[MuscleChoice]] = {}
     for choice in result.choices:
-        groups.setdefault(key(choice), []).append(choice)
+        groups.setdefault((product_of(choice), choice.total_count), []).append(choice)
     first = [group[0] for group in groups.values()]
     lengths = [sorted(choice.length for choice in group) for group in groups.values()]
     columns: dict[str, Any] = {

@@ -91,7 +91,8 @@ class JointSearch:
         if length < shortest * (1.0 - ROUNDING):
             return None
         if length > shortest * (1.0 + ROUNDING):
-            extended, contracted = self._least_radius(muscle, length)
+            pairs = self._pairs(muscle, length)
+            extended, contracted = (float(each[np.argmin(pairs[1] - pairs[0])]) for each in pairs)
         radius = self._radius(length, contracted - extended)
         return self._design(muscle, extended, contracted, radius, self.radii(muscle, MARGIN * length))
 
@@ -99,24 +100,17 @@ class JointSearch:
         return contraction * length / self.requirement.angle
 
     def _pairs(self, muscle: StaticMuscle, length: float) -> tuple[Array, Array]:
-        """Pairs of contractions of the grid with which a length meets the requirement."""
+        """Pairs of contractions of the grid with which a length meets the requirement; the best one without any."""
         grid = np.linspace(*muscle.contraction_range, GRID)
         rows, columns = np.nonzero(self.needed(muscle, grid, grid) <= length)
+        if not rows.size:  # the region is smaller than the grid
+            _, extended, contracted = self._best(muscle)
+            return np.array([extended]), np.array([contracted])
         return grid[rows], grid[columns]
-
-    def _least_radius(self, muscle: StaticMuscle, length: float) -> tuple[float, float]:
-        extended, contracted = self._pairs(muscle, length)
-        if not extended.size:  # the region is smaller than the grid
-            return self._best(muscle)[1:]
-        least = int(np.argmin(contracted - extended))
-        return float(extended[least]), float(contracted[least])
 
     def radii(self, muscle: StaticMuscle, length: float) -> tuple[float, float]:
         """Minimum and maximum pulley radius [m] with this length [m], on the grid of contractions."""
         extended, contracted = self._pairs(muscle, length)
-        if not extended.size:
-            _, *pair = self._best(muscle)
-            extended, contracted = np.array(pair[:1]), np.array(pair[1:])
         used = contracted - extended
         return self._radius(length, float(used.min())), self._radius(length, float(used.max()))
 

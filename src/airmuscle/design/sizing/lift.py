@@ -2,7 +2,6 @@
 
 import dataclasses
 import functools
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -10,7 +9,7 @@ import numpy as np
 from ...core import Array, SolveError
 from .choice import MuscleDesign
 from .requirement import LiftRequirement, SizingConditions
-from .static_muscle import StaticMuscle
+from .static_muscle import StaticMuscle, least_sufficient
 
 GRID = 257
 """Contractions at which the limits of an end point are searched, before they are refined (chosen)."""
@@ -136,7 +135,9 @@ class LiftSearch:
             length *= GROWTH
             if length > MAX_GROWTH * shortest:
                 raise SolveError("between the ends of the stroke, the load exceeds the force of the muscle")
-        return length if length == shortest else _bisect(lambda x: self.mounting(muscle, x) is not None, length)
+        if length == shortest:
+            return length
+        return least_sufficient(lambda x: self.mounting(muscle, x) is not None, length / GROWTH, length)
 
     def design(self, muscle: StaticMuscle, length: float) -> MuscleDesign | None:
         """The design with this length [m]; None if it does not meet the requirement."""
@@ -171,12 +172,3 @@ class LiftSearch:
 def _force_at(muscle: StaticMuscle, contraction: float) -> str:
     pressure = muscle.pressure_range[1] / 1e5
     return f"force at {pressure:.4g} bar and {100 * contraction:.4g} % is {float(muscle.capacity(contraction)):.4g} N"
-
-
-def _bisect(sufficient: Callable[[float], bool], length: float) -> float:
-    """The shortest sufficient length between this one and the previous one of the search."""
-    low, high = length / GROWTH, length
-    for _ in range(50):
-        middle = 0.5 * (low + high)
-        low, high = (low, middle) if sufficient(middle) else (middle, high)
-    return high

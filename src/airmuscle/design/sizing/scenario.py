@@ -53,9 +53,7 @@ def air_path(choice: MuscleChoice) -> AirPath:
         pressures = np.array([muscle.end_point(eps, load).pressure for eps, load in points])
     else:
         pressures = first.pressure + fraction * (last.pressure - first.pressure)
-    volumes = np.array(
-        [muscle.volume(p, eps) for p, eps in zip(pressures.tolist(), contractions.tolist(), strict=True)]
-    )
+    volumes = np.array(list(map(muscle.volume, pressures.tolist(), contractions.tolist())))
     absolute = np.asarray(absolute_pressure(pressures, ambient))
     return AirPath(absolute, np.asarray(Isothermal().air_mass(absolute, volumes, ambient)))
 
@@ -172,21 +170,13 @@ def _stiffness(choice: MuscleChoice) -> float:
 
 def _load(choice: MuscleChoice, requirement: LiftRequirement) -> tuple[Mechanism, float]:
     """The mechanism of a lift and its moving mass [kg]; the position 0 is that of the muscles at rest."""
-    start = choice.design.extended.contraction * choice.length
-    mass = requirement.mass or FORCE_MASS * requirement.load(0.0) / STANDARD_GRAVITY
-    mechanism: Mechanism
+    start, weight = choice.design.extended.contraction * choice.length, requirement.load(0.0)
+    mass = requirement.mass or FORCE_MASS * weight / STANDARD_GRAVITY
+    if requirement.stiffness < 0.0:
+        raise SolveError("the scenario of a load that decreases over the stroke is not written; give a constant load.")
     if requirement.stiffness:
-        preload = requirement.load(0.0) - requirement.stiffness * start
-        if requirement.stiffness < 0.0:
-            raise SolveError(
-                "the scenario of a load that decreases over the stroke is not written; give a constant load."
-            )
-        mechanism = SpringLoad(mass, requirement.stiffness, preload=preload)
-    elif requirement.force:
-        mechanism = Isotonic(requirement.load(0.0), mass)
-    else:
-        mechanism = HangingMass(mass)
-    return mechanism, mass
+        return SpringLoad(mass, requirement.stiffness, preload=weight - requirement.stiffness * start), mass
+    return Isotonic(weight, mass) if requirement.force else HangingMass(mass), mass
 
 
 def _lift_text(choice: MuscleChoice) -> str:

@@ -9,12 +9,12 @@ from collections.abc import Callable, Iterable
 import numpy as np
 
 from ...core import AirmuscleError, AirmuscleWarning, ParameterError, ShortRepr, SolveError
-from ...files.library import LAWS, Entry, list_laws, list_products, load_law, read_toml
+from ...files.library import LAWS, Entry, list_laws, list_products, load_law, own_length, read_toml
 from .choice import MuscleChoice, Requirement, SortKey, UnsuitableMuscle, by_air, rank
 from .joint import JointSearch
 from .lift import LiftSearch
 from .requirement import LiftRequirement, SizingConditions
-from .static_muscle import LengthRange, at_length, length_range, own_length, static_muscle
+from .static_muscle import LengthRange, at_length, least_sufficient, length_range, static_muscle
 
 LENGTHS = 49
 """Lengths that are tried for a law that depends on its length, before the shortest is refined (chosen)."""
@@ -67,8 +67,9 @@ class SizingResult(ShortRepr):
         best: MuscleChoice | None = None
         low, high = 0.0, 1.0
         for _ in range(BISECTIONS):
-            fraction = 0.5 * (low + high)
-            choice = _any_choice(_reduced(self.requirement, what, fraction), self.conditions, entries)
+            fraction, choice = 0.5 * (low + high), None
+            with contextlib.suppress(ParameterError):
+                choice = _any_choice(self.requirement.reduced(**{what: fraction}), self.conditions, entries)
             low, high, best = (low, fraction, best) if choice is None else (fraction, high, choice)
         if best is None:
             return ""
@@ -184,31 +185,22 @@ def _shortest_length(entry: Entry, search: Search, lengths: LengthRange) -> floa
     def needed(length: float) -> float:
         return search.required_length(static_muscle(at_length(entry, length), search.conditions))
 
+    def suffices(length: float) -> bool:
+        try:
+            return needed(length) <= length
+        except AirmuscleError:
+            return False
+
     if lengths.low == lengths.high:
         return lengths.high
     if not _depends_on_length(entry, search, lengths):
         return float(np.clip(needed(lengths.high), *lengths))
     previous = lengths.low
     for length in np.geomspace(*lengths, LENGTHS).tolist():
-        if _is_sufficient(needed, length):
-            return length if length == lengths.low else _refine(needed, previous, length)
+        if suffices(length):
+            return length if length == lengths.low else least_sufficient(suffices, previous, length)
         previous = length
     return lengths.high
-
-
-def _is_sufficient(needed: Callable[[float], float], length: float) -> bool:
-    try:
-        return needed(length) <= length
-    except AirmuscleError:
-        return False
-
-
-def _refine(needed: Callable[[float], float], low: float, high: float) -> float:
-    """The shortest sufficient length between one that is not and one that is, to rounding."""
-    for _ in range(50):
-        middle = 0.5 * (low + high)
-        low, high = (low, middle) if _is_sufficient(needed, middle) else (middle, high)
-    return high
 
 
 def _depends_on_length(entry: Entry, search: Search, lengths: LengthRange) -> bool:
@@ -238,19 +230,8 @@ def _check_diameter(choice: MuscleChoice) -> None:
         )
 
 
-def _reduced(requirement: Requirement, what: str, fraction: float) -> Requirement | None:
-    try:
-        return requirement.reduced(**{what: fraction})
-    except ParameterError:
-        return None
-
-
-def _any_choice(
-    requirement: Requirement | None, conditions: SizingConditions, entries: list[Entry]
-) -> MuscleChoice | None:
+def _any_choice(requirement: Requirement, conditions: SizingConditions, entries: list[Entry]) -> MuscleChoice | None:
     """A choice of any of the entries, with the maximum number of muscles or with one; None if there is none."""
-    if requirement is None:
-        return None
     for entry in entries:
         for count in (conditions.max_count, conditions.min_count):
             with contextlib.suppress(AirmuscleError):

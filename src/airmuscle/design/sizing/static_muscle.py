@@ -7,8 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core import Array, ParameterError, ShortRepr, SolveError, leaves
-from ...files.library import Entry, scale_entry
+from ...core import Array, ParameterError, ShortRepr, SolveError
+from ...files.library import Entry, own_length, scale_entry
 from ...physics.muscle import ElasticSeriesElement, Muscle
 from ...physics.muscle.characteristic import Characteristic, ContractionLaw, ForceLaw, PressureLaw, validity_range_of
 from ...physics.muscle.ratings import LENGTH_BOUNDS
@@ -158,13 +158,6 @@ def static_muscle(entry: Entry, conditions: SizingConditions) -> StaticMuscle:
     return StaticMuscle(entry, (low, high), contraction)
 
 
-def own_length(entry: Entry) -> float | None:
-    """Resting length [m] of the law or geometry of an entry; None if it has none."""
-    parts = (part for part in (entry.characteristic, entry.geometry) if part is not None)
-    lengths = (leaf.value for part in parts for leaf in leaves(part) if leaf.declared.name == "resting_length")
-    return next((float(length) for length in lengths), None)
-
-
 def length_range(entry: Entry, max_length: float) -> LengthRange:
     """Nominal lengths [m] for which the law of an entry can be used, from three diameters (chosen) up to `max_length`.
 
@@ -202,14 +195,17 @@ def _solve_for_force(law: Characteristic, pressure: Any, contraction: Any) -> An
     if not isinstance(law, ContractionLaw | PressureLaw):
         return law.force(pressure, contraction)
     p, eps = np.broadcast_arrays(np.asarray(pressure, dtype=float), np.asarray(contraction, dtype=float))
-    exceeds: Callable[[Array], Any] = (
-        (lambda force: law.contraction(p, force) < eps)
-        if isinstance(law, ContractionLaw)
-        else (lambda force: law.pressure(eps, force) > p)
-    )
     low, high = (np.full(p.shape, limit) for limit in law.force_range)
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
-        above = exceeds(middle)
+        above = law.contraction(p, middle) < eps if isinstance(law, ContractionLaw) else law.pressure(eps, middle) > p
         low, high = np.where(above, low, middle), np.where(above, middle, high)
     return 0.5 * (low + high)
+
+
+def least_sufficient(suffices: Callable[[float], bool], low: float, high: float) -> float:
+    """The least length that suffices, between one that does not and one that does, to rounding."""
+    for _ in range(50):
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if suffices(middle) else (middle, high)
+    return high

@@ -11,7 +11,6 @@ import numpy as np
 from ...core import BLACK, BLUE, ORANGE, RED, SKY, Array, atomic_folder, cite, legend_below, new_figure
 from ...report.chapter import BY_ROW, Chapter, NamedValue, Plot, Table, TableColumn
 from ...report.write import save_table, write_into
-from .distributions import LevelSet, Variation
 from .result import SobolIndices, StudyResult, sensitivity_table
 from .study import Study
 
@@ -161,8 +160,6 @@ def _file_stem(name: str) -> str:
 
 
 RESULTS_FILE, TIME_SERIES_FILE = "results.csv", "time_series.npz"
-MAX_LISTED_LEVELS = 6
-"""Maximum number of levels that are listed; of more levels, only range and number are printed."""
 MAX_LISTED_REASONS = 20
 SHORT_LISTED = 4
 """Reasons of failed runs in the brief view (chosen)."""
@@ -233,7 +230,7 @@ def variation_table(study: Study) -> Table:
     """The varied parameters with their distributions or levels and their sampled range."""
     columns: dict[str, Any] = {
         "parameter": [parameter.path for parameter in study.parameters],
-        "values": [describe_variation(variation) for variation in study.variations],
+        "values": list(map(str, study.variations)),
         "min": TableColumn(study.values.min(axis=0), BY_ROW),
         "max": TableColumn(study.values.max(axis=0), BY_ROW),
         "unit": [parameter.unit for parameter in study.parameters],
@@ -243,16 +240,6 @@ def variation_table(study: Study) -> Table:
         ],
     }
     return Table("varied", "Varied parameters", columns)
-
-
-def describe_variation(variation: Variation) -> str:
-    """A variation as one line of text."""
-    if not isinstance(variation, LevelSet):
-        return str(variation)
-    if len(variation.values) > MAX_LISTED_LEVELS:
-        low, high = variation.support
-        return f"{len(variation.values)} values from {low:.4g} to {high:.4g}"
-    return ", ".join(f"{value:.4g}" for value in variation.values)
 
 
 def failure_table(result: StudyResult) -> Table:

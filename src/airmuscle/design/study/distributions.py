@@ -10,10 +10,13 @@ import numpy as np
 
 from ...core import Array, ParameterError, abridged
 from ...files.library import Location, TableReader, custom_field, read_finite_number
-from .paths import read_count, read_difference, read_quantity, read_ratio
+from ...files.scenario.values import Number
+from .paths import read_count, read_difference
 
 MIN_PROBABILITY = 1e-6
 """Minimum probability of the range of a truncated distribution, so that its bounds are exact to ten digits."""
+MAX_LISTED_LEVELS = 6
+"""Maximum number of levels that are listed; of more levels, only range and number are printed."""
 
 
 class Variation(abc.ABC):
@@ -57,20 +60,26 @@ class LevelSet(Variation):
 
     def ppf(self, probabilities: Array) -> Array:
         index = np.floor(probabilities * len(self.values)).astype(int)
-        values: Array = np.array(self.values)[np.minimum(index, len(self.values) - 1)]
-        return values
+        return np.asarray(np.array(self.values)[np.minimum(index, len(self.values) - 1)])
 
     @property
     def support(self) -> tuple[float, float]:
         return min(self.values), max(self.values)
+
+    def __str__(self) -> str:
+        """The values; of many only their number and range."""
+        if len(self.values) <= MAX_LISTED_LEVELS:
+            return ", ".join(f"{value:.4g}" for value in self.values)
+        low, high = self.support
+        return f"{len(self.values)} values from {low:.4g} to {high:.4g}"
 
 
 @dataclasses.dataclass(frozen=True)
 class Range:
     """Equidistant levels, including both ends."""
 
-    low: float = custom_field(read_quantity, "first value")
-    high: float = custom_field(read_quantity, "last value")
+    low: float = custom_field(read_finite_number, "first value")
+    high: float = custom_field(read_finite_number, "last value")
     count: int = custom_field(read_count, "number of values")
 
     def __post_init__(self) -> None:
@@ -104,8 +113,8 @@ class Distribution(Variation):
 class Uniform(Distribution):
     """Uniform distribution between two bounds."""
 
-    low: float = custom_field(read_quantity, "lower bound")
-    high: float = custom_field(read_quantity, "upper bound")
+    low: float = custom_field(read_finite_number, "lower bound")
+    high: float = custom_field(read_finite_number, "upper bound")
 
     def ppf(self, probabilities: Array) -> Array:
         return probabilities * (self.high - self.low) + self.low
@@ -119,7 +128,7 @@ class Normal(Distribution):
     """Normal distribution. It is unbounded: use Truncated if values beyond a bound are impossible."""
 
     positive: ClassVar[tuple[str, ...]] = ("std",)
-    mean: float = custom_field(read_quantity, "mean")
+    mean: float = custom_field(read_finite_number, "mean")
     std: float = custom_field(read_difference, "standard deviation")
 
     def ppf(self, probabilities: Array) -> Array:
@@ -138,9 +147,9 @@ class LogNormal(Distribution):
     """Log-normal distribution: the natural logarithm of the value is normally distributed."""
 
     positive: ClassVar[tuple[str, ...]] = ("median", "log_std")
-    median: float = custom_field(read_quantity, "median")
+    median: float = custom_field(read_finite_number, "median")
     log_std: float = custom_field(
-        read_ratio, "standard deviation of the natural logarithm; approximately the relative standard deviation"
+        Number("1"), "standard deviation of the natural logarithm; approximately the relative standard deviation"
     )
 
     def ppf(self, probabilities: Array) -> Array:
@@ -155,9 +164,9 @@ class LogNormal(Distribution):
 class Triangular(Distribution):
     """Triangular distribution with a mode between two bounds."""
 
-    low: float = custom_field(read_quantity, "lower bound")
-    mode: float = custom_field(read_quantity, "mode")
-    high: float = custom_field(read_quantity, "upper bound")
+    low: float = custom_field(read_finite_number, "lower bound")
+    mode: float = custom_field(read_finite_number, "mode")
+    high: float = custom_field(read_finite_number, "upper bound")
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -189,8 +198,8 @@ class Truncated(Variation):
     """A distribution truncated to the range between two bounds."""
 
     inner: Distribution = custom_field(_read_inner, "the distribution to be truncated, a table with a model")
-    low: float = custom_field(read_quantity, "lower bound")
-    high: float = custom_field(read_quantity, "upper bound")
+    low: float = custom_field(read_finite_number, "lower bound")
+    high: float = custom_field(read_finite_number, "upper bound")
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -240,4 +249,4 @@ def read_variation(value: Any, unit: str, location: Location) -> Variation:
 
 def _check_finite(variation: Any, *values: float) -> None:
     if not all(math.isfinite(value) for value in values):
-        raise ParameterError(f"{variation}: all values must be finite.")
+        raise ParameterError(f"{variation!r}: all values must be finite.")

@@ -8,13 +8,14 @@ therefore determines the accuracy of the metrics.
 import abc
 import dataclasses
 import math
-from typing import Any, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from ...core import Array, ParameterError
-from ...files.library.fields import custom_field
-from .paths import read_name, read_quantity, read_ratio, read_time
+from ...files.library import custom_field, read_finite_number
+from ...files.scenario.values import Number
+from .paths import read_name
 
 
 class Window(NamedTuple):
@@ -25,12 +26,14 @@ class Window(NamedTuple):
 
 
 @dataclasses.dataclass(frozen=True)
-class Metric(abc.ABC):
+class Metric:
     """A metric of one column of each run, within a time window [s] or over the whole run."""
 
+    own_unit: ClassVar[str] = ""
+    """The unit of a metric that does not have the unit of its column."""
     column: str = custom_field(read_name, "column of the run")
-    begin: float = custom_field(read_time, "start of the time window", default=-math.inf, kw_only=True)
-    end: float = custom_field(read_time, "end of the time window", default=math.inf, kw_only=True)
+    begin: float = custom_field(Number("s"), "start of the time window", default=-math.inf, kw_only=True)
+    end: float = custom_field(Number("s"), "end of the time window", default=math.inf, kw_only=True)
 
     def __post_init__(self) -> None:
         if not self.begin < self.end:
@@ -62,12 +65,12 @@ class Metric(abc.ABC):
         """The times [s] that must be among the rows of a run."""
         return np.array([t for t in (self.begin, self.end) if math.isfinite(t)])
 
-    @abc.abstractmethod
     def unit(self, column_unit: str) -> str:
         """The unit of the metric, given that of the column."""
+        return self.own_unit or column_unit
 
 
-class Scalar(Metric):
+class Scalar(Metric, abc.ABC):
     """A metric that is a single number; NaN if it does not exist for a run."""
 
     def value(self, time: Array, values: Array) -> float:
@@ -78,9 +81,6 @@ class Scalar(Metric):
     @abc.abstractmethod
     def _evaluate(self, window: Window) -> float:
         """The metric of a window with at least one row."""
-
-    def unit(self, column_unit: str) -> str:
-        return column_unit
 
 
 class Final(Scalar):
@@ -127,7 +127,8 @@ class RootMeanSquare(Scalar):
 class TimeToReach(Scalar):
     """Time [s] from the start of the window until the column first reaches a level, from above or below."""
 
-    level: float = custom_field(read_quantity, "value to be reached")
+    own_unit: ClassVar[str] = "s"
+    level: float = custom_field(read_finite_number, "value to be reached")
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -137,21 +138,17 @@ class TimeToReach(Scalar):
     def _evaluate(self, window: Window) -> float:
         return _first_crossing(window, self.level) - float(window.time[0])
 
-    def unit(self, column_unit: str) -> str:
-        return "s"
-
 
 class Overshoot(Scalar):
     """Overshoot beyond the final value, as a fraction of the difference between final and initial value [1]."""
+
+    own_unit: ClassVar[str] = "1"
 
     def _evaluate(self, window: Window) -> float:
         change = window.values[-1] - window.values[0]
         if change == 0.0:
             return math.nan
         return max(0.0, float(((window.values - window.values[-1]) / change).max()))
-
-    def unit(self, column_unit: str) -> str:
-        return "1"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -161,8 +158,9 @@ class SettlingTime(Scalar):
     Half the width of the band is the fraction `band` of the difference between final and initial value, by default 2 %.
     """
 
+    own_unit: ClassVar[str] = "s"
     band: float = custom_field(
-        read_ratio, "half-width of the band, relative to the change of the column", default=0.02, kw_only=True
+        Number("1"), "half-width of the band, relative to the change of the column", default=0.02, kw_only=True
     )
 
     def __post_init__(self) -> None:
@@ -174,23 +172,20 @@ class SettlingTime(Scalar):
         error, begin = window.values - window.values[-1], float(window.time[0])
         half_width = self.band * abs(float(error[0]))
         outside = np.flatnonzero(np.abs(error) > half_width)
-        if half_width == 0.0:
-            return 0.0 if outside.size == 0 else math.nan
         if outside.size == 0:
             return 0.0
+        if half_width == 0.0:
+            return math.nan
         i = int(outside[-1])
         entry = Window(window.time[i : i + 2], error[i : i + 2])
         return _first_crossing(entry, math.copysign(half_width, error[i])) - begin
-
-    def unit(self, column_unit: str) -> str:
-        return "s"
 
 
 @dataclasses.dataclass(frozen=True)
 class TimeSeries(Metric):
     """The column at equidistant times; NaN after the end of a run that was aborted."""
 
-    sample_time: float = custom_field(read_time, "sample time")
+    sample_time: float = custom_field(Number("s"), "sample time")
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -211,9 +206,6 @@ class TimeSeries(Metric):
     def times(self) -> Array:
         steps = math.floor((self.end - self.begin) / self.sample_time * (1 + 1e-12))
         return np.asarray(self.begin + self.sample_time * np.arange(steps + 1), dtype=float)
-
-    def unit(self, column_unit: str) -> str:
-        return column_unit
 
     def sample(self, time: Array, values: Array) -> Array:
         """The column (T,) at `times`, from a run with times (N,) [s] and values (N,)."""

@@ -10,6 +10,7 @@ such a field is declared with `custom_field` and one of the readers, which recei
 
 import copy
 import dataclasses
+import itertools
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -52,14 +53,10 @@ class ScenarioTemplate:
     def parameters(self) -> dict[str, ScenarioParameter]:
         """All parameters that may vary, by path."""
         plant, input_table = self.scenario.plant, self.tables.get("input", {})
-        available = [
-            ScenarioParameter(leaf.path, leaf.declared.unit, leaf.declared.bounds, i)
-            for i, leaf in enumerate(leaves(plant))
-        ]
-        for keys, unit in (
-            *_input_parameters(input_table, self.scenario),
-            *_run_parameters(self.tables["run"], self.scenario),
-        ):
+        of_plant = enumerate(leaves(plant))
+        available = [ScenarioParameter(leaf.path, leaf.declared.unit, leaf.declared.bounds, i) for i, leaf in of_plant]
+        of_tables = _input_parameters(input_table, self.scenario), _run_parameters(self.tables["run"], self.scenario)
+        for keys, unit in itertools.chain(*of_tables):
             available.append(ScenarioParameter(_format_path(keys), unit, (-math.inf, math.inf), keys))
         return {parameter.path: parameter for parameter in available}
 
@@ -74,7 +71,7 @@ class ScenarioTemplate:
 
         None for a run whose initial state must be computed individually. The values are not validated.
         """
-        plant, individually = self.scenario.plant, [None] * len(values)
+        plant = self.scenario.plant
         pressure = initial_pressure(self.tables, self.location, plant)
         if pressure is None or any(
             p.location[:2] == ("run", "initial_state")
@@ -82,7 +79,7 @@ class ScenarioTemplate:
             else p.unit == ABSOLUTE and isinstance(pressure, AbsolutePressure)
             for p in varied
         ):
-            return list(individually)
+            return [None] * len(values)
         leaf_values = np.repeat(flatten(plant)[None, :], len(values), axis=0)
         of_plant = {p.path: column for p, column in zip(varied, values.T, strict=True) if isinstance(p.location, int)}
         of_plant |= absolute_pressures(plant, of_plant)
@@ -135,10 +132,8 @@ def _input_parameters(table: Mapping[str, Any], scenario: Scenario) -> Iterator[
     units = run_column_units(scenario.problem)
     for name, value in table.items():
         if isinstance(scenario.problem.input, ControlLoop) and name == "controller":
-            yield from (
-                (("input", name, *keys), unit)
-                for keys, unit in controller_number_paths(value, scenario.problem.input, units)
-            )
+            for keys, unit in controller_number_paths(value, scenario.problem.input, units):
+                yield ("input", name, *keys), unit
         elif name == "period":
             yield ("input", name), "s"
         elif isinstance(value, list):
@@ -191,27 +186,10 @@ def _replace_number(tables: Mapping[str, Any], keys: Keys, value: float) -> Mapp
 _NUMBER = re.compile(r"^\s*[-+]?(\d+\.?\d*|\.\d+)([eE][-+]?\d+)?")
 
 
-def read_quantity(value: Any, unit: str, where: object) -> float:
-    """A finite number in the contextual unit. Raises ParameterError or UnitError."""
-    return read_finite_number(value, unit, where)
-
-
 def read_difference(value: Any, unit: str, where: object) -> float:
     """A difference of two quantities, converted without the offset of its unit (degC, bara)."""
-    number = read_finite_number(value, unit, where)
-    return (
-        number - read_finite_number(_NUMBER.sub("0", value, count=1), unit, where) if isinstance(value, str) else number
-    )
-
-
-def read_ratio(value: Any, unit: str, where: object) -> float:
-    """A dimensionless number, or a percentage as text."""
-    return read_finite_number(value, "1", where)
-
-
-def read_time(value: Any, unit: str, where: object) -> float:
-    """A time [s]."""
-    return read_finite_number(value, "s", where)
+    zero = read_finite_number(_NUMBER.sub("0", value, count=1), unit, where) if isinstance(value, str) else 0.0
+    return read_finite_number(value, unit, where) - zero
 
 
 def read_count(value: Any, unit: str, where: object) -> int:

@@ -78,7 +78,7 @@ class Study(ShortRepr):
     @property
     def units(self) -> dict[str, str]:
         """The units of the metrics."""
-        known = columns_of(self.template.scenario)
+        known = run_column_units(self.template.scenario.problem)
         return {name: metric.unit(known[metric.column]) for name, metric in self.metrics.items()}
 
     def chunk_runs(self, index: int) -> range:
@@ -115,16 +115,10 @@ class Study(ShortRepr):
         return fingerprint(scenario, tables, self.parameters, self.follow, self.metrics)
 
 
-def columns_of(scenario: Scenario) -> dict[str, str]:
-    """The units of all columns that a run has."""
-    return run_column_units(scenario.problem)
-
-
 def load_study(path: str | Path) -> Study:
     """Read a study file. Raises FileError, ParameterError, UnitError or UnknownNameError with the location."""
     file = Path(path)
-    tables = read_toml(file)
-    location = Location(str(file), "", file.parent)
+    tables, location = read_toml(file), Location.of_file(file)
     check_keys(tables, TABLES, location)
     template = _read_scenario(tables.get("scenario"), location)
     with ambient_pressure(template.scenario.plant.ambient.pressure):
@@ -141,6 +135,9 @@ def _build_study(file: Path, tables: Mapping[str, Any], location: Location, temp
     with located_errors(location.inside("design")):
         values = design.values(variations)
     metrics = _require_table(tables, "metrics", location)
+    chunk_size = read_count(tables.get("chunk_size", CHUNK_SIZE), "1", f"{location}, chunk_size")
+    if not chunk_size:
+        raise ParameterError(f"{location}, chunk_size is 0; it must be at least 1.")
     return Study(
         title=read_text(tables, "title", location, needed=False) or template.scenario.title,
         path=file,
@@ -151,7 +148,7 @@ def _build_study(file: Path, tables: Mapping[str, Any], location: Location, temp
         design=design,
         values=values,
         metrics=_read_metrics(metrics, template.scenario, location.inside("metrics")),
-        chunk_size=_read_chunk_size(tables.get("chunk_size", CHUNK_SIZE), f"{location}, chunk_size"),
+        chunk_size=chunk_size,
     )
 
 
@@ -159,7 +156,7 @@ def _read_scenario(value: Any, location: Location) -> ScenarioTemplate:
     if isinstance(value, str):
         file = location.folder / value
         with located_errors(f"{location}, scenario"):
-            return ScenarioTemplate(read_toml(file), Location(str(file), "", file.parent), load_scenario(file))
+            return ScenarioTemplate(read_toml(file), Location.of_file(file), load_scenario(file))
     if not isinstance(value, Mapping):
         raise ParameterError(
             f'{location}: scenario is {abridged(value)}; name a file, scenario = "fill.toml", or write the tables '
@@ -220,7 +217,7 @@ def _read_follow(
 
 
 def _read_metrics(tables: Mapping[str, Any], scenario: Scenario, location: Location) -> dict[str, Metric]:
-    known = columns_of(scenario)
+    known = run_column_units(scenario.problem)
     metrics: dict[str, Metric] = {}
     for name, table in tables.items():
         inner = location.inside(name)
@@ -236,10 +233,3 @@ def _read_metrics(tables: Mapping[str, Any], scenario: Scenario, location: Locat
                 metric = metric.clip_to_run(scenario.problem.start_time, scenario.problem.duration)
         metrics[name] = metric
     return metrics
-
-
-def _read_chunk_size(value: Any, where: str) -> int:
-    size = read_count(value, "1", where)
-    if not size:
-        raise ParameterError(f"{where} is 0; it must be at least 1.")
-    return size

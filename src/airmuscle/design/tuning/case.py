@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core import Array, Leaf, ShortRepr, abridged, leaves, structure, with_parameters
+from ...core import Array, Leaf, ShortRepr, abridged, check_field_types, leaves, structure, with_parameters
 from ...core.errors import ParameterError, PhysicsError, check_known
 from ...engine.loop import Controller, ControlLoop
 from ...physics.equilibrium import find_equilibrium
@@ -113,10 +113,7 @@ class LoopCase(ShortRepr):
     controller_path: str = ""
 
     def __post_init__(self) -> None:
-        for field, kind in (("name", str), ("plant", Plant), ("loop", ControlLoop), ("controller_path", str)):
-            value = getattr(self, field)
-            if not isinstance(value, kind):
-                raise ParameterError(f"LoopCase.{field} is {abridged(value)}; give a {kind.__name__}.")
+        check_field_types(self)
 
     @property
     def controller(self) -> Controller:
@@ -174,12 +171,9 @@ def check_names(where: str, kind: str, names: Sequence[str]) -> None:
 
 def with_gains(controller: Any, gains: Mapping[str, float]) -> Any:
     """A controller with other values of some parameters, validated like a new one. Raises ParameterError."""
-    known = list(leaves(controller))
-    unknown = set(gains) - {leaf.path for leaf in known}
-    if unknown:
-        raise ParameterError(f"{type(controller).__name__} has no parameter '{min(unknown)}'.")
-    values = [gains.get(leaf.path, leaf.value) for leaf in known]
-    return with_parameters(controller, values)
+    present = {leaf.path: leaf.value for leaf in leaves(controller)}
+    check_known(f"{type(controller).__name__} has no parameter", gains, present)
+    return with_parameters(controller, list({**present, **gains}.values()))
 
 
 def loop_with_gains(case: LoopCase, gains: Mapping[str, float]) -> ControlLoop:

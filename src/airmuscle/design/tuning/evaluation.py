@@ -205,10 +205,8 @@ def _air_drawn(batch: BatchSolution, group: CaseGroup) -> Array:
 
 def _travel(batch: BatchSolution, group: CaseGroup) -> Array:
     """The sum (N,) of the changes of the commands from sample to sample, in strokes; NaN for a run that ended early."""
-    known = {each.name: (each.minimum, each.maximum) for each in group.plant.input_variables}
-    known |= dict.fromkeys(group.loop.drivers, (0.0, 1.0))
     strokes = [
-        np.abs(np.diff(batch[f"{COMMAND}{name}"], axis=1)).sum(axis=1) / (known[name][1] - known[name][0])
-        for name in group.loop.controller.inputs
+        np.abs(np.diff(batch[f"{COMMAND}{name}"], axis=1)).sum(axis=1) / (high - low)
+        for name, (low, high) in group.loop.command_ranges(group.plant).items()
     ]
     return np.where(batch.status == 0, np.sum(strokes, axis=0), np.nan)

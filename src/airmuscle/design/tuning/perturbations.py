@@ -1,10 +1,9 @@
 """Perturbations of a plant and its loop: the family of cases for which gains are tuned."""
 
 import dataclasses
-import functools
 import math
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,15 +18,14 @@ from ...physics.plant.plant import Plant
 from ...physics.pneumatics import Valve, WithLeak
 from .case import LoopCase
 
-LOADS = ("mass", "inertia", "weight_torque", "payload", "force")
-"""Parameters of a mechanism that a factor of the load multiplies; where all are 0, as in an identified joint, those of
-ROTORS."""
-ROTORS = ("rotor_inertia",)
+LOAD = re.compile(r"^mechanism\.(.+\.)?(mass|inertia|weight_torque|payload|force)$")
+"""Parameters of a mechanism that a factor of the load multiplies; where all are 0, as in an identified joint, ROTOR."""
+ROTOR = re.compile(r"^mechanism\.(.+\.)?rotor_inertia$")
 LEAK_CRITICAL_RATIO = 0.3
 """Critical pressure ratio of the leak (chosen)."""
 MAX_ATTEMPTS = 1000
 """Draws after which a distribution is considered impossible (chosen)."""
-_SUPPLY = re.compile(r"(^|\.)supply\.pressure$")
+SUPPLY = re.compile(r"(^|\.)supply\.pressure$")
 _CONDUCTANCE = re.compile(r"\.conductance$")
 InitialState = Callable[[Plant], Mapping[str, float] | None]
 
@@ -85,14 +83,14 @@ def perturbed_family(
     """
     cases, notes = [LoopCase("nominal", plant, loop, initial_state(plant))], list[str]()
     changed: list[tuple[str, Plant]] = []
-    for factors, symbol, kinds in (
-        (perturbations.loads, "load", [functools.partial(_is_load, names=names) for names in (LOADS, ROTORS)]),
-        (perturbations.supplies, "supply", [_is_supply]),
-    ):
-        chosen = next((kind for kind in kinds if any(kind(leaf) for leaf in leaves(plant))), None)
-        if factors and chosen is None:
+    nonzero = [leaf.path for leaf in leaves(plant) if leaf.value != 0.0]
+    loads, rotors, supplies = (set(filter(kind.search, nonzero)) for kind in (LOAD, ROTOR, SUPPLY))
+    for factors, symbol, chosen in (
+        (perturbations.loads, "load", loads or rotors), (perturbations.supplies, "supply", supplies),
+    ):  # fmt: skip
+        if factors and not chosen:
             notes.append(f"no case with another {symbol}: the plant has no parameter of that kind")
-        elif chosen is not None:
+        elif chosen:
             changed += [(f"{symbol} x {factor:g}", _multiplied(plant, chosen, factor, symbol)) for factor in factors]
     if perturbations.leak:
         leaking = _leaking(plant, perturbations.leak)
@@ -115,20 +113,10 @@ def perturbed_family(
     return PerturbedFamily(tuple(cases), tuple(notes))
 
 
-def _is_load(leaf: Leaf, names: Sequence[str]) -> bool:
-    return leaf.path.startswith("mechanism.") and leaf.declared.name in names and leaf.value != 0.0
-
-
-def _is_supply(leaf: Leaf) -> bool:
-    return bool(_SUPPLY.search(leaf.path))
-
-
-def _multiplied(plant: Plant, chosen: Callable[[Leaf], bool], factor: float, what: str) -> Plant:
+def _multiplied(plant: Plant, chosen: Collection[str], factor: float, what: str) -> Plant:
     """The plant with some of its parameters multiplied by a factor, validated."""
-    try:
-        return with_parameters(plant, [leaf.value * (factor if chosen(leaf) else 1.0) for leaf in leaves(plant)])
-    except AirmuscleError as error:
-        raise error.located(f"{what} x {factor:g}") from None
+    with located_errors(f"{what} x {factor:g}"):
+        return with_parameters(plant, [x.value * (factor if x.path in chosen else 1.0) for x in leaves(plant)])
 
 
 def _leaking(plant: Plant, share: float) -> Plant | None:
@@ -177,9 +165,8 @@ def _drawn(
             prefix = f"muscle[{i}]." if isinstance(plant.muscle, tuple) else "muscle."
             shifts |= dict(zip(muscle_paths(uncertainty, prefix), deviations[uncertainty].tolist(), strict=True))
         if of_plant is not None:
-            shifts |= _within_ranges(
-                of_plant, of_plant.deviations(random.standard_normal(len(of_plant.parameters))), known
-            )
+            deviates = random.standard_normal(len(of_plant.parameters))
+            shifts |= _within_ranges(of_plant, of_plant.deviations(deviates), known)
         _check_known(shifts, known)
         try:
             return with_parameters(plant, [leaf.value + shifts.get(leaf.path, 0.0) for leaf in known])

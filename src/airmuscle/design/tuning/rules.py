@@ -9,7 +9,7 @@ import numpy as np
 
 from ...control.laws.pid import PID
 from ...core import AirmuscleError, Array, ParameterError, Reference, check_field_types, published
-from ...engine.loop import Schedule, WithDrivers, inputs_of, range_of
+from ...engine.loop import Schedule, WithDrivers, commands, range_of
 from ...engine.run import simulate
 from ...engine.run.integrators import Integrator
 from .case import LoopCase
@@ -24,8 +24,6 @@ from .process_models import (
 
 SKOGESTAD2003 = published("skogestad-2003")
 ASTROM_HAGGLUND2004 = published("astrom-hagglund-2004")
-
-
 ZIEGLER_NICHOLS1942 = published("ziegler-nichols-1942")
 TYREUS_LUYBEN1992 = published("tyreus-luyben-1992")
 
@@ -171,35 +169,21 @@ def step_experiment(
         raise ParameterError(
             f"step_experiment: the controller is {type(pid).__name__}; rules give the settings of a PID alone."
         )
-    low, high = _range(case, pid)
+    low, high = map(float, range_of(pid.commanded, case.loop.command_ranges(case.plant)))
     size = STEP * (high - low) if step is None else step
     value = pid.initial_output + size
     if not low <= value <= high:
         raise ParameterError(f"step_experiment: the command would be {value:g}; allowed range: {low:g} to {high:g}.")
-    names = inputs_of(pid.commanded)
-    values = (value,) if len(names) == 1 else (max(value, 0.0), max(-value, 0.0))
-    signal = WithDrivers(
-        Schedule({n: ((0.0, v),) for n, v in zip(names, values, strict=True)}), case.loop.drivers
-    )  # fmt: skip
+    held = Schedule({name: ((0.0, float(each)),) for name, each in commands(pid.commanded, value).items()})
     run = simulate(
-        case.plant, signal, duration=duration, initial_state=case.start(), output_times=duration / ROWS,
-        integrator=integrator,
+        case.plant, WithDrivers(held, case.loop.drivers), duration=duration, initial_state=case.start(),
+        output_times=duration / ROWS, integrator=integrator,
     )  # fmt: skip
     time, first = np.unique(run["time"], return_index=True)
     output = run[pid.measured][first]
     model = _best_model(time, output, size)
     delayed = dataclasses.replace(model, dead_time=model.dead_time + case.loop.sample_time / 2)
     return StepExperiment(time, output, size, delayed)
-
-
-def _range(case: LoopCase, pid: PID) -> tuple[float, float]:
-    known = {variable.name: variable for variable in case.plant.input_variables}
-    ranges = {
-        name: (0.0, 1.0) if name in case.loop.drivers else (known[name].minimum, known[name].maximum)
-        for name in inputs_of(pid.commanded)
-    }
-    low, high = range_of(pid.commanded, ranges)
-    return float(low), float(high)
 
 
 def _best_model(time: Array, output: Array, step: float) -> ProcessModel:

@@ -81,7 +81,7 @@ class ScenarioLoop(ShortRepr):
         of_file = {leaf.path: leaf.value for leaf in leaves(entry.muscle)}
         of_plant = {leaf.path: leaf.value for leaf in leaves(self.scenario.plant.muscles[index])}
         paths = muscle_paths(entry.uncertainty, "")
-        return _part(entry.uncertainty, [p in of_plant and of_file.get(p) == of_plant[p] for p in paths])
+        return entry.uncertainty.part(p in of_plant and of_file.get(p) == of_plant[p] for p in paths)
 
     def bounds(self, given: Sequence[str] = ()) -> dict[str, tuple[float, float]]:
         """The ranges [SI] of the tuned gains: those given as `gain=5 1/m:500 1/m`, or the default ranges.
@@ -176,16 +176,6 @@ def load_scenario_loop(path: str | Path) -> ScenarioLoop:
     file = Path(path)
     text = file.read_bytes().decode("utf-8-sig")
     return ScenarioLoop(file, text, tables, scenario)
-
-
-def _part(uncertainty: ParameterUncertainty, kept: Sequence[bool]) -> ParameterUncertainty | None:
-    """The uncertainty of some of the parameters; None if there are none."""
-    places = [i for i, keep in enumerate(kept) if keep]
-    if not places:
-        return None
-    rows = tuple(tuple(uncertainty.correlations[i][j] for j in places) for i in places)
-    names, errors = uncertainty.parameters, uncertainty.standard_errors
-    return ParameterUncertainty(tuple(names[i] for i in places), tuple(errors[i] for i in places), rows)
 
 
 def _tuned(known: Sequence[Leaf]) -> list[Leaf]:

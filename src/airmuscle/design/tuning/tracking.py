@@ -95,6 +95,8 @@ class TrackingIndex(abc.ABC):
 
     references: ClassVar[tuple[Reference, ...]] = ()
 
+    time_unit: ClassVar[str] = ""
+    """What an integral over time adds to the unit of the error."""
     scales: Mapping[str, float] = dataclasses.field(default_factory=dict)
     begin: float = 0.0
 
@@ -147,9 +149,9 @@ class TrackingIndex(abc.ABC):
     def of_magnitude(self, time: Array, magnitude: Array) -> Array:
         """The index (N,) of the magnitude (N, T) of the error at times (T,) [s]."""
 
-    @abc.abstractmethod
     def unit(self, column_unit: str) -> str:
         """The unit of the index, given that of the error."""
+        return f"{column_unit} {self.time_unit}".strip().removeprefix("1 ")
 
 
 class RootMeanSquareError(TrackingIndex):
@@ -158,27 +160,21 @@ class RootMeanSquareError(TrackingIndex):
     def of_magnitude(self, time: Array, magnitude: Array) -> Array:
         return np.asarray(np.sqrt(np.trapezoid(magnitude**2, time, axis=1) / (time[-1] - time[0])))
 
-    def unit(self, column_unit: str) -> str:
-        return column_unit
-
 
 class IntegralAbsoluteError(TrackingIndex):
     """Integral of the absolute error (IAE): integral |e| dt, trapezoidal rule between the samples."""
 
+    time_unit: ClassVar[str] = "s"
+
     def of_magnitude(self, time: Array, magnitude: Array) -> Array:
         return np.asarray(np.trapezoid(magnitude, time, axis=1))
-
-    def unit(self, column_unit: str) -> str:
-        return "s" if column_unit == "1" else f"{column_unit} s"
 
 
 class IntegralTimeAbsoluteError(TrackingIndex):
     """Integral of time-multiplied absolute error (ITAE): integral (t - t_begin) |e| dt; Graham and Lathrop (1953)."""
 
     references: ClassVar[tuple[Reference, ...]] = (GRAHAM_LATHROP1953,)
+    time_unit: ClassVar[str] = "s^2"
 
     def of_magnitude(self, time: Array, magnitude: Array) -> Array:
         return np.asarray(np.trapezoid((time - time[0]) * magnitude, time, axis=1))
-
-    def unit(self, column_unit: str) -> str:
-        return "s^2" if column_unit == "1" else f"{column_unit} s^2"

@@ -128,6 +128,12 @@ class ControlLoop(ShortRepr):
         check_present(self.controller, columns, inputs)
         check_input_names((*(self.other_inputs.names or ()), *self.drivers), inputs)
 
+    def command_ranges(self, plant: System) -> dict[str, tuple[float, float]]:
+        """Minimum and maximum of every commanded input of a plant, in its order; of one with a driver 0 and 1."""
+        declared = {variable.name: (variable.minimum, variable.maximum) for variable in plant.input_variables}
+        known = {**declared, **dict.fromkeys(self.drivers, (0.0, 1.0))}
+        return {name: known[name] for name in self.controller.inputs}
+
     def check_sample_time(self, duration: float) -> None:
         """Raise ParameterError where a run of `duration` [s] ends before the second sample."""
         if self.sample_time > duration:

@@ -10,7 +10,6 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core import Array, ParameterError
-from ..compile.program import CompiledSystem
 from ..loop import FEW_SEGMENTS, ControlLoop, ControlLoopState, InputSignal, Measurement, PiecewiseLinear
 from .output_times import output_times
 from .problem import Problem
@@ -84,7 +83,7 @@ def prepare_loop(problem: Problem, state: ControlLoopState) -> SampledLoop:
     setpoints, _ = setpoint.at_rising(edges[:-1], start)
     return SampledLoop(
         loop, edges, sampled, inputs, first_segments, commanded, setpoint, setpoints, times,
-        first_rows_of(times, edges), names, _ranges(compiled, loop),
+        first_rows_of(times, edges), names, loop.command_ranges(compiled.system),
     )  # fmt: skip
 
 
@@ -109,13 +108,6 @@ def _merged(instants: Array, others: Array) -> Array:
     """The instants and the others, both rising, each once."""
     at = np.minimum(instants.searchsorted(others), instants.size - 1)
     return instants if (instants[at] == others).all() else np.unique(np.concatenate([instants, others]))
-
-
-def _ranges(compiled: CompiledSystem, loop: ControlLoop) -> dict[str, tuple[float, float]]:
-    """Minimum and maximum of every commanded input; of one with a driver 0 and 1."""
-    declared = {i.name: (i.minimum, i.maximum) for i in compiled.system.input_variables}
-    with_driver = dict.fromkeys(loop.drivers, (0.0, 1.0))
-    return {name: ({**declared, **with_driver})[name] for name in loop.controller.inputs}
 
 
 def _edges(sample_time: float, state: ControlLoopState, start: float, end: float) -> tuple[Array, bool]:

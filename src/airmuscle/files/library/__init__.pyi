@@ -65,6 +65,7 @@ from .fitted_entry import find_initial_law as find_initial_law
 from .fitted_entry import missing_geometry as missing_geometry
 from .fitted_entry import resting_lengths as resting_lengths
 from .plant_file import SCENARIO_TABLES as SCENARIO_TABLES
+from .scaling import own_length as own_length
 from .uncertainty import PREDICTED as PREDICTED
 from .write import model_table as model_table
 from .write import part_toml as part_toml

@@ -10,28 +10,18 @@ import dataclasses
 import inspect
 import typing
 from collections.abc import Callable, Mapping
-from typing import Any, Protocol
+from typing import TYPE_CHECKING, Any
 
-from ...core import Parameter, ParameterError, abridged, check_field, parameters
+from ...core import ParameterError, abridged, check_field, parameters
 from . import fields
 from .fields import allows, model_class, model_names
 from .files import Location, check_keys, located_errors
 
+if TYPE_CHECKING:
+    from ..scenario.controller import PlantSignals
+
 Named = Callable[[Any, Location, "TableReader"], Any]
 """The part that a text or a table with `library` names; None if it describes the part itself."""
-
-
-class Signals(Protocol):
-    """What a table does not state of a model whose units follow from signals: the fields and units it has from them."""
-
-    def concerns(self, cls: type[Any]) -> bool:
-        """Whether the fields or units of a class depend on the signals."""
-
-    def parts(self, cls: type[Any], hints: Mapping[str, Any]) -> dict[str, Any]:
-        """The fields that a table need not give."""
-
-    def make(self, cls: type[Any], parts: Mapping[str, Any], numbers: Mapping[str, Any], location: Location) -> Any:
-        """The object of a class from its parts and the numbers of its table, which are not read yet."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -41,13 +31,13 @@ class TableReader:
     classes  the allowed classes by name, for the outermost table; by default all registered models
     known    what the readers of fields declared with `custom_field` are given, such as a unit or a plant
     named    readers of parts that may be named instead of described, by their class
-    signals  for controllers, see scenario/controller.py
+    signals  for controllers: what a table does not state of a model whose fields and units follow from signals
     """
 
     classes: Mapping[str, type[Any]] | None = None
     known: Any = None
     named: Mapping[type[Any], Named] = dataclasses.field(default_factory=dict)
-    signals: Signals | None = None
+    signals: "PlantSignals | None" = None
 
     def build(self, table: Any, location: Location, given: Mapping[str, Any] | None = None, *, kind: Any = Any) -> Any:
         """The object that a table describes; `given` are fields that are not read from the table.
@@ -83,9 +73,8 @@ class TableReader:
             return signals.make(cls, parts, numbers, location)
         with located_errors(location):
             units = cls.units_of_table(table) if hasattr(cls, "units_of_table") else {}
-        numbers = {
-            n: fields.read_parameter(v, _in_unit(declared[n], units), hints[n], location) for n, v in numbers.items()
-        }
+        declared |= {name: dataclasses.replace(declared[name], unit=unit) for name, unit in units.items()}
+        numbers = {n: fields.read_parameter(v, declared[n], hints[n], location) for n, v in numbers.items()}
         with located_errors(location):
             return cls(**parts, **numbers, **given)
 
@@ -140,10 +129,6 @@ class TableReader:
 build = TableReader().build
 
 
-def _in_unit(declared: Parameter, units: Mapping[str, str]) -> Parameter:
-    return dataclasses.replace(declared, unit=units[declared.name]) if declared.name in units else declared
-
-
 def _keys(cls: type[Any]) -> list[str]:
     """The keys of the table of a class."""
     return [key for f in dataclasses.fields(cls) if f.init and (key := f.metadata.get("key", f.name))]
@@ -151,9 +136,7 @@ def _keys(cls: type[Any]) -> list[str]:
 
 def only_class(kind: Any) -> type[Any] | None:
     """The class of a place where only one is possible."""
-    classes = [
-        option for option in fields.options(kind) if dataclasses.is_dataclass(option) and inspect.isclass(option)
-    ]
+    classes = [each for each in fields.options(kind) if dataclasses.is_dataclass(each) and inspect.isclass(each)]
     if len(classes) != 1 or inspect.isabstract(classes[0]) or set(model_names(kind)) - {classes[0].__name__}:
         return None
     return classes[0]

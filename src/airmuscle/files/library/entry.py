@@ -114,9 +114,6 @@ class Entry(EntryDisplay):
     95 % band of the predicted quantity, `ratings` the values that the maker of the muscle permits, if known.
     """
 
-    name: str = dataclasses.field(metadata=under(""))
-    title: str
-    provenance: str
     characteristic: Characteristic
     geometry: Geometry | None = None
     spring: Spring | None = None
@@ -126,8 +123,6 @@ class Entry(EntryDisplay):
     series: SeriesElement | None = None
     stop: Stop | None = None
     creep: CreepElements | None = None
-    note: str = ""
-    warning: str = ""
     validity_range: ValidityRange | None = None
     ratings: Ratings | None = None
     checks: tuple[Check, ...] = dataclasses.field(default=(), metadata=under("check"))
@@ -165,14 +160,9 @@ class ValveEntry(EntryDisplay):
     `provenance` is the origin of the numbers, `note` states what was published and how it was converted.
     """
 
-    name: str = dataclasses.field(metadata=under(""))
-    title: str
-    provenance: str
     valve: Orifice
     exhaust: Orifice | None = None
     switching_times: SwitchingTimes | None = None
-    note: str = ""
-    warning: str = ""
     checks: tuple[Check, ...] = dataclasses.field(default=(), metadata=under("check"))
     references: tuple[Reference, ...] = dataclasses.field(default=(), metadata=under("reference"))
 
@@ -198,12 +188,7 @@ class ProductEntry(EntryDisplay):
     "festo-dmsp-20"`, or has a table [ratings] of its own.
     """
 
-    name: str = dataclasses.field(metadata=under(""))
-    title: str
-    provenance: str
     ratings: Ratings
-    note: str = ""
-    warning: str = ""
     references: tuple[Reference, ...] = dataclasses.field(default=(), metadata=under("reference"))
 
     def _tables(self) -> Iterator[Table]:
@@ -227,12 +212,7 @@ class PlantEntry(EntryDisplay):
     "chosen" if no publication states them. `warning` is issued when the plant is loaded.
     """
 
-    name: str = dataclasses.field(metadata=under(""))
-    title: str
-    provenance: str
     plant: Plant
-    note: str = ""
-    warning: str = ""
     sources: tuple[tuple[str, str], ...] = ()
     references: tuple[Reference, ...] = dataclasses.field(default=(), metadata=under("reference"))
 

@@ -1,6 +1,7 @@
 """Description of library entries: provenance, components, parameters, checks, chart and references."""
 
 import abc
+import dataclasses
 from collections.abc import Iterator
 from typing import Any
 
@@ -13,6 +14,7 @@ from ...physics.muscle import Ratings
 from ...physics.muscle.isobar_plot import plot_isobars
 from ...report.chapter import BY_ROW, Chapter, NamedValue, Plot, Table, TableColumn
 from ...report.shown import leaf_table
+from .fields import under
 
 PROVENANCES = (
     "printed", "corrected", "converted", "measured", "data sheet", "secondary source", "fitted", "chosen", "example",
@@ -34,12 +36,24 @@ FLOW_SUPPLY = 7e5
 """Absolute pressure [Pa] upstream of a valve in its chart (chosen)."""
 
 
+@dataclasses.dataclass(frozen=True, repr=False)
 class EntryDisplay(Reported, abc.ABC):
-    """Base of the library entries: the check of their fields, and their description."""
+    """Base of the library entries: what all of them state, the check of their fields, and their description.
+
+    `provenance` is the origin of the numbers, words of PROVENANCES between commas, `warning` a restriction of use,
+    which is issued when the entry is loaded.
+    """
+
+    name: str = dataclasses.field(metadata=under(""))
+    title: str
+    provenance: str
+    _: dataclasses.KW_ONLY
+    note: str = ""
+    warning: str = ""
 
     def __post_init__(self) -> None:
         check_field_types(self)
-        for word in map(str.strip, getattr(self, "provenance", "").split(",")):
+        for word in map(str.strip, self.provenance.split(",")):
             if word not in PROVENANCES:
                 raise ParameterError(
                     f"provenance is '{one_line(word)}'; allowed are {', '.join(PROVENANCES)}, several between commas."
@@ -48,8 +62,7 @@ class EntryDisplay(Reported, abc.ABC):
 
     def chapter(self) -> Chapter:
         """The description of the entry."""
-        entry: Any = self
-        parts = {name: part for name in PARTS if (part := getattr(entry, name, None)) is not None}
+        parts = {name: part for name in PARTS if (part := getattr(self, name, None)) is not None}
         law_geometry = getattr(parts.get("characteristic"), "geometry", None)
         rows = [
             (f"{name}.{leaf.path}", leaf)
@@ -67,17 +80,14 @@ class EntryDisplay(Reported, abc.ABC):
         chart = self._chart()
         return Chapter(
             name="entry",
-            title=f"{entry.name}: {entry.title}",
-            summary=f"Provenance: {entry.provenance}. Components: {', '.join(map(' '.join, models.items()))}.",
-            values=(
-                NamedValue("name", entry.name, brief=False),
-                NamedValue("provenance", entry.provenance, brief=False),
-            ),
+            title=f"{self.name}: {self.title}",
+            summary=f"Provenance: {self.provenance}. Components: {', '.join(map(' '.join, models.items()))}.",
+            values=tuple(NamedValue(name, getattr(self, name), brief=False) for name in ("name", "provenance")),
             tables=tuple(table for table in tables if len(table)),
-            plots=() if chart is None else (Plot("entry", entry.title, chart),),
-            problems=(entry.warning,) if entry.warning else (),
-            notes=tuple(filter(None, (entry.note, *self._remarks()))),
-            references=tuple(cite(entry)),
+            plots=() if chart is None else (Plot("entry", self.title, chart),),
+            problems=(self.warning,) if self.warning else (),
+            notes=tuple(filter(None, (self.note, *self._remarks()))),
+            references=tuple(cite(self)),
         )
 
     def _tables(self) -> Iterator[Table]:

@@ -30,7 +30,7 @@ NOUNS: Mapping[type[Any], str] = {
 
 def load_law(name_or_path: str | Path) -> Entry:
     """A muscle or a law by its name or a unique beginning of it, or its file by its path; as `load`, without valves."""
-    tables, location = _tables(name_or_path, Entry)
+    tables, location = entry_tables(name_or_path, Entry)
     check_describes_law(tables, f"{location}: the file")
     entry: Entry = build_entry(tables, location)
     issue_warning(entry.name, entry.warning, stacklevel=3)
@@ -43,8 +43,7 @@ def load_valve(name_or_path: str | Path) -> ValveEntry:
     Raises UnknownNameError, FileError, ParameterError or UnitError with the location. A warning of the entry is issued
     as an AirmuscleWarning.
     """
-    tables, location = _tables(name_or_path, ValveEntry)
-    entry: ValveEntry = build_entry(tables, location, ValveEntry)
+    entry: ValveEntry = build_entry(*entry_tables(name_or_path, ValveEntry), ValveEntry)
     issue_warning(entry.name, entry.warning, stacklevel=3)
     return entry
 
@@ -55,21 +54,22 @@ def load_product(name: str) -> ProductEntry:
     return entry
 
 
-def _tables(name_or_path: str | Path, kind: type[Any]) -> tuple[dict[str, Any], Location]:
-    """The tables of an entry of this kind, by name or path, and their location."""
+def entry_tables(name_or_path: str | Path, kind: type[Any] | None = None) -> tuple[dict[str, Any], Location]:
+    """The tables of an entry of this kind, or of any, by name or path, and their location."""
     if is_path(name_or_path):
         path = Path(name_or_path)
         return read_toml(path), Location.of_file(path)
     return tables_of_name(str(name_or_path), kind)
 
 
-def tables_of_name(name: str, kind: type[Any]) -> tuple[dict[str, Any], Location]:
-    """The tables of the entry of this kind with a name, or a unique beginning of it, and their location."""
-    noun = NOUNS[kind]
+def tables_of_name(name: str, kind: type[Any] | None) -> tuple[dict[str, Any], Location]:
+    """The tables of the entry of this kind, or of any, with a name or a unique beginning of it, and their location."""
     if kind is Entry:
         _check_law_name(name)
-    path = FOLDERS[noun] / f"{complete_name(name, list_names(FOLDERS[noun]), noun)}.toml"
-    return read_toml(path), Location(path.name, "", path.parent)
+    noun, folders = ("library entry", list(FOLDERS.values())) if kind is None else (NOUNS[kind], [FOLDERS[NOUNS[kind]]])
+    known = {name: folder for folder in folders for name in list_names(folder)}
+    name = complete_name(name, sorted(known), noun)
+    return read_toml(known[name] / f"{name}.toml"), Location(f"{name}.toml", "", known[name])
 
 
 def _check_law_name(name: str) -> None:
@@ -93,8 +93,7 @@ def kind_of(tables: Mapping[str, Any]) -> type[Any]:
 
 def check_describes_law(tables: Mapping[str, Any], what: str) -> None:
     """Raise ParameterError unless tables describe a muscle or a law; `what` begins the message."""
-    kind = kind_of(tables)
-    if kind is not Entry:
+    if (kind := kind_of(tables)) is not Entry:
         noun = "product without a law" if kind is ProductEntry else NOUNS[kind]
         raise ParameterError(f"{what} describes a {noun}; a muscle or a law is required.")
 

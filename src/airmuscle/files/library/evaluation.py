@@ -7,24 +7,21 @@ from collections.abc import Mapping
 from typing import Any
 
 from ...bench.reported import Reported
-from ...core import check_above_vacuum, contraction_text, leaves, quantity, quantity_text
+from ...core import check_above_vacuum, contraction_text, quantity, quantity_text
 from ...core.errors import AirmuscleWarning, GeometryLimitError, ParameterError, PhysicsError, RatingError, SolveError
 from ...physics.muscle.characteristic import Characteristic, ForceLaw, ValidityRange, validity_range_of
 from ...physics.muscle.isobar_plot import describe_point, isobar_figure
 from ...physics.muscle.isobars import Isobars, WorkingPoint, compute_isobars
 from ...report.chapter import Chapter, NamedValue, Plot, Table, TableColumn
 from .entry import Entry
+from .scaling import own_length
 
 UNITS = {"pressure": "Pa", "contraction": "1", "force": "N"}
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Evaluation(Reported):
-    """A working point of an entry.
-
-    solved     the quantity that follows from the other two
-    stiffness  -dF/deps at constant pressure [N]; None where the force is not unique or not defined
-    """
+    """A working point of an entry; `solved` is the quantity that follows from the other two."""
 
     entry: Entry
     point: WorkingPoint
@@ -39,20 +36,13 @@ class Evaluation(Reported):
             return None
 
     @property
-    def resting_length(self) -> float | None:
-        """The resting length of geometry or law [m]; None if neither has one."""
-        parts = (part for part in (self.entry.geometry, self.entry.characteristic) if part is not None)
-        lengths = (leaf.value for part in parts for leaf in leaves(part) if leaf.path.endswith("resting_length"))
-        return next(lengths, None)
-
-    @property
     def validity_range(self) -> ValidityRange | None:
         """The validity range of the law; None if none is stated."""
         return validity_range_of(self.entry.characteristic, self.entry.validity_range)
 
     def chapter(self) -> Chapter:
         """The description of the point: quantities, stiffness, and the isobars around it."""
-        point, length, stiffness = self.point, self.resting_length, self.stiffness
+        point, length, stiffness = self.point, own_length(self.entry), self.stiffness
         limits, ratings = self.validity_range, self.entry.ratings
         remarks = {"pressure": "gauge"}
         if length:
@@ -67,13 +57,13 @@ class Evaluation(Reported):
         ]  # fmt: skip
         if stiffness is not None and length:
             values.append(NamedValue("stiffness", stiffness / length, "N/m", "N/mm", remark="at constant pressure"))
+            values.append(NamedValue("stiffness per contraction", stiffness, "N", brief=False))
         elif stiffness is not None:
             values.append(NamedValue("stiffness per contraction", stiffness, "N", "N/%", remark="at constant pressure"))
-        if stiffness is not None and length:
-            values.append(NamedValue("stiffness per contraction", stiffness, "N", brief=False))
         caption = f"{self.entry.title}: force over contraction at constant gauge pressure."
         caption += f" Working point: {describe_point(point)}."
         inside = None if limits is None else bool(limits.contains(point.pressure, point.contraction))
+        permitted = None if ratings is None else not ratings.excesses(**point._asdict())
         return Chapter(
             name="evaluation",
             title=f"{self.entry.name}: {self.entry.title}",
@@ -83,9 +73,7 @@ class Evaluation(Reported):
                 NamedValue("solved", self.solved, brief=False),
                 NamedValue("resting length", length, "m", "mm", brief=False),
                 NamedValue("inside the validity range", inside, brief=False),
-                NamedValue(
-                    "permitted", None if ratings is None else not ratings.excesses(**point._asdict()), brief=False
-                ),
+                NamedValue("permitted", permitted, brief=False),
             ),
             plots=(Plot("isobars", caption, self._figure),),
         )

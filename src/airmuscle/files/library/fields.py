@@ -38,22 +38,16 @@ def _is_file_model(cls: type[Any]) -> bool:
     return getattr(cls, "from_file", False) and not inspect.isabstract(cls)
 
 
+@functools.cache
 def model_names(kind: Any = Any) -> tuple[str, ...]:
     """Names of all classes that a file may name, sorted; with an annotation `kind`, of those that it allows."""
-    if kind not in _NAMES:
-        _NAMES[kind] = tuple(sorted(name for name, cls in _registry().items() if allows(kind, cls)))
-    return _NAMES[kind]
-
-
-_NAMES: dict[Any, tuple[str, ...]] = {}
+    return tuple(sorted(name for name, cls in _registry().items() if allows(kind, cls)))
 
 
 def allows(kind: Any, cls: type[Any]) -> bool:
     """Whether the outermost type of an annotation allows the instances of a class."""
-    if typing.get_origin(kind) in (typing.Union, types.UnionType):
-        return any(allows(option, cls) for option in typing.get_args(kind))
-    base = typing.get_origin(kind) or kind
-    return kind is Any or (inspect.isclass(base) and issubclass(cls, base))
+    bases = map(origin, options(kind))
+    return kind is Any or any(inspect.isclass(base) and issubclass(cls, base) for base in bases)
 
 
 MOST_NAMES = 40

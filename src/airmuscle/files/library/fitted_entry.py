@@ -50,7 +50,8 @@ def find_initial_law(
         return InitialLaw(_at_length_of(_load_law(name), recordings, f"{option} {name}"))
     cls = model_class(name, option)
     if not issubclass(cls, Characteristic):
-        raise ParameterError(f"{option}: {name} is not a characteristic; there are {', '.join(_law_names())}.")
+        laws = ", ".join(model_names(Characteristic))
+        raise ParameterError(f"{option}: {name} is not a characteristic; there are {laws}.")
     if issubclass(cls, ContractileSurface):
         return InitialLaw(Entry(name, name, "chosen", cls.guess(recordings, degree)))
     for candidate in standard_candidates(recordings):
@@ -64,10 +65,6 @@ def find_initial_law(
     )
 
 
-def _law_names() -> tuple[str, ...]:
-    return model_names(Characteristic)
-
-
 def _load_law(name: str) -> Entry:
     """A library entry or muscle file; the error for another name also lists the laws."""
     try:
@@ -75,8 +72,9 @@ def _load_law(name: str) -> Entry:
     except UnknownNameError as error:
         if is_path(name):
             raise
-        laws = f" Or name a law: {', '.join(_law_names())}.{suggestion(name, _law_names())}"
-        raise UnknownNameError(HintedText(error.message, laws)) from None
+        laws = model_names(Characteristic)
+        text = f" Or name a law: {', '.join(laws)}.{suggestion(name, laws)}"
+        raise UnknownNameError(HintedText(error.message, text)) from None
 
 
 def resting_lengths(recordings: Sequence[Recording]) -> tuple[float, ...]:
@@ -235,6 +233,8 @@ def _stated_band(campaign: Campaign, stage: StaticStage, length: float | None) -
 
 def _uncertainty(campaign: Campaign, stage: StaticStage) -> ParameterUncertainty | None:
     """Standard errors and correlations of the static law, then those of damper and creep, fitted separately."""
+    from scipy.linalg import block_diag
+
     fit = stage.fit
     known = [i for i, estimate in enumerate(fit.estimates) if np.isfinite(estimate.stderr)]
     names = [f"characteristic.{fit.estimates[i].name}" for i in known]
@@ -252,15 +252,8 @@ def _uncertainty(campaign: Campaign, stage: StaticStage) -> ParameterUncertainty
         names += paths
         errors += campaign.creep.standard_errors.tolist()
         blocks += [np.eye(1)] * len(paths)
-    return None if not names else ParameterUncertainty(tuple(names), tuple(errors), _block_diagonal(blocks))
-
-
-def _block_diagonal(blocks: Sequence[np.ndarray]) -> tuple[tuple[float, ...], ...]:
-    size = sum(len(block) for block in blocks)
-    matrix, start = np.zeros((size, size)), 0
-    for block in blocks:
-        end = start + len(block)
-        matrix[start:end, start:end] = block
-        start = end
-    np.fill_diagonal(matrix, 1.0)
-    return tuple(tuple(float(value) for value in row) for row in matrix)
+    if not names:
+        return None
+    correlations = block_diag(*blocks)
+    np.fill_diagonal(correlations, 1.0)
+    return ParameterUncertainty(tuple(names), tuple(errors), tuple(map(tuple, correlations.tolist())))

@@ -33,17 +33,13 @@ from ...physics.pneumatics.valve import Orifice
 from ...recording import Recording
 from .build import TableReader, build
 from .entry import MISSING_GEOMETRY, PATHS, AnyEntry, Entry, PlantEntry, ValveEntry, issue_warning
-from .entry_file import build_entry, kind_of, load_law, load_valve, tables_of_name
+from .entry_file import build_entry, entry_tables, kind_of, load_law, load_valve, tables_of_name
 from .files import (
     DATA,
-    FOLDERS,
     Location,
     check_keys,
     complete_name,
-    is_path,
     list_data,
-    list_library,
-    list_names,
     located_errors,
     read_finite_number,
     read_table,
@@ -204,15 +200,7 @@ def load(name_or_path: str | Path) -> AnyEntry:
     `.plant`. Raises UnknownNameError, FileError, ParameterError or UnitError with the location. A warning of the entry
     is issued as an AirmuscleWarning.
     """
-    if is_path(name_or_path):
-        path = Path(name_or_path)
-        location = Location.of_file(path)
-    else:
-        name = complete_name(str(name_or_path), list_library(), "library entry")
-        folder = next(folder for folder in FOLDERS.values() if name in list_names(folder))
-        path = folder / f"{name}.toml"
-        location = Location(path.name, "", folder)
-    tables = read_toml(path)
+    tables, location = entry_tables(name_or_path)
     kind = kind_of(tables)
     entry: AnyEntry = build_plant_entry(tables, location) if kind is PlantEntry else build_entry(tables, location, kind)
     issue_warning(entry.name, entry.warning, stacklevel=3)

@@ -1,7 +1,7 @@
 """Scaling of entries, laws and geometries to another resting length or, for McKibben muscles, to another diameter."""
 
 import dataclasses
-from typing import Any, TypeVar
+from typing import Any, TypeVar, cast
 
 from ...core import ParameterError, leaves, quantity
 from ...physics.muscle.characteristic import MartensBoblan2017, Reynolds2003, Serres2009, TonduLopez2000, VirtualWork
@@ -72,10 +72,15 @@ def _positive(value: float | str, where: str) -> float:
     return size
 
 
+def own_length(entry: Entry) -> float | None:
+    """Resting length [m] of the law or geometry of an entry; None if it has none."""
+    parts = (part for part in (entry.characteristic, entry.geometry) if part is not None)
+    lengths = (leaf.value for part in parts for leaf in leaves(part) if leaf.declared.name == "resting_length")
+    return next((float(length) for length in lengths), None)
+
+
 def _with_resting_length(entry: Entry, length: float) -> Entry:
-    lengths = [leaf for part in (entry.characteristic, entry.geometry) if part is not None for leaf in leaves(part)
-               if leaf.declared.name == "resting_length"]  # fmt: skip
-    if not lengths:
+    if own_length(entry) is None:
         raise ParameterError(
             f"{entry.name} has no resting length: its force depends on pressure and contraction alone. Omit the "
             "resting length, or give the file of a muscle with a geometry."
@@ -99,15 +104,9 @@ def _with_diameter(entry: Entry, diameter: float) -> Entry:
             f"{entry.name}: {type(law).__name__} cannot be scaled to another diameter, because the wall does not scale "
             f"with the braid; only {names} with a Braid can. Give an entry of the wanted diameter."
         )
-    radius = diameter / 2
-    scaled = dataclasses.replace(law, geometry=dataclasses.replace(law.geometry, radius=radius))
-    return dataclasses.replace(
-        entry,
-        characteristic=scaled,
-        geometry=dataclasses.replace(geometry, radius=radius),
-        ratings=None,
-        error_band=None,
-    )
+    scaled = dataclasses.replace(law, geometry=dataclasses.replace(law.geometry, radius=diameter / 2))
+    geometry = dataclasses.replace(geometry, radius=diameter / 2)
+    return dataclasses.replace(entry, characteristic=scaled, geometry=geometry, ratings=None, error_band=None)
 
 
 def scale_to_length(thing: T, resting_length: float, where: str) -> T:
@@ -131,8 +130,7 @@ def scale_to_length(thing: T, resting_length: float, where: str) -> T:
             "Braid, or with a resting length of their own, can. Give a muscle file with the geometry of the measured "
             "muscle, or correct the resting length."
         )
-    result: T = scaled
-    return result
+    return cast(T, scaled)
 
 
 def _different_lengths(thing: Any, resting_length: float) -> dict[str, float]:

@@ -2,7 +2,7 @@
 
 import dataclasses
 import math
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -105,15 +105,16 @@ class ParameterUncertainty:
         root = directions * np.sqrt(np.maximum(variances, 0.0))
         return np.asarray(normal @ root.T * np.array(self.standard_errors))
 
+    def part(self, kept: Iterable[bool]) -> "ParameterUncertainty | None":
+        """The uncertainty of those of the parameters that are kept; None if there are none."""
+        places = np.flatnonzero(list(kept)).tolist()
+        if not places:
+            return None
+        names, errors = [self.parameters[i] for i in places], [self.standard_errors[i] for i in places]
+        correlations = np.array(self.correlations)[np.ix_(places, places)].tolist()
+        return ParameterUncertainty(tuple(names), tuple(errors), tuple(map(tuple, correlations)))
+
 
 def without_parts(uncertainty: ParameterUncertainty, parts: Collection[str]) -> ParameterUncertainty | None:
     """The uncertainty without the parameters of these tables, such as `friction`; None if no parameter remains."""
-    names = uncertainty.parameters
-    kept = [i for i, name in enumerate(names) if name.partition(".")[0] not in parts]
-    if not kept:
-        return None
-    return ParameterUncertainty(
-        tuple(names[i] for i in kept),
-        tuple(uncertainty.standard_errors[i] for i in kept),
-        tuple(tuple(uncertainty.correlations[i][k] for k in kept) for i in kept),
-    )
+    return uncertainty.part(name.partition(".")[0] not in parts for name in uncertainty.parameters)

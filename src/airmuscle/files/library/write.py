@@ -23,7 +23,7 @@ WITHOUT_MODEL = Check | Reference | Ratings | ValidityRange | ParameterUncertain
 def to_toml(entry: Entry) -> str:
     """Text of the library file of an entry; numbers in SI units with all digits."""
     geometry = None if entry.geometry == getattr(entry.characteristic, "geometry", None) else entry.geometry
-    return _to_text(stated_table(dataclasses.replace(entry, geometry=geometry)))
+    return tables_toml(stated_table(dataclasses.replace(entry, geometry=geometry)))
 
 
 def stated_table(thing: Any) -> dict[str, Any]:
@@ -38,12 +38,14 @@ def stated_table(thing: Any) -> dict[str, Any]:
 
 def part_toml(name: str, thing: Any) -> str:
     """Text of one table of a library file, such as [friction], with the model and its parameters."""
-    return _to_text({name: model_table(thing)})
+    return tables_toml({name: model_table(thing)})
 
 
 def tables_toml(tables: Mapping[str, Any]) -> str:
-    """Text of tables of plain values."""
-    return _to_text(tables)
+    """Text of tables of plain values and models."""
+    import tomlkit
+
+    return tomlkit.dumps(_plain(tables))
 
 
 def scenario_toml(
@@ -56,9 +58,8 @@ def scenario_toml(
     fit of the plant.
     """
     comments = "".join(f"# {line}\n" for line in note.splitlines())
-    return comments + _to_text(
-        {"title": title, "plant": model_table(plant), "input": input_table, "run": run, **(fitted or {})}
-    )
+    tables = {"title": title, "plant": model_table(plant), "input": input_table, "run": run, **(fitted or {})}
+    return comments + tables_toml(tables)
 
 
 def save(entry: Savable, path: str | Path) -> Path:
@@ -81,12 +82,6 @@ def write_text(path: Path, text: str) -> Path:
     except OSError as error:
         raise FileError(f"{path}: cannot be written ({error.strerror}). Name a file in a writable folder.") from None
     return path
-
-
-def _to_text(tables: Mapping[str, Any]) -> str:
-    import tomlkit
-
-    return tomlkit.dumps(_plain(tables))
 
 
 def model_table(thing: Any) -> dict[str, Any]:

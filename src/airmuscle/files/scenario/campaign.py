@@ -2,7 +2,7 @@
 
 import dataclasses
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -50,31 +50,27 @@ def campaign_scenarios(campaign: Campaign) -> tuple[RecordScenario, ...]:
         stem = re.sub(r"[^\w-]+", "-", record.origin.rpartition(".")[0] or record.origin).strip("-").lower()
         names[stem] = names.get(stem, 0) + 1
         unique = stem if names[stem] == 1 else f"{stem}-{names[stem]}"
-        scenarios.append(_scenario(campaign, record, f"{unique}.toml"))
+        scenarios.append(RecordScenario(record.origin, f"{unique}.toml", *_text_or_reason(campaign, record)))
     return tuple(scenarios)
 
 
-def _scenario(campaign: Campaign, record: CampaignRecord, name: str) -> RecordScenario:
+def _text_or_reason(campaign: Campaign, record: CampaignRecord) -> tuple[str, str]:
+    """The text of the scenario of a record, and the reason where there is none."""
     muscle, geometry = campaign.muscle(record.resting_length), campaign.geometry(record.resting_length)
     if muscle is None and record.kind is RecordKind.FILL and geometry is not None:
         muscle = Muscle.ideal(geometry)
-    reason = ""
     if record.kind is RecordKind.UNUSED:
-        reason = record.reason
-    elif muscle is None:
-        reason = "the muscle has no static law" if geometry is not None else "the muscle has no enclosed volume"
-    elif "time" not in record.recording:
-        reason = "the record has no time"
-    if reason or muscle is None:
-        return RecordScenario(record.origin, name, "", reason)
+        return "", record.reason
+    if muscle is None:
+        return "", "the muscle has no static law" if geometry is not None else "the muscle has no enclosed volume"
+    if "time" not in record.recording:
+        return "", "the record has no time"
     try:
         if record.kind is RecordKind.FILL:
-            return RecordScenario(record.origin, name, *_fill(campaign, record, muscle))
-        if record.kind is RecordKind.RELEASE:
-            return RecordScenario(record.origin, name, *_release(campaign, record, muscle))
-        return RecordScenario(record.origin, name, _slow(record, muscle))
+            return _fill(campaign, record, muscle)
+        return _release(campaign, record, muscle) if record.kind is RecordKind.RELEASE else (_slow(record, muscle), "")
     except AirmuscleError as error:
-        return RecordScenario(record.origin, name, "", str(error.message))
+        return "", str(error.message)
 
 
 def _note(record: CampaignRecord, start: float) -> str:
@@ -141,16 +137,12 @@ def _slow(record: CampaignRecord, muscle: Muscle) -> str:
         table[ACCELERATION] = [list(point) for point in motion.input.points[ACCELERATION]]
         initial |= motion.initial_state
         mechanism = PrescribedMotion()
-    plant = Plant(muscle, _regulator(float(pressure.max())), mechanism, ambient=stated_ambient(recording))
+    supply = float(pressure.max()) + MARGIN
+    limit = max(REGULATOR.max_setpoint, supply)
+    regulator = dataclasses.replace(REGULATOR, supply=Supply(supply), max_setpoint=limit)
+    plant = Plant(muscle, regulator, mechanism, ambient=stated_ambient(recording))
     run: Mapping[str, Any] = {"duration": float(time[-1]), "initial_state": initial}
     return scenario_toml(record.origin, plant, table, run, _note(record, start))
-
-
-def _regulator(pressure: float) -> ProportionalRegulator:
-    return ProportionalRegulator(
-        Supply(pressure + MARGIN), REGULATOR.fill, REGULATOR.discharge, REGULATOR.lag, REGULATOR.band,
-        max(REGULATOR.max_setpoint, pressure + MARGIN),
-    )  # fmt: skip
 
 
 def _points(recording: Recording, length: float) -> tuple[Array, Array, Array]:
@@ -158,9 +150,9 @@ def _points(recording: Recording, length: float) -> tuple[Array, Array, Array]:
     time = recording["time"] - recording["time"][0]
     path = running_median(recording["contraction"] * length, MEDIAN_ROWS)
     pressure = running_median(recording["pressure"], MEDIAN_ROWS)
-    travelled = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(path[:: max(1, path.size // 400)])))])
-    coarse = time[:: max(1, path.size // 400)]
-    by_path = np.interp(np.linspace(0.0, travelled[-1], POINTS // 2), travelled, coarse)
+    coarse = slice(None, None, max(1, path.size // 400))
+    travelled = np.append(0.0, np.cumsum(np.abs(np.diff(path[coarse]))))
+    by_path = np.interp(np.linspace(0.0, travelled[-1], POINTS // 2), travelled, time[coarse])
     instants = np.unique(np.concatenate([np.linspace(0.0, time[-1], POINTS // 2), by_path]))
     instants = _separated(instants, float(time[-1]) / (8 * POINTS))
     return instants, np.interp(instants, time, pressure), np.interp(instants, time, path)
@@ -168,8 +160,9 @@ def _points(recording: Recording, length: float) -> tuple[Array, Array, Array]:
 
 def _separated(instants: Array, distance: float) -> Array:
     """The instants without those that follow another one too closely, always with the first and the last."""
-    kept: Sequence[float] = [float(instants[0])]
-    for instant in instants[1:-1].tolist():
-        if instant - kept[-1] >= distance and instants[-1] - instant >= distance:
-            kept = [*kept, instant]
-    return np.array([*kept, float(instants[-1])])
+    first, *between, last = instants.tolist()
+    kept = [first]
+    for instant in between:
+        if instant - kept[-1] >= distance and last - instant >= distance:
+            kept.append(instant)
+    return np.array([*kept, last])

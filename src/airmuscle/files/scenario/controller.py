@@ -103,9 +103,8 @@ class PlantSignals:
         if isinstance(outline, Controller) and declared.unit in RELATIVE:
             names = outline.inputs
             if len({units.get(name) for name in names}) > 1:
-                raise ParameterError(
-                    f"{location}: {' and '.join(names)} have different units; choose inputs of the same unit."
-                )
+                named = " and ".join(names)
+                raise ParameterError(f"{location}: {named} have different units; choose inputs of the same unit.")
         if not isinstance(value, list) or origin(hint) is not tuple:
             return _read(value, declared, self._unit(value, declared, 0, outline, location), hint, location)
         return tuple(
@@ -187,11 +186,8 @@ def build_control_loop(
 
     Raises ParameterError, UnitError, UnknownNameError, FileError or ColumnError with the location.
     """
-    inner, remedy = (
-        location.inside("controller"),
-        '. Write model = "PID", its parameters, sample_time and setpoint in it',
-    )
-    controller_table = read_table(table["controller"], plant, inner, remedy)
+    inner, remedy = location.inside("controller"), '. Write model = "PID", its parameters, sample_time and setpoint'
+    controller_table = read_table(table["controller"], plant, inner, f"{remedy} in it")
     own = {key: value for key, value in controller_table.items() if key not in LOOP_KEYS}
     stated = {key: value for key, value in controller_table.items() if key in LOOP_KEYS}
     keys: LoopTable = build(stated, inner, kind=LoopTable)

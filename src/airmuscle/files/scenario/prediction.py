@@ -106,10 +106,8 @@ class PlantModel:
 
     def _with_observed(self, recording: Recording) -> Recording:
         """The recording with those columns of the fit that it has under the names of the outputs."""
-        kept = {}
-        for name, (deviation, column) in self._observed.items():
-            if column in [split_unit(heading)[0] for heading in recording]:
-                kept[name] = deviation, column
+        columns = [split_unit(heading)[0] for heading in recording]
+        kept = {name: observed for name, observed in self._observed.items() if observed[1] in columns}
         return with_observed(recording, kept, self.scenario.plant)
 
     def predicted_names(self, recording: Recording) -> tuple[str, ...]:
@@ -188,9 +186,9 @@ def predict_with_entry(entry: Entry, recording: Recording) -> RecordPrediction:
     if left_out and isinstance(law, ForceLaw):
         notes.append(f"left out of the static prediction: {', '.join(left_out)}")
     own = None if entry.geometry is None else float(entry.geometry.resting_length)
-    if None not in (own, length) and abs((own or 0.0) - (length or 0.0)) > LENGTH_TOLERANCE:
+    if own is not None and length is not None and abs(own - length) > LENGTH_TOLERANCE:
         differences.append("another resting length")
-        notes.append(f"the law was scaled from {1e3 * (own or 0.0):.4g} mm to {1e3 * (length or 0.0):.4g} mm")
+        notes.append(f"the law was scaled from {1e3 * own:.4g} mm to {1e3 * length:.4g} mm")
     half, source, remarks = _band(entry, fitted_quantity_of(law).name, recording)
     limits = entry.error_band
     rates = {} if limits is None else {"contraction": limits.max_contraction_rate, "pressure": limits.max_pressure_rate}

@@ -33,12 +33,6 @@ _UNIT = r"\s*([^\s\d.,]|1/).*"
 _TEXT: Schema = {"type": "string"}
 _CODE: Schema = {"description": "module:Class, code of a user", "pattern": r"^\w+(\.\w+)*:\w+$", **_TEXT}
 _PLAIN: Mapping[Any, str] = {int: "integer", float: "number", str: "string", bool: "boolean"}
-_ANY_UNIT = {
-    (Check, "equals"),
-    (Check, "tolerance"),
-    *((StatedBand, name) for name in ("half_width", "held_half_width")),
-}
-"""Numbers whose unit depends on another key of their table."""
 _CHOICES = {(Check, "quantity"): tuple(CONDITIONS), (StatedBand, "quantity"): PREDICTED}
 """Texts of which only some are allowed."""
 
@@ -94,7 +88,7 @@ class _ModelSchemas:
     def __init__(self) -> None:
         self.definitions: Schema = {}
 
-    def kind(self, cls: type[Any]) -> Schema:
+    def kind(self, cls: Any) -> Schema:
         """Any model of a class: a table that names it, or its name alone if it needs no parameters."""
         if only_class(cls) is not None:
             return self._reference(cls)
@@ -133,16 +127,16 @@ class _ModelSchemas:
     def _field(self, cls: type[Any], field: dataclasses.Field[Any], declared: Parameter | None, hint: Any) -> Schema:
         """A field of a class: a number with meaning, unit and bounds, a value with a reader of its own, or a part."""
         if declared is not None:
-            return self.number(declared, hint, (cls, field.name) in _ANY_UNIT)
+            return self.number(declared, hint)
         if "read" in field.metadata:
             return {"description": field.metadata["meaning"], **self._read(field.metadata["read"])}
         if (cls, field.name) in _CHOICES:
             return {"enum": list(_CHOICES[cls, field.name])}
         return self.part(hint)
 
-    def number(self, declared: Parameter, hint: Any, any_unit: bool) -> Schema:
+    def number(self, declared: Parameter, hint: Any) -> Schema:
         """A declared parameter."""
-        number = _quantity("" if any_unit or declared.unit in RELATIVE else declared.unit, *declared.bounds)
+        number = _quantity("" if declared.unit in RELATIVE else declared.unit, *declared.bounds)
         if any(origin(option) is tuple for option in options(hint)):
             column = _table({"file": _TEXT, "column": _TEXT}, ("file", "column"))
             number = {"anyOf": [_list_of(number), column]}
