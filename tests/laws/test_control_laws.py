@@ -99,7 +99,7 @@ def test_decentralised_laws_do_not_influence_each_other():
             "commands 'q', which is no set point",
         ),
         (lambda: Cascade(PID("x", "p", 1.0), PID("p", "u", 1.0), (0.0, 1.0), (1.0,)), "2 minima and 1 maxima for 1"),
-        (lambda: Cascade(PID("x", "p", 1.0), PID("p", "u", 1.0), (2.0,), (1.0,)), "allowed range: below its maximum 1"),
+        (lambda: Cascade(PID("x", "p", 1.0), PID("p", "u", 1.0), (2.0,), (1.0,)), "must be below its maximum 1"),
         (lambda: Decentralised(()), "there is no law; give at least one"),
         (lambda: Decentralised((PID("a", "u", 1.0), PID("b", "u", 1.0))), "'u' is commanded by two laws"),
         (lambda: WithFeedForward(SetpointCommand(("u",)), PID("y", "v", 1.0)), "the feedback commands 'v'"),

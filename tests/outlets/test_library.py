@@ -265,7 +265,7 @@ def test_a_file_that_cannot_be_written_leaves_nothing(tmp_path: Path):
             'quantity = "force"',
             'quantity = "forc"',
             ParameterError,
-            r"'forc' cannot be checked.*Did you mean 'force'\?",
+            r"no check of the quantity 'forc'.*Did you mean 'force'\?",
         ),
         # mistyped
         (

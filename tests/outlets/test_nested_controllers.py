@@ -232,7 +232,7 @@ stiffness = [["0 s", "40 N m/rad"]]"""
         ('gain = "3 bar/rad"', "gain = nan", ParameterError, r"\[input.controller.law.outer.outer\]: PID.gain .* is nan; it must be finite"),
         ('minimum = ["-2.4 bar"]', "minimum = []", ParameterError, r"\[input.controller.law.outer\]: Cascade: 0 minima and 1 maxima for 1 outer commands \(difference\)"),
         ('minimum = ["-2.4 bar"]', 'minimum = ["-2.4 deg"]', UnitError, r"\[input.controller.law.outer\], minimum\[0\]: unit 'deg' cannot be converted to 'Pa'"),
-        ('minimum = ["-2.4 bar"]', 'minimum = ["9 bar"]', ParameterError, r"'difference' has minimum 900000; allowed range: below its maximum 240000"),
+        ('minimum = ["-2.4 bar"]', 'minimum = ["9 bar"]', ParameterError, r"'difference' has minimum 900000; it must be below its maximum 240000"),
         ('minimum = ["-2.4 bar"]', 'minimum = "-2.4 bar"', ParameterError, r"minimum is '-2.4 bar'; it must be a list of numbers"),
         ('commanded = "difference"', 'commanded = "diference"', ParameterError, r"\[input.controller.law.outer.outer\], gain is '3 bar/rad'; the unit of the signal 'diference' is not known"),
         ('resolution = "2.44 mbar"', 'resolution = "2 deg"', UnitError, r"\[input.controller.sensors\[1\]\], resolution: unit 'deg' cannot be converted to 'Pa'"),

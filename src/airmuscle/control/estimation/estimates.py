@@ -39,8 +39,6 @@ class BoundFilter(NamedTuple):
     transition: Array
     variances: Array
     slopes: Array
-    outputs: Any
-    output_values: Array
     predict: Any = None
     correct: Any = None
 

@@ -9,7 +9,6 @@ import numpy as np
 
 from ...core import Array, ParameterError, ShortRepr, SolveError, Status, System, check_field_types, check_known, tree
 from ...core.system import check_system, state_vector
-from ...engine.compile.cache.kernel import evaluate
 from ...engine.compile.function import AugmentedRates, augmented_rates, states_and_outputs
 from ...engine.compile.program import CompiledSystem, compile_system
 from ...engine.loop.control_loop import COMMAND
@@ -88,13 +87,10 @@ class StateEstimator(ShortRepr, abc.ABC):
 
     def _bind(self) -> BoundFilter:
         """The compiled filter with new arrays."""
-        functions, n, p = self._functions, len(self.states), len(self.measured)
-        mean, inputs = np.zeros(n), np.zeros(self._compiled.sizes.inputs)
-        columns = np.zeros((1, len(self._compiled.output_names)))
+        n, p = len(self.states), len(self.measured)
         bound = BoundFilter(
-            mean, np.zeros((n, n)), inputs, np.zeros(p), np.zeros(p), np.zeros((p, p)), np.zeros((n, n)),
-            self.variances, np.zeros((p, n)),
-            evaluate.bind(functions.outputs, functions.constants, mean[None, :], inputs[None, :], columns), columns,
+            np.zeros(n), np.zeros((n, n)), np.zeros(self._compiled.sizes.inputs), np.zeros(p), np.zeros(p),
+            np.zeros((p, p)), np.zeros((n, n)), self.variances, np.zeros((p, n)),
         )  # fmt: skip
         predict, correct = self._kernels(bound)
         return bound._replace(predict=predict, correct=correct)
@@ -193,15 +189,8 @@ class StateEstimator(ShortRepr, abc.ABC):
 
     def columns(self, estimate: StateEstimate, inputs: Sequence[float]) -> dict[str, float]:
         """All states and outputs of the plant at an estimate, such as contraction and force."""
-        bound = self._filled(estimate, inputs)
-        bound.outputs()
-        known = self._compiled.description
-        count = len(known.state_names)
-        mean: list[float] = bound.mean.tolist()
-        outputs = dict(zip(known.output_names, bound.output_values[0].tolist(), strict=True))
-        self._idle.append(bound)
-        states = dict(zip(known.state_names, mean[:count], strict=True))
-        return {**states, **outputs, **dict(zip(self.states[count:], mean[count:], strict=True))}
+        table = self.table(estimate.mean[None, :], np.array([inputs], dtype=float))
+        return {name: float(column[0]) for name, column in table.items()}
 
     def estimate(self, recording: Recording, first: StateEstimate) -> dict[str, Array]:
         """Columns (N,) that are estimated from a recording, row by row, and `time` [s].

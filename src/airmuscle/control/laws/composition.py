@@ -35,12 +35,8 @@ class Cascade(ControlLaw):
 
     def check(self) -> None:
         commanded = self.outer.inputs
-        unknown = [name for name in commanded if name not in self.inner.setpoints]
-        if unknown:
-            raise ParameterError(
-                f"Cascade: the outer law commands '{unknown[0]}', which is no set point of the inner law; these are "
-                f"{', '.join(self.inner.setpoints)}."
-            )
+        what = "Cascade: the inner law has no set point for the outer command"
+        check_known(what, commanded, self.inner.setpoints, "its set points are")
         if not len(self.minimum) == len(self.maximum) == len(commanded):
             raise ParameterError(
                 f"Cascade: {len(self.minimum)} minima and {len(self.maximum)} maxima for {len(commanded)} outer "
@@ -48,9 +44,7 @@ class Cascade(ControlLaw):
             )
         for name, low, high in zip(commanded, self.minimum, self.maximum, strict=True):
             if low >= high:
-                raise ParameterError(
-                    f"Cascade: '{name}' has minimum {low:g}; allowed range: below its maximum {high:g}."
-                )
+                raise ParameterError(f"Cascade: '{name}' has minimum {low:g}; it must be below its maximum {high:g}.")
 
     def unit_of(self, declared: Parameter, index: int, units: Mapping[str, str]) -> str:
         """The unit of a limit: that of the outer command with the same index."""
@@ -108,12 +102,8 @@ class WithFeedForward(ControlLaw):
     feedback: ControlLaw
 
     def check(self) -> None:
-        other = [name for name in self.feedback.inputs if name not in self.feed_forward.inputs]
-        if other:
-            raise ParameterError(
-                f"WithFeedForward: the feedback commands '{other[0]}'; the feed-forward law commands "
-                f"{', '.join(self.feed_forward.inputs)}. Both must command the same inputs."
-            )
+        what = "WithFeedForward: the feed-forward law does not command the input of the feedback"
+        check_known(what, self.feedback.inputs, self.feed_forward.inputs, "it commands")
 
     @property
     def measured_columns(self) -> tuple[str, ...]:

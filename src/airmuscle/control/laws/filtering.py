@@ -6,20 +6,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from ...core import (
-    Parameter,
-    ParameterError,
-    Reference,
-    Value,
-    check_known,
-    model,
-    ops,
-    parameter,
-    published,
-    select_prefix,
-    with_prefix,
-    within,
-)
+from ...core import Parameter, ParameterError, Reference, Value, check_known, model, ops, parameter, published, within
+from ...core.system import select_prefix, with_prefix
 from ...engine.loop.control_law import Commanded, ControlLaw, EnclosingLaw, Memory, Sampled, inputs_of
 from ...engine.loop.controller import Measurement, relative_unit
 from .enclosing import MAX_SAMPLES

@@ -3,18 +3,8 @@
 from collections.abc import Mapping
 from typing import ClassVar
 
-from ...core import (
-    ParameterError,
-    Reference,
-    Value,
-    model,
-    ops,
-    parameter,
-    published,
-    select_prefix,
-    united,
-    with_prefix,
-)
+from ...core import ParameterError, Reference, Value, model, ops, parameter, published
+from ...core.system import select_prefix, united, with_prefix
 from ...engine.loop import Commanded, ControlLaw, Measurement, Memory, Sampled, commands, range_of
 from ...physics.muscle.characteristic.tondu_lopez2000 import TONDU_LOPEZ_2000
 from .open_loop import OpenLoopLaw, check_pair

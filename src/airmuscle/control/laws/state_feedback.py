@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from ...core import ParameterError, Reference, Value, model, ops, parameter, published, select_prefix, with_prefix
+from ...core.errors import check_known
 from ...engine.loop import ControlLaw, Measurement, Memory, MultivariableController, Sampled
 from .angle_and_stiffness import AntagonisticInverse
 from .open_loop import check_pair
@@ -51,11 +52,7 @@ class StateFeedback(MultivariableController, ControlLaw):
                     f"StateFeedback: {name} has {len(getattr(self, name))} numbers; for {n} states, {m} inputs, {p} "
                     f"measured and {q} controlled columns it must have {size}, row by row."
                 )
-        for name in self.controlled:
-            if name not in self.measured:
-                raise ParameterError(
-                    f"StateFeedback: '{name}' is controlled and not measured; measured are {', '.join(self.measured)}."
-                )
+        check_known("StateFeedback: no measured column is the controlled", self.controlled, self.measured)
 
     @property
     def initial_memory(self) -> dict[str, float]:

@@ -85,13 +85,6 @@ def chunk_file_names(study: Study) -> list[str]:
     return [f"{fingerprint(*common, study.values[each.start : each.stop])}.npz" for each in runs]
 
 
-def register_study(study: Study) -> str:
-    """Make this process use the given study in `run_chunk`, without reading its file; return its fingerprint."""
-    identity = study_fingerprint(study)
-    _loaded[str(study.path.resolve()), identity] = study
-    return identity
-
-
 def run_chunk(study_file: tuple[str, str], index: int) -> Chunk:
     """Run one chunk of the study in a file, its path and fingerprint, in any process; the plants are built there.
 
@@ -130,20 +123,15 @@ def compute_chunk(study: Study, index: int) -> Chunk:
         if isinstance(outcome, str):
             chunk.failure_reasons[row] = outcome
         else:
-            _store(study, outcome, chunk, row)
+            chunk.scalars[row] = list(study.scalar_values(outcome).values())
+            for name, series in study.time_series.items():
+                chunk.time_series[name][row] = series.sample(outcome["time"], outcome[series.column])
     return dataclasses.replace(chunk, failure_reasons=chunk.failure_reasons.astype(str))
 
 
 def metric_times(study: Study) -> Array:
     """All times [s] at which the metrics of a study are evaluated, sorted."""
     return np.unique(np.concatenate([metric.times for metric in study.metrics.values()]))
-
-
-def _store(study: Study, recording: Recording, chunk: Chunk, row: int) -> None:
-    time = recording["time"]
-    chunk.scalars[row] = [metric.value(time, recording[metric.column]) for metric in study.scalars.values()]
-    for name, series in study.time_series.items():
-        chunk.time_series[name][row] = series.sample(time, recording[series.column])
 
 
 def write_chunk(chunk: Chunk, path: Path) -> None:
@@ -188,14 +176,22 @@ def run_study(
     done = len(study) - sum(len(study.chunk_runs(index)) for index in missing)
     report = progress or (lambda done, total: None)
     report(done, len(study))
-    study_file = str(study.path.resolve()), register_study(study)
+    study_file = str(study.path.resolve()), study_fingerprint(study)
+    _loaded[study_file] = study  # this process need not read its file
     for place, chunk in DistributedCalls(executor, run_chunk, study_file).completed(missing):
         chunks[index := missing[place]] = chunk
         if files:
             write_chunk(chunk, files[index])
         done += len(study.chunk_runs(index))
         report(done, len(study))
-    return _combine(study, [chunks[index] for index in study.chunks], nominal)
+    parts = [chunks[index] for index in study.chunks]
+    return StudyResult(
+        study,
+        np.concatenate([part.scalars for part in parts]),
+        {name: np.concatenate([part.time_series[name] for part in parts]) for name in study.time_series},
+        tuple(str(reason) for part in parts for reason in part.failure_reasons),
+        nominal,
+    )
 
 
 def _chunk_files(study: Study, folder: Path) -> list[Path]:
@@ -221,16 +217,4 @@ def count_finished_runs(study: Study, folder: Path | str) -> int:
 def _nominal_values(study: Study) -> dict[str, float]:
     """The scalar metrics of the nominal scenario; NaN if its run fails."""
     (recording,) = simulate_all([study.template.scenario], metric_times(study))
-    if isinstance(recording, str):
-        return dict.fromkeys(study.scalars, np.nan)
-    return {name: metric.value(recording["time"], recording[metric.column]) for name, metric in study.scalars.items()}
-
-
-def _combine(study: Study, chunks: Sequence[Chunk], nominal: dict[str, float]) -> StudyResult:
-    return StudyResult(
-        study,
-        np.concatenate([chunk.scalars for chunk in chunks]),
-        {name: np.concatenate([chunk.time_series[name] for chunk in chunks]) for name in study.time_series},
-        tuple(str(reason) for chunk in chunks for reason in chunk.failure_reasons),
-        nominal,
-    )
+    return dict.fromkeys(study.scalars, np.nan) if isinstance(recording, str) else study.scalar_values(recording)

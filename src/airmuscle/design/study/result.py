@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ...core import Array, ColumnError, ShortRepr, alternatives
+from ...core import Array, ColumnError, ShortRepr, check_known
 from ...report.chapter import BY_ROW, Table, TableColumn
 from .design import Saltelli
 from .study import Study
@@ -110,9 +110,7 @@ class StudyResult(ShortRepr):
         if name in self.time_series:
             return self.time_series[name]
         names = list(self.study.scalars)
-        if name not in names:
-            known = [*names, *self.time_series]
-            raise ColumnError(f"study: no metric '{name}'{alternatives(name, known, 'the metrics are')}")
+        check_known("study: no metric", name, [*names, *self.time_series], "the metrics are", ColumnError)
         return self.scalars[:, names.index(name)]
 
     @property

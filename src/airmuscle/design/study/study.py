@@ -25,10 +25,11 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ...core import ParameterError, ShortRepr, abridged, alternatives, ambient_pressure, suggestion
+from ...core import ParameterError, ShortRepr, abridged, ambient_pressure, check_known, suggestion
 from ...core.tree import fingerprint
 from ...files.library import Location, TableReader, check_keys, located_errors, read_text, read_toml
 from ...files.scenario.scenario import Scenario, build_scenario, load_scenario, run_column_units
+from ...recording import Recording
 from .design import DESIGNS, Design
 from .distributions import Variation, read_variation
 from .metrics import METRICS, Metric, Scalar, TimeSeries
@@ -80,6 +81,11 @@ class Study(ShortRepr):
         """The units of the metrics."""
         known = run_column_units(self.template.scenario.problem)
         return {name: metric.unit(known[metric.column]) for name, metric in self.metrics.items()}
+
+    def scalar_values(self, recording: Recording) -> dict[str, float]:
+        """The scalar metrics of a run."""
+        time = recording["time"]
+        return {name: metric.value(time, recording[metric.column]) for name, metric in self.scalars.items()}
 
     def chunk_runs(self, index: int) -> range:
         """The runs of one chunk."""
@@ -222,10 +228,8 @@ def _read_metrics(tables: Mapping[str, Any], scenario: Scenario, location: Locat
     for name, table in tables.items():
         inner = location.inside(name)
         column = table.get("column") if isinstance(table, Mapping) else None
-        if isinstance(column, str) and column not in known:
-            raise ParameterError(
-                f"{inner}: a run has no column '{column}'{alternatives(column, known, 'its columns are')}"
-            )
+        if isinstance(column, str):
+            check_known(f"{inner}: a run has no column", column, known, "its columns are")
         metric = TableReader(classes=METRICS, known=known.get(str(column), "1") or "1").build(table, inner)
         with located_errors(inner):
             metric.check_range(scenario.problem.start_time, scenario.problem.duration)

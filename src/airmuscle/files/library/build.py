@@ -10,15 +10,12 @@ import dataclasses
 import inspect
 import typing
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from ...core import ParameterError, abridged, check_field, parameters
 from . import fields
 from .fields import allows, model_class, model_names
 from .files import Location, check_keys, located_errors
-
-if TYPE_CHECKING:
-    from ..scenario.controller import PlantSignals
 
 Named = Callable[[Any, Location, "TableReader"], Any]
 """The part that a text or a table with `library` names; None if it describes the part itself."""
@@ -31,13 +28,13 @@ class TableReader:
     classes  the allowed classes by name, for the outermost table; by default all registered models
     known    what the readers of fields declared with `custom_field` are given, such as a unit or a plant
     named    readers of parts that may be named instead of described, by their class
-    signals  for controllers: what a table does not state of a model whose fields and units follow from signals
+    signals  for controllers: the PlantSignals that make what a table does not state, or None
     """
 
     classes: Mapping[str, type[Any]] | None = None
     known: Any = None
     named: Mapping[type[Any], Named] = dataclasses.field(default_factory=dict)
-    signals: "PlantSignals | None" = None
+    signals: Any = None
 
     def build(self, table: Any, location: Location, given: Mapping[str, Any] | None = None, *, kind: Any = Any) -> Any:
         """The object that a table describes; `given` are fields that are not read from the table.
@@ -64,7 +61,7 @@ class TableReader:
         values = {names[key]: value for key, value in values.items() if names[key] not in given}
         hints = typing.get_type_hints(cls)
         declared = {p.name: p for p in parameters(cls)}
-        signals = self.signals if self.signals is not None and self.signals.concerns(cls) else None
+        signals = self.signals if self.signals and self.signals.concerns(cls) else None
         parts = signals.parts(cls, hints) if signals else {}
         parts |= {n: self._part(v, cls, n, hints[n], location) for n, v in values.items() if n not in declared}
         fields.check_required(cls, {**values, **parts, **given}, hints, location, is_named)

@@ -17,8 +17,8 @@ import warnings
 from collections.abc import Iterator, Mapping
 from typing import Any, ClassVar
 
-from ...core import ABSOLUTE, Reference, check_field_types, model, one_line, parameter
-from ...core.errors import AirmuscleWarning, ParameterError, UnknownNameError, alternatives, suggestion
+from ...core import ABSOLUTE, Reference, check_field_types, model, parameter
+from ...core.errors import AirmuscleWarning, ParameterError, UnknownNameError, check_known, suggestion
 from ...physics.muscle import CreepElements, Damper, Muscle, Ratings, SeriesElement, Spring, Stop, Wall
 from ...physics.muscle.characteristic import Characteristic, ForceLaw, ValidityRange
 from ...physics.muscle.friction.base import Friction
@@ -97,10 +97,7 @@ class Check:
 
 def _conditions_of(quantity: Any) -> tuple[str, tuple[str, ...]]:
     """The unit of a checked quantity, and the quantities on which it depends. Raises ParameterError."""
-    if quantity not in tuple(CONDITIONS):
-        raise ParameterError(
-            f"quantity '{one_line(quantity)}' cannot be checked{alternatives(str(quantity), CONDITIONS)}"
-        )
+    check_known("there is no check of the quantity", str(quantity), CONDITIONS)
     return CONDITIONS[quantity]
 
 

@@ -14,16 +14,8 @@ from ...core import ParameterError, abridged, check_known, tree
 from ...engine.run import Integrator
 from ...physics.plant.plant import Plant
 from ...recording.columns import quantity_of
-from ..library import (
-    PLANT_READER,
-    Location,
-    TableReader,
-    check_keys,
-    custom_field,
-    read_finite_number,
-    read_table,
-    read_text,
-)
+from ..library import PLANT_READER, Location, TableReader, custom_field
+from ..library.files import check_keys, read_finite_number, read_table, read_text
 from .initial_state import PRESSURE, pressure_names
 
 MAX_STARTS, MAX_SEED = 10_000, 2**32 - 1
