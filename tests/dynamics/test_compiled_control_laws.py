@@ -203,7 +203,7 @@ def test_lqg_gains_are_those_of_python_control():
         ({"disturbed": ("speed",), "permitted_integral": None}, "process_noise has no number for 'speed.disturbance'"),
         (
             {"measured": ("mass_flow", "position"), "measurement_noise": {"mass_flow": 1.0, "position": 1.0}},
-            "'mass_flow' depends on the inputs at once",
+            "'mass_flow' depends on inputs at once",
         ),
     ],
 )

@@ -96,13 +96,13 @@ def test_decentralised_laws_do_not_influence_each_other():
     [
         (
             lambda: Cascade(PID("x", "q", 1.0), PID("p", "u", 1.0), (0.0,), (1.0,)),
-            "commands 'q', which is no set point",
+            "no set point for the outer command 'q'",
         ),
         (lambda: Cascade(PID("x", "p", 1.0), PID("p", "u", 1.0), (0.0, 1.0), (1.0,)), "2 minima and 1 maxima for 1"),
         (lambda: Cascade(PID("x", "p", 1.0), PID("p", "u", 1.0), (2.0,), (1.0,)), "must be below its maximum 1"),
         (lambda: Decentralised(()), "there is no law; give at least one"),
         (lambda: Decentralised((PID("a", "u", 1.0), PID("b", "u", 1.0))), "'u' is commanded by two laws"),
-        (lambda: WithFeedForward(SetpointCommand(("u",)), PID("y", "v", 1.0)), "the feedback commands 'v'"),
+        (lambda: WithFeedForward(SetpointCommand(("u",)), PID("y", "v", 1.0)), "the input of the feedback 'v'"),
         (lambda: SetpointCommand(("u",), ("a", "b")), "2 set points for 1 inputs"),
         (lambda: GainSchedule(PID("y", "u", 1.0), "gian", "p", (1.0, 2.0), (1.0, 2.0)), "no parameter 'gian'"),
         (lambda: GainSchedule(PID("y", "u", 1.0), "gain", "p", (2.0, 1.0), (1.0, 2.0)), "must rise"),

@@ -269,5 +269,5 @@ def test_a_step_experiment_gives_starts_within_the_bounds():
     assert [set(each) for each in starts] == [{"gain", "integral_time"}] * 3
     assert all(1e-6 <= each["gain"] <= 2e-6 for each in starts)
     other = LoopCase("relay", LIFT, ControlLoop(OnOffController("pressure", "fill"), 0.01, loop.setpoint))
-    with pytest.raises(ParameterError, match="rules give the settings of a PID alone"):
+    with pytest.raises(ParameterError, match="rules are for a PID alone"):
         step_experiment(other, duration=1.0)

@@ -484,7 +484,7 @@ def test_the_report_of_a_run_shows_inputs_parameters_sources_and_notes(scenario:
     page = (tmp_path / "run" / "report.html").read_text(encoding="utf-8").replace("\u00a0", " ")
     for text in (
         "Simulation of 0.5 s. ",
-        " rows; all columns are in recording.csv.",
+        " rows; recording.csv has all columns.",
         "was outside the validity range of its characteristic in pressure",
         "Inputs applied to the plant; dashed: commands to the drivers.",
         "fill 0 before 0.1 s, 1 from 0.1 s, 0 from 0.3 s; drivers: fill: PWM(frequency=50.0, smallest_pulse=0.0), SolenoidDriver(opening_delay=",

@@ -217,7 +217,7 @@ PID_TABLE = ('commanded = "fill"', 'commanded = {{ model = "SplitRange", positiv
         (SETPOINT, 'pressure = [[0, nan]]', ParameterError, r"setpoint\], pressure is nan; it must be finite"),
         (SETPOINT, 'pressure = 3', ParameterError, r"setpoint\], pressure is 3; it must be a list of instants and values"),
         (SETPOINT, f'{SETPOINT}\ndrivers = {{ pressure = "SolenoidDriver" }}', ParameterError, r"a set point has no drivers; write \[input.drivers\]"),
-        (SETPOINT, f'{SETPOINT}\ncontroller = 3', ParameterError, r"a controller is allowed only in a scenario"),
+        (SETPOINT, f'{SETPOINT}\ncontroller = 3', ParameterError, r"only a scenario has a controller"),
         (SETPOINT, 'file = "none.csv"', AirmuscleError, r"none.csv"),
         ('model = "PID"', 'model = "Valve"', ParameterError, r"\[input.controller\]: Valve is not allowed here; a Controller is required: AngleAndStiffness, Cascade, .*OnOffController, PID"),
         ('model = "PID"', 'model = "PDI"', UnknownNameError, r"no model 'PDI'; there are AngleAndStiffness, .*, PID, .*WithStuckValve\. Did you mean 'PID'"),
@@ -271,7 +271,7 @@ def test_a_record_has_no_controller(tmp_path: Path):
 
     with pytest.raises(
         ParameterError,
-        match=r"record, \[input\]: a controller is allowed only in a scenario; give the commanded inputs",
+        match=r"record, \[input\]: only a scenario has a controller; give commanded inputs",
     ):
         build_input_signal({"controller": {}}, (), Location("record", "input", tmp_path))
 

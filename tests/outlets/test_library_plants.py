@@ -112,7 +112,7 @@ def test_a_scenario_replaces_parts_of_a_library_plant(tmp_path):
     [
         ('"joint-dmsp-20-matrix"', '"joint-nothing"', r"plant.library\]: no plant 'joint-nothing'.*joint-sam-30x290"),
         ('"joint-dmsp-20-matrix"', '"joint-dmsp"', "'joint-dmsp' is ambiguous"),
-        ('"joint-dmsp-20-matrix"', "3", "name a plant of the library"),
+        ('"joint-dmsp-20-matrix"', "3", "name a library plant"),
     ],
 )
 def test_a_library_plant_that_does_not_exist_is_refused(tmp_path, old, new, message):

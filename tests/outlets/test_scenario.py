@@ -470,7 +470,7 @@ def test_the_pressure_of_the_surroundings_is_absolute(tmp_path: Path):
             FILL,
             'model = "Braid"',
             ParameterError,
-            r"\[input\]: Braid is not an input signal; there are Schedule and SampledSignal",
+            r"\[input\]: Braid is no input signal; there are Schedule, SampledSignal",
         ),
         (
             FILL,

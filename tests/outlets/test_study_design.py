@@ -182,7 +182,7 @@ def test_no_value_of_a_normal_distribution_is_infinite():
         (lambda: LevelSet((1.0, float("nan"))), "all values must be finite"),
         (lambda: Normal(float("inf"), 1.0), "all values must be finite"),
         (lambda: Normal(0.0, -1.0), "std is -1; it must be positive"),
-        (lambda: Uniform(1.0, 1.0), "low is 1 and high is 1; low must be less than high"),
+        (lambda: Uniform(1.0, 1.0), "low is 1 and high is 1; low must be below high"),
         (lambda: Truncated(LevelSet((1.0,)), 0.0, 1.0), "is not a continuous distribution"),
         (lambda: Range(0.0, 0.0, 3), "two different ends"),
         (lambda: MonteCarlo(0), "count is 0; it must be at least 1"),

@@ -107,7 +107,7 @@ CASES = {
     "fit of a class": (lambda: fit(ContractileSurface, RUN), r"fit: the class ContractileSurface is not a characteristic\. Give one, for example an object of the class, ContractileSurface\.blank\(degree=5\)\."),
     "fit to a file": (lambda: fit(MUSCLE.contractile, "run.csv"), "fit: run.csv is not a Recording"),
     "fit to nothing": (lambda: fit(MUSCLE.contractile, None), "fit: None is not a Recording. Give one, as returned by read"),
-    "save a plant": (lambda: save(PLANT, "muscle.toml"), "save: Plant.* is not a muscle, a characteristic, a fit or an entry of the library.*save_scenario"),
+    "save a plant": (lambda: save(PLANT, "muscle.toml"), "save: Plant.* is no muscle, characteristic, fit or entry of the library.*save_scenario"),
     "write a plant": (lambda: write(PLANT, "run.csv"), "write: Plant.* is not a Recording"),
 }  # fmt: skip
 

@@ -139,9 +139,7 @@ class FiniteControlSet(ShortRepr, Controller):
         sequence = tuple(int(k) for k in search.best[1:])
         self._searches.append(search)
         if status is not Status.DONE:
-            raise SolveError(
-                f"FiniteControlSet: no prediction succeeded, because {status.message}. Check the estimate."
-            )
+            raise SolveError(f"FiniteControlSet: all predictions fail, because {status.message}. Check the estimate.")
         return sequence
 
     @property

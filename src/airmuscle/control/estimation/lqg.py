@@ -139,9 +139,8 @@ def _check_integral(
             "design_lqg: give either permitted_integral, for integral action, or disturbed, for an observer of "
             "disturbances."
         )
-    check_numbers(
-        "design_lqg", "permitted_integral", permitted_integral or {}, controlled, () if disturbed else controlled
-    )
+    needed = () if disturbed else controlled
+    check_numbers("design_lqg", "permitted_integral", permitted_integral or {}, controlled, needed)
 
 
 def _flat(matrix: Array) -> tuple[float, ...]:

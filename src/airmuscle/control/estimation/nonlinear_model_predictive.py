@@ -151,9 +151,8 @@ class NonlinearModelPredictive(ShortRepr, MultivariableController):
         estimator, ready = self.estimator, compile_system(self.estimator.plant)
         states = ready.description.state_names
         inputs = dict(zip(ready.description.input_names, self._all_inputs(self.init().applied), strict=True))
-        scale = np.array(
-            [self.permitted.get(name, size) for name, size in zip(states, estimator.magnitudes.tolist(), strict=False)]
-        )
+        magnitudes = dict(zip(states, estimator.magnitudes.tolist(), strict=False))
+        scale = np.array([self.permitted.get(name, size) for name, size in magnitudes.items()])
         sizes = np.array([self.permitted[name] for name in self.commanded])
         point = dict(zip(states, self.first.mean.tolist(), strict=False))
         linear = linearise(estimator.plant, point, inputs).select(inputs=list(self.commanded))

@@ -43,9 +43,7 @@ def checked_scale(
         check_known(f"{owner}: {argument} names", chosen, known)
         for name, row in zip(chosen, model.select(outputs=list(chosen)).D, strict=True):
             if row.any():
-                raise ParameterError(
-                    f"{owner}: '{name}' depends on the inputs at once; use states, or outputs of states."
-                )
+                raise ParameterError(f"{owner}: '{name}' depends on inputs at once; use states, or outputs of states.")
     check_numbers(owner, "permitted", permitted, (*model.states, *model.inputs), model.inputs)
     check_numbers(owner, "process_noise", noise[0], names, names[len(model.states) :])
     check_numbers(owner, "measurement_noise", noise[1], columns["measured"], columns["measured"])

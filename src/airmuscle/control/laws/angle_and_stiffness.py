@@ -140,9 +140,7 @@ class AngleAndStiffness(ControlLaw):
     def check(self) -> None:
         check_pair(self, self.commanded)
         if self.speed_gain and not self.speed_column:
-            raise ParameterError(
-                "AngleAndStiffness: speed_gain needs speed_column, the measured speed, such as 'angular_speed'."
-            )
+            raise ParameterError("AngleAndStiffness: speed_gain needs speed_column, such as 'angular_speed'.")
 
     @property
     def measured_columns(self) -> tuple[str, ...]:
@@ -173,8 +171,7 @@ class AngleAndStiffness(ControlLaw):
         missing = torque - self.inverse.torque(first, second, wanted[angle])
         # with the same sign, the integral would ask for still more of what the pressures cannot give
         held = ops.where(missing * rate > 0.0, ops.where(missing * missing > (UNREACHED * torque) ** 2, 1.0, 0.0), 0.0)
-        integral = ops.clip(
-            memory["integral"] + dt * ops.where(held > 0.5, 0.0, rate), -self.max_integral, self.max_integral
-        )
+        integral = memory["integral"] + dt * ops.where(held > 0.5, 0.0, rate)
+        integral = ops.clip(integral, -self.max_integral, self.max_integral)
         later = {"integral": ops.where(integrates, integral, memory["integral"])}
         return dict(zip(self.commanded, (first, second), strict=True)), later

@@ -74,11 +74,10 @@ class Cascade(ControlLaw):
         ranges = {name: (low, high) for name, low, high in limits}
         wanted, first = self.outer.step(select_prefix("outer.", memory), measurement._replace(ranges=ranges), dt)
         setpoints = {**measurement.setpoints, **{n: ops.clip(wanted[n], *ranges[n]) for n in self.outer.inputs}}
-        commands, second = self.inner.step(
-            select_prefix("inner.", memory), measurement._replace(setpoints=setpoints), dt
-        )
+        seen = measurement._replace(setpoints=setpoints)
+        commands, second = self.inner.step(select_prefix("inner.", memory), seen, dt)
         if self.tracking:
-            reached = self.inner.attained(measurement._replace(setpoints=setpoints), commands)
+            reached = self.inner.attained(seen, commands)
             only = {name: (reached[name], reached[name]) for name in ranges}
             _, tracked = self.outer.step(select_prefix("outer.", memory), measurement._replace(ranges=only), dt)
             missed = sum((ops.absolute_value(reached[name] - setpoints[name]) for name in ranges), 0.0)
@@ -125,9 +124,8 @@ class WithFeedForward(ControlLaw):
 
     def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
         ahead, first = self.feed_forward.step(select_prefix("feed_forward.", memory), measurement, dt)
-        ranges = {
-            name: tuple(limit - ahead[name] for limit in measurement.ranges[name]) for name in self.feedback.inputs
-        }
+        known = {name: measurement.ranges[name] for name in self.feedback.inputs}
+        ranges = {name: (low - ahead[name], high - ahead[name]) for name, (low, high) in known.items()}
         back, second = self.feedback.step(select_prefix("feedback.", memory), measurement._replace(ranges=ranges), dt)
         commands = {name: value + back[name] if name in back else value for name, value in ahead.items()}
         return commands, {**with_prefix("feed_forward.", first), **with_prefix("feedback.", second)}

@@ -1,7 +1,6 @@
 """Controllers of one column: PID in standard form, two-position control, and a dead zone for two valves."""
 
 import functools
-from collections.abc import Mapping
 from typing import ClassVar
 
 from ...core import ParameterError, Reference, Value, model, ops, parameter, published
@@ -48,9 +47,7 @@ class PID(SisoController):
     )
     initial_output: float = parameter("u", "u_0", "first command; without integral action the bias", default=0.0)
 
-    initial_memory: ClassVar[Mapping[str, float]] = dict.fromkeys(
-        ("started", "integral", "derivative", "weighted_error"), 0.0
-    )
+    initial_memory: ClassVar[Memory] = {"started": 0.0, "integral": 0.0, "derivative": 0.0, "weighted_error": 0.0}
     """Whether it has started (0 or 1), I and D [u], and c r - y of the last sample [y]."""
 
     def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
@@ -104,7 +101,7 @@ class OnOffController(SisoController):
         "y", "H", "width between switching on and off", bounds=(0.0, float("inf")), default=0.0
     )
 
-    initial_memory: ClassVar[Mapping[str, float]] = {"on": 0.0}
+    initial_memory: ClassVar[Memory] = {"on": 0.0}
     """Whether the maximum is commanded (0 or 1)."""
 
     def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
@@ -143,7 +140,7 @@ class DeadZoneController(SisoController):
                 "SplitRange('fill', 'discharge')."
             )
 
-    initial_memory: ClassVar[Mapping[str, float]] = {**SLIDING_MEMORY, "position": 0.0}
+    initial_memory: ClassVar[Memory] = {**SLIDING_MEMORY, "position": 0.0}
     """The position (-1, 0 or 1), whether it has started, the last error and its filtered derivative."""
 
     def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:

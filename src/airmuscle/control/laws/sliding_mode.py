@@ -1,17 +1,16 @@
 """Sliding-mode controllers: boundary layer and super-twisting, with their sliding variable."""
 
-from collections.abc import Mapping
 from typing import ClassVar
 
 from ...core import Reference, Value, model, ops, parameter, published
 from ...engine.loop import Commanded, Measurement, Memory, Sampled, SisoController, commands, range_of
 
-SLIDING_MEMORY: Mapping[str, float] = {"started": 0.0, "error": 0.0, "error_rate": 0.0}
+SLIDING_MEMORY: Memory = {"started": 0.0, "error": 0.0, "error_rate": 0.0}
 """Whether it has started (0 or 1), the last error and its filtered derivative."""
 
 
 def sliding_variable(
-    memory: Mapping[str, Value], error: Value, sliding_time: Value, filter_time: Value, dt: Value
+    memory: Memory, error: Value, sliding_time: Value, filter_time: Value, dt: Value
 ) -> tuple[Value, dict[str, Value]]:
     """s = e + T_s e' and the memory for the next sample; e' is 0 at the first sample.
 
@@ -45,7 +44,7 @@ class SlidingMode(SisoController):
     filter_time: float = parameter("s", "T_f", "time constant of the derivative", bounds=(0.0, 1e3), default=0.0)
     equivalent_output: float = parameter("u", "u_0", "command on the sliding surface", default=0.0)
 
-    initial_memory: ClassVar[Mapping[str, float]] = SLIDING_MEMORY
+    initial_memory: ClassVar[Memory] = SLIDING_MEMORY
     """Whether it has started (0 or 1), the last error [y] and its filtered derivative [y/s]."""
 
     def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
@@ -83,7 +82,7 @@ class SuperTwisting(SisoController):
     filter_time: float = parameter("s", "T_f", "time constant of the derivative", bounds=(0.0, 1e3), default=0.0)
     initial_output: float = parameter("u", "u_0", "initial integral", default=0.0)
 
-    initial_memory: ClassVar[Mapping[str, float]] = {**SLIDING_MEMORY, "integral": 0.0}
+    initial_memory: ClassVar[Memory] = {**SLIDING_MEMORY, "integral": 0.0}
     """Whether it has started (0 or 1), the last error, its filtered derivative, and the integral w [u]."""
 
     def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:

@@ -239,10 +239,8 @@ def benchmark_contender(
             progress(f"{contender.name}: {truth.name}", i, len(joint.truths))
             laws = {Group.MODELS: law}
             if bounds and commissioning_runs:
-                found[truth.name] = commission(
-                    joint, truth, law, bounds, joint.commissioning_tasks, runs=commissioning_runs
-                )
-                laws[Group.COMMISSIONED] = with_gains(law, found[truth.name].gains)
+                made = commission(joint, truth, law, bounds, joint.commissioning_tasks, runs=commissioning_runs)
+                found[truth.name], laws[Group.COMMISSIONED] = made, with_gains(law, made.gains)
             for group, each in laws.items():
                 for task in tasks:
                     run = run_task(joint, truth, each, task)

@@ -250,10 +250,8 @@ def _summary(result: BenchmarkResult) -> list[str]:
 def _references(result: BenchmarkResult) -> tuple[Reference, ...]:
     plants = (result.joint.model, *(truth.plant for truth in result.joint.truths))
     sources = cite((*plants, *(each.law for each in result.results)))
-    references = {reference.key: reference for reference in (*sources, BONE2019)}
-    for each in result.results:
-        references |= {reference.key: reference for reference in (each.tuning.references if each.tuning else ())}
-    return tuple(references.values())
+    tuned = [reference for each in result.results if each.tuning for reference in each.tuning.references]
+    return tuple({reference.key: reference for reference in (*sources, BONE2019, *tuned)}.values())
 
 
 def _settings(result: BenchmarkResult) -> tuple[tuple[str, str, str], ...]:

@@ -60,9 +60,8 @@ def _delay(joint: BenchmarkJoint) -> int:
 
 def _angle_and_stiffness(joint: BenchmarkJoint) -> Contender:
     """Angle and stiffness by the inverse of the model for torque and stiffness."""
-    inverse = AntagonisticInverse(
-        joint.model.muscles, joint.model.mechanism, joint.min_pressure, joint.max_pressure, steps=2
-    )
+    plant = joint.model
+    inverse = AntagonisticInverse(plant.muscles, plant.mechanism, joint.min_pressure, joint.max_pressure, steps=2)
     law = AngleAndStiffness(
         inverse, joint.pressures, gain=20.0, integral_time=0.3, speed_gain=0.3, speed_column="angular_speed",
         acceleration_setpoint="angular_acceleration",

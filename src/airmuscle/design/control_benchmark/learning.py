@@ -61,7 +61,8 @@ def learn(
         raise ParameterError(f"learn: {trials} trials; give at least 2.")
     signals = task_signals(joint, task)
     count = round(task.duration / joint.sample_time)
-    signal = _present_signal(contender, signals)[:count]
+    lead = next((leaf.value for leaf in leaves(law) if leaf.path.endswith("lead_time")), 0.0)
+    signal = (signals.feed_forward + lead * signals.feed_forward_rate)[:count]  # before learning
     learning = _learning(joint, law, task, signals, count, cutoff, change_weight)
     true, wanted = joint.truths[truth], signals.angle[1 : count + 1]
     start, sensed = joint.start(true.plant), on_truth(law, true.extra_delay)
@@ -81,12 +82,6 @@ def learn(
         signal = learning.improve(signal, wanted - ENCODER_STEP * np.round(angle / ENCODER_STEP))
     repeated = [errors[-1], *(tried(trials + i, last)[1] for i in range(REPETITIONS))]
     return LearningCurve(task, contender.name, np.array(errors), last, float(np.ptp(repeated)))
-
-
-def _present_signal(contender: ContenderResult, signals: TaskSignals) -> Array:
-    """The feed-forward signal of a contender before learning, with its lead time."""
-    lead = next((leaf.value for leaf in leaves(contender.law) if leaf.path.endswith("lead_time")), 0.0)
-    return np.asarray(signals.feed_forward + lead * signals.feed_forward_rate)
 
 
 def _learning(

@@ -142,11 +142,9 @@ class ControlTask:
         check_field_types(self)
         if not 0 < self.duration < math.inf:
             raise ParameterError(f"task '{self.name}': duration is {self.duration!r} s; it must be positive, finite.")
-        for name, time in (("begin", self.begin), ("event", self.event)):
-            if time is not None and not 0 <= time < self.duration:
-                raise ParameterError(
-                    f"task '{self.name}': {name} is {time:g} s; allowed range: 0 to {self.duration:g} s."
-                )
+        for name, t in (("begin", self.begin), ("event", self.event)):
+            if t is not None and not 0 <= t < self.duration:
+                raise ParameterError(f"task '{self.name}': {name} is {t:g} s; allowed range: 0 to {self.duration:g} s.")
 
 
 def _sine(frequency: float, amplitude: float) -> ControlTask:

@@ -65,16 +65,13 @@ class MuscleChoice(ShortRepr):
 
         The magnitude of the difference of m = p V/(R T) between both end points, at ambient temperature, without tubes.
         """
-        masses = [self._air_mass(point) for point in (self.design.contracted, self.design.extended)]
-        if masses[0] is None or masses[1] is None:
-            return None
-        return self.total_count * abs(masses[0] - masses[1])
-
-    def _air_mass(self, point: EndPoint) -> float | None:
-        volume, ambient = self.muscle.volume(point.pressure, point.contraction), self.conditions.ambient
-        if volume is None:
-            return None
-        return float(Isothermal().air_mass(absolute_pressure(point.pressure, ambient), volume, ambient))
+        masses, ambient = [], self.conditions.ambient
+        for point in (self.design.contracted, self.design.extended):
+            volume = self.muscle.volume(point.pressure, point.contraction)
+            if volume is None:
+                return None
+            masses.append(Isothermal().air_mass(absolute_pressure(point.pressure, ambient), volume, ambient))
+        return self.total_count * abs(float(masses[0]) - float(masses[1]))
 
     @property
     def reference_volume(self) -> float | None:

@@ -1,7 +1,7 @@
 """Requirements of a sizing: a lift over a stroke or a joint over an angle, and the conditions of operation."""
 
-import dataclasses
 import math
+from dataclasses import replace
 from typing import Any, ClassVar
 
 from ...core import STANDARD_GRAVITY, Array, ParameterError, model, parameter
@@ -63,7 +63,7 @@ class LiftRequirement:
 
     def reduced(self, load: float = 1.0, travel: float = 1.0) -> "LiftRequirement":
         """The requirement with a fraction of the load and of the stroke."""
-        return dataclasses.replace(
+        return replace(
             self, mass=load * self.mass, force=load * self.force, stiffness=load * self.stiffness / travel,
             stroke=travel * self.stroke,
         )  # fmt: skip
@@ -108,9 +108,7 @@ class JointRequirement:
 
     def reduced(self, load: float = 1.0, travel: float = 1.0) -> "JointRequirement":
         """The requirement with a fraction of torque and inertia, and of the angle."""
-        return dataclasses.replace(
-            self, torque=load * self.torque, inertia=load * self.inertia, angle=travel * self.angle
-        )
+        return replace(self, torque=load * self.torque, inertia=load * self.inertia, angle=travel * self.angle)
 
     def describe(self) -> str:
         """Torque and angle as text."""
@@ -147,9 +145,7 @@ class SizingConditions:
         for name, least in (("min_count", 1), ("max_count", self.min_count)):
             count = getattr(self, name)
             if isinstance(count, bool) or not least <= count <= MAX_COUNT:
-                raise ParameterError(
-                    f"SizingConditions: {name} is {count!r}; allowed range: {least} to {MAX_COUNT} muscles in parallel."
-                )
+                raise ParameterError(f"SizingConditions: {name} is {count!r}; allowed range: {least} to {MAX_COUNT}.")
         if not self.min_pressure < self.supply:
             raise ParameterError(
                 f"SizingConditions: min_pressure is {self.min_pressure:g} Pa; it must be less than the supply "

@@ -220,9 +220,8 @@ def _joint_text(choice: MuscleChoice) -> str:
         design.radius, inertia, weight_torque=weight, min_angle=-1.5 * half, max_angle=1.5 * half,
         offset=0.5 * (design.extended.contraction + design.contracted.contraction),
     )  # fmt: skip
-    regulator = ProportionalRegulator(
-        Supply(choice.conditions.supply), fill, discharge, LAG, BAND, max_setpoint=choice.conditions.supply
-    )
+    supply = choice.conditions.supply
+    regulator = ProportionalRegulator(Supply(supply), fill, discharge, LAG, BAND, max_setpoint=supply)
     plant = _plant(choice, _muscles(choice, ("left", "right"), damping), regulator, joint)
     low, high = design.extended.pressure, design.contracted.pressure
     middle = 0.5 * (low + high)

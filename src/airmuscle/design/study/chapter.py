@@ -103,17 +103,14 @@ def _scatter(result: StudyResult, name: str) -> Plot:
         if i % PANELS_PER_ROW == 0:
             axis.set_ylabel(_axis_label(name, study.units[name]))
     subset = f" {drawn.size} of {finite.size} runs are drawn." if drawn.size < finite.size else ""
-    return Plot(
-        f"scatter-{_file_stem(name)}", f"{name} against each varied parameter, one point per run.{subset}", figure
-    )
+    caption = f"{name} against each varied parameter, one point per run.{subset}"
+    return Plot(f"scatter-{_file_stem(name)}", caption, figure)
 
 
 def _sensitivity_bars(result: StudyResult, indices: dict[str, SobolIndices]) -> Plot:
     study = result.study
     count, paths = len(indices), [parameter.path for parameter in study.parameters]
-    figure, axes = new_figure(
-        count, 1, width=6.3, height=0.8 + count * (0.7 + 0.42 * len(paths)), squeeze=False, sharex=True
-    )
+    figure, axes = new_figure(count, 1, height=0.8 + count * (0.7 + 0.42 * len(paths)), squeeze=False, sharex=True)
     rows = np.arange(len(paths))
     bar = {"height": 0.38, "error_kw": {"elinewidth": 0.9, "ecolor": BLACK, "capsize": 2}}
     for axis, (name, index) in zip(axes[:, 0], indices.items(), strict=True):
@@ -218,9 +215,7 @@ def summary(result: StudyResult) -> Iterator[str]:
 def _notes(result: StudyResult, indices: dict[str, SobolIndices]) -> Iterator[str]:
     """Failed runs and excluded base points."""
     if result.failed.size:
-        yield (
-            f"Failed runs: {result.failed.size}. They are excluded from the statistics; the table states the reasons."
-        )
+        yield f"Failed runs: {result.failed.size}. They are excluded from the statistics; the table has the reasons."
     excluded = max((each.excluded_points for each in indices.values()), default=0)
     if excluded:
         yield f"Base points excluded from the sensitivities, because a metric is missing: {excluded}."

@@ -33,9 +33,7 @@ class Variation(abc.ABC):
                 raise ParameterError(f"{type(self).__name__}: {name} is {numbers[name]:g}; it must be positive.")
         low, high = numbers.get("low", 0.0), numbers.get("high", 1.0)
         if not low < high:
-            raise ParameterError(
-                f"{type(self).__name__}: low is {low:g} and high is {high:g}; low must be less than high."
-            )
+            raise ParameterError(f"{type(self).__name__}: low is {low:g} and high is {high:g}; low must be below high.")
 
     @abc.abstractmethod
     def ppf(self, probabilities: Array) -> Array:
@@ -171,9 +169,7 @@ class Triangular(Distribution):
     def __post_init__(self) -> None:
         super().__post_init__()
         if not self.low <= self.mode <= self.high:
-            raise ParameterError(
-                f"Triangular: mode is {self.mode:g}; it must lie between low, {self.low:g}, and high, {self.high:g}."
-            )
+            raise ParameterError(f"Triangular: mode is {self.mode:g}; allowed range: {self.low:g} to {self.high:g}.")
 
     def ppf(self, probabilities: Array) -> Array:
         q, c = probabilities, (self.mode - self.low) / (self.high - self.low)

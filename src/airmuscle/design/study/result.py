@@ -143,9 +143,7 @@ class StudyResult(ShortRepr):
             },
             "unit": [self.study.units[name] for name in names],
         }
-        return Table(
-            "statistics", "Metrics", columns, "Statistics over all runs that have the metric.", brief=MAX_BRIEF
-        )
+        return Table("statistics", "Metrics", columns, "Statistics of all runs that have the metric.", brief=MAX_BRIEF)
 
     def indices(self) -> dict[str, SobolIndices]:
         """The Sobol indices of each scalar metric; empty for designs other than Saltelli."""

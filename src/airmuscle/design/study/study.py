@@ -183,9 +183,7 @@ def _require_table(tables: Mapping[str, Any], key: str, location: Location) -> M
     table = tables.get(key)
     if not isinstance(table, Mapping) or not table:
         problem = "is missing" if table is None else "is empty" if table == {} else f"is {abridged(table)}, not a table"
-        raise ParameterError(
-            f"{location}: [{key}] {problem}; it must contain at least one entry, such as {_EXAMPLES[key]}."
-        )
+        raise ParameterError(f"{location}: [{key}] {problem}; it must contain an entry, such as {_EXAMPLES[key]}.")
     return table
 
 

@@ -44,12 +44,10 @@ def pareto_figure(tuning: Tuning, unit: str) -> Any:
     """Mean index against mean air drawn and travel of the commands of all sets of gains, with the Pareto fronts."""
     history = tuning.history
     factor, shown = _display(unit)
-    shown_metrics = [name for name in COSTS if np.isfinite(history.means(name)).any()]
-    figure, axes = new_figure(
-        1, len(shown_metrics), height=3.2, width=3.15 * max(len(shown_metrics), 1.4), squeeze=False
-    )
+    costs = [name for name in COSTS if np.isfinite(history.means(name)).any()]
+    figure, axes = new_figure(1, len(costs), height=3.2, width=3.15 * max(len(costs), 1.4), squeeze=False)
     error = history.means("index") * factor
-    for axis, name in zip(axes[0], shown_metrics, strict=True):
+    for axis, name in zip(axes[0], costs, strict=True):
         scale, label = COSTS[name]
         cost, front = history.means(name) * scale, history.pareto(name)
         axis.plot(cost, error, "o", color=SKY, markersize=2.5, label="set of gains")
@@ -105,9 +103,7 @@ def tuning_chapter(
     runs = _runs(tuning, integrator)
     caption = "Objective over the budget; a failed set of gains is not drawn."
     plots = [Plot("convergence", caption, partial(convergence_figure, tuning))]
-    caption = (
-        "Mean tracking index over the cases against mean air drawn and travel of the commands, with the Pareto fronts."
-    )
+    caption = "Mean tracking index over the cases against mean air drawn and travel of commands, with Pareto fronts."
     plots.append(Plot("pareto", caption, partial(pareto_figure, tuning, tuning.index.unit(unit))))
     if runs:
         caption = "Nominal case with present and tuned gains."

@@ -114,9 +114,8 @@ class Evaluator:
     def metrics(self, gains: Array) -> CaseMetrics:
         """The metrics (E, M) of gains (E, D). Raises Interrupted if the user stops the simulation."""
         shape = len(gains), len(self.cases)
-        metrics = CaseMetrics(
-            np.full(shape, np.inf), np.full(shape, np.nan), np.full(shape, np.nan), np.zeros(shape, bool)
-        )
+        air, travel = np.full((2, *shape), np.nan)
+        metrics = CaseMetrics(np.full(shape, np.inf), air, travel, np.zeros(shape, bool))
         possible = np.array([i for i, row in enumerate(gains.tolist()) if self._is_possible(row)], dtype=np.intp)
         for group in self.groups:
             for part in self._parts(possible, group):

@@ -128,9 +128,8 @@ def tune(
     family = check_cases(cases)
     duration = _check_options(duration, index, objective, budget, seed, len(family))
     ranges = gain_ranges(family[0].controller, bounds)
-    evaluator = Evaluator(
-        family, group_cases(family, index), tuple(each.path for each in ranges), duration, index, integrator, start_time
-    )
+    paths = tuple(each.path for each in ranges)
+    evaluator = Evaluator(family, group_cases(family, index), paths, duration, index, integrator, start_time)
     search = _Search(evaluator, ranges, objective, budget, progress or (lambda done, total: None))
     given = search.given(start)
     with process_pool(workers) as executor:
@@ -142,7 +141,11 @@ def tune(
         search.history(), search.present_count, search.converged, interrupted,
     )  # fmt: skip
     if not math.isfinite(result.objective):
-        raise SimulationError(_nothing_found(evaluator, len(result.history)))
+        reason = max(evaluator.reasons, key=evaluator.reasons.__getitem__, default="the index is not finite")
+        raise SimulationError(
+            f"tune: each of {len(result.history)} sets of gains fails in at least one case; most frequent reason: "
+            f"{reason}. Narrow the bounds, check the set point, or leave out the cases that no controller can hold."
+        )
     return result
 
 
@@ -158,14 +161,6 @@ def _check_options(duration: Any, index: Any, objective: Any, budget: Any, seed:
             why = f", {MIN_SETS} sets of gains for each of {count} cases" if name == "budget" else ""
             raise ParameterError(f"tune: {name} is {value!r}; it must be a whole number of at least {least}{why}.")
     return float(duration)
-
-
-def _nothing_found(evaluator: Evaluator, sets: int) -> str:
-    reason = max(evaluator.reasons, key=lambda text: evaluator.reasons[text], default="the index is not finite")
-    return (
-        f"tune: each of {sets} sets of gains fails in at least one case; most frequent reason: {reason}. "
-        "Narrow the bounds, check the set point, or leave out the cases that no controller can hold."
-    )
 
 
 class _Search:
@@ -263,9 +258,8 @@ class _Search:
 
     def history(self) -> TuningHistory:
         """All that was simulated."""
-        return TuningHistory(
-            self.evaluator.paths, np.concatenate(self.gains), np.concatenate(self.values), joined_metrics(self.metrics)
-        )
+        gains, values = np.concatenate(self.gains), np.concatenate(self.values)
+        return TuningHistory(self.evaluator.paths, gains, values, joined_metrics(self.metrics))
 
 
 def _starts(points: Array, energies: Array) -> Iterator[Array]:

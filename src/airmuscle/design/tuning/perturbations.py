@@ -172,9 +172,7 @@ def _drawn(
             return with_parameters(plant, [leaf.value + shifts.get(leaf.path, 0.0) for leaf in known])
         except AirmuscleError as error:
             message = str(error)
-    raise ParameterError(
-        f"perturbed_family: {MAX_ATTEMPTS} draws of the fitted parameters are all impossible; the last: {message}"
-    )
+    raise ParameterError(f"perturbed_family: {MAX_ATTEMPTS} draws of parameters are impossible; the last: {message}")
 
 
 def _within_ranges(fitted: ParameterUncertainty, deviations: Array, known: Sequence[Leaf]) -> dict[str, float]:

@@ -166,9 +166,7 @@ def step_experiment(
     """
     pid = case.controller
     if not isinstance(pid, PID):
-        raise ParameterError(
-            f"step_experiment: the controller is {type(pid).__name__}; rules give the settings of a PID alone."
-        )
+        raise ParameterError(f"step_experiment: the controller is {type(pid).__name__}; rules are for a PID alone.")
     low, high = map(float, range_of(pid.commanded, case.loop.command_ranges(case.plant)))
     size = STEP * (high - low) if step is None else step
     value = pid.initial_output + size

@@ -89,9 +89,7 @@ class TableReader:
         if not isinstance(table.get("model"), str):
             choice = ", ".join(self.classes or (() if kind is Any else model_names(kind)))
             example = f"one of {choice}" if choice else 'such as model = "Braid"'
-            raise ParameterError(
-                f'{location}: the model is not named; write model = "...", {example}, and its parameters.'
-            )
+            raise ParameterError(f'{location}: the model is not named; write model = "...", {example}, and parameters.')
         cls = model_class(table["model"], f"{location}, model", self.classes, kind)
         if not allows(kind, cls):
             listed = "" if only else f": {', '.join(model_names(kind))}"

@@ -75,9 +75,7 @@ class Check:
         check_field_types(self)
         _, required = _conditions_of(self.quantity)
         if tuple(name for name, _ in self.conditions) != required:
-            raise ParameterError(
-                f"a check of the {self.quantity} requires {' and '.join(required)}, and no other quantity."
-            )
+            raise ParameterError(f"a check of the {self.quantity} requires {' and '.join(required)}, and no other.")
         for name, value in (("equals", self.equals), ("tolerance", self.tolerance), *self.conditions):
             if not math.isfinite(value) or (name == "tolerance" and value < 0.0):
                 must = "not be negative" if math.isfinite(value) else "be finite"
@@ -134,10 +132,9 @@ class Entry(EntryDisplay):
         if not isinstance(self.characteristic, ForceLaw) or self.geometry is None:
             missing = MISSING_GEOMETRY if self.geometry is None else "a law solved for the force: see as_force_law"
             raise UnknownNameError(f"{self.name} is a characteristic, not a muscle; it lacks {missing}.")
-        parts = {part: getattr(self, part) for part in OPTIONAL_PARTS if getattr(self, part) is not None}
-        return Muscle(
-            self.characteristic, self.geometry, validity_range=self.validity_range, ratings=self.ratings, **parts
-        )
+        names = (*OPTIONAL_PARTS, "validity_range", "ratings")
+        parts = {name: part for name in names if (part := getattr(self, name)) is not None}
+        return Muscle(self.characteristic, self.geometry, **parts)
 
 
 @model

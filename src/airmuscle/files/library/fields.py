@@ -154,13 +154,13 @@ def check_required(
         key = field.metadata.get("key", field.name)
         hint = hints[field.name]
         if is_named:
-            raise ParameterError(
-                f"{location}: {cls.__name__} needs '{key}' {_describe_field(field, hint)}; it is missing."
-            )
-        if "meaning" in field.metadata:
-            raise ParameterError(f"{location}: '{key}' is missing: {field.metadata['meaning']}.")
-        what = f"the table [{key}]" if describes_tables(hint) else f"'{key}'"
-        raise ParameterError(f"{location}: {what} is missing; it must be {describe_type(hint)}.")
+            text = f"{cls.__name__} needs '{key}' {_describe_field(field, hint)}; it is missing"
+        elif "meaning" in field.metadata:
+            text = f"'{key}' is missing: {field.metadata['meaning']}"
+        else:
+            what = f"the table [{key}]" if describes_tables(hint) else f"'{key}'"
+            text = f"{what} is missing; it must be {describe_type(hint)}"
+        raise ParameterError(f"{location}: {text}.")
 
 
 def _describe_field(field: dataclasses.Field[Any], hint: Any) -> str:
@@ -175,23 +175,16 @@ def read_parameter(value: Any, declared: Parameter, hint: Any, location: Locatio
 
     A tuple may also be a column of a data file. Raises ParameterError, UnitError, FileError or ColumnError.
     """
-    where = location.at(declared.name)
-    many = origin(hint) is tuple
+    where, many = location.at(declared.name), origin(hint) is tuple
+    unit, about = declared.unit, f" ({declared.symbol}, {declared.meaning})"
     if isinstance(value, Mapping) and many:
         return _read_column(value, where)
     if isinstance(value, list) != many:
         expected = "a list of numbers" if many else "one number"
-        raise ParameterError(
-            f"{where} is {abridged(value)}; it must be {expected} in {declared.unit} ({declared.symbol}, "
-            f"{declared.meaning})."
-        )
+        raise ParameterError(f"{where} is {abridged(value)}; it must be {expected} in {unit}{about}.")
     if many:
-        return tuple(_read_declared(v, declared, f"{where}[{i}]") for i, v in enumerate(value))
-    return _read_declared(value, declared, where)
-
-
-def _read_declared(value: Any, declared: Parameter, where: object) -> float:
-    return read_number(value, declared.unit, where, f" ({declared.symbol}, {declared.meaning})")
+        return tuple(read_number(item, unit, f"{where}[{i}]", about) for i, item in enumerate(value))
+    return read_number(value, unit, where, about)
 
 
 def _read_column(value: Mapping[str, Any], where: Location) -> tuple[float, ...]:

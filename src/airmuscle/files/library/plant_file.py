@@ -104,9 +104,7 @@ def _named_plant(table: Any, location: Location, reader: TableReader) -> Plant |
     if "library" not in table:
         return None
     if not isinstance(table["library"], str):
-        raise ParameterError(
-            f"{location.inside('library')} is {abridged(table['library'])}; name a plant of the library."
-        )
+        raise ParameterError(f"{location.inside('library')} is {abridged(table['library'])}; name a library plant.")
     with located_errors(location.inside("library")):
         tables, _ = plant_tables(table["library"])
     replaced = {key: value for key, value in table.items() if key != "library"}

@@ -38,24 +38,21 @@ def scale_entry(
     if not isinstance(entry, Entry):  # a valve or a product
         raise ParameterError(f"{getattr(entry, 'name', entry)!s:.80} has no law to scale; give a muscle or a law.")
     sizes = []
-    if diameter is not None:
-        size = _positive(diameter, f"{entry.name}, diameter")
-        entry = _with_diameter(entry, size)
-        sizes.append(f"a diameter of {1e3 * size:.4g} mm")
-    if resting_length is not None:
-        size = _positive(resting_length, f"{entry.name}, resting length")
-        entry = _with_resting_length(entry, size)
-        sizes.append(f"a resting length of {1e3 * size:.4g} mm")
+    for what, value, scaled in (
+        ("diameter", diameter, _with_diameter), ("resting length", resting_length, _with_resting_length),
+    ):  # fmt: skip
+        if value is not None:
+            size = _positive(value, f"{entry.name}, {what}")
+            entry = scaled(entry, size)
+            sizes.append(f"a {what} of {1e3 * size:.4g} mm")
     parts = [part for part in OPTIONAL_PARTS if getattr(entry, part) is not None]
     texts = (
         entry.note,
         f"Scaled to {' and '.join(sizes)}; not measured at this size.",
         f"Not scaled, but as at the original size: {', '.join(parts)}." if parts else "",
     )
-    changed = _fitted_values(entry) != _fitted_values(original)
-    return dataclasses.replace(
-        entry, checks=(), note=" ".join(filter(None, texts)), uncertainty=None if changed else entry.uncertainty
-    )
+    uncertainty = entry.uncertainty if _fitted_values(entry) == _fitted_values(original) else None
+    return dataclasses.replace(entry, checks=(), note=" ".join(filter(None, texts)), uncertainty=uncertainty)
 
 
 def _fitted_values(entry: Entry) -> list[float]:

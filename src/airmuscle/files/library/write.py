@@ -120,9 +120,7 @@ def entry_of(thing: Savable) -> Entry:
     remedy = ""
     if isinstance(thing, Plant):
         remedy = " A plant is written with its run: airmuscle.files.save_scenario(scenario, path)."
-    raise ParameterError(
-        f"save: {one_line(thing)} is not a muscle, a characteristic, a fit or an entry of the library.{remedy}"
-    )
+    raise ParameterError(f"save: {one_line(thing)} is no muscle, characteristic, fit or entry of the library.{remedy}")
 
 
 def _of_law(law: Characteristic) -> Entry:

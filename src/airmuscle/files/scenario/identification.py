@@ -139,9 +139,7 @@ class Record:
         """The rows from the time `first` to the time `last`."""
         kept = (recording["time"] >= row.first) & (recording["time"] <= row.last)
         if not kept.any():
-            raise ParameterError(
-                f"{recording.origin}: there is no row between first, {row.first:g} s, and last, {row.last:g} s."
-            )
+            raise ParameterError(f"{recording.origin}: no row from first, {row.first:g} s, to last, {row.last:g} s.")
         return recording.rows(kept)
 
 
@@ -243,9 +241,8 @@ def load_dynamic_fit(path: str | Path) -> DynamicFitSetup:
     check_keys(tables, ("title", "plant", "input", "observed", "fit", "record"), location)
     plant = build_plant(values.required_table(tables, "plant", location), location.inside("plant"))
     with ambient_pressure(plant.ambient.pressure):  # that of the texts
-        observed = values.read_observed(
-            values.required_table(tables, "observed", location), plant, location.at("observed")
-        )
+        stated = values.required_table(tables, "observed", location)
+        observed = values.read_observed(stated, plant, location.at("observed"))
         records = build_records(tables, tables, plant, observed, location)
         table = values.required_table(tables, "fit", location)
         fit: values.FitTable = values.table_reader(plant).build(table, location.inside("fit"), kind=values.FitTable)

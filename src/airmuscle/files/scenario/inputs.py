@@ -11,7 +11,7 @@ fill = { model = "SolenoidDriver", opening_delay = "5 ms" }     optional: one dr
 """
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from ...bench.readers import read_csv
@@ -55,9 +55,7 @@ class SignalTable:
         name = self.model or ("SampledSignal" if self.file is not None else "Schedule")
         cls = model_class(name, f"{location}, model", kind=Schedule | SampledSignal)
         if not issubclass(cls, Schedule | SampledSignal):
-            raise ParameterError(
-                f"{location}: {cls.__name__} is not an input signal; there are Schedule and SampledSignal."
-            )
+            raise ParameterError(f"{location}: {cls.__name__} is no input signal; there are Schedule, SampledSignal.")
         return cls
 
 
@@ -73,9 +71,7 @@ def build_input_signal(
     Raises ParameterError, UnitError, UnknownNameError, FileError or ColumnError with the location.
     """
     if "controller" in table:
-        raise ParameterError(
-            f"{location}: a controller is allowed only in a scenario; give the commanded inputs as rows or a file."
-        )
+        raise ParameterError(f"{location}: only a scenario has a controller; give commanded inputs as rows or a file.")
     units = {command.name: command.unit for command in commands}
     rows = {key: value for key, value in table.items() if key not in RESERVED_KEYS}
     stated = {key: value for key, value in table.items() if key in RESERVED_KEYS}
@@ -88,27 +84,23 @@ def build_input_signal(
     for key, value in rows.items():
         if key in points:
             raise ParameterError(f"{location}: '{key}' is given both by the file and by rows; remove one of them.")
-        points[key] = _read_rows(value, units[key], location.at(key))
+        points[key] = tuple(_read_rows(value, units[key], location.at(key)))
     with located_errors(location):
         signal: InputSignal = keys.signal_class(location)(points)
         signal = signal if keys.period is None else Periodic(signal, keys.period)
     return WithDrivers(signal, keys.drivers) if keys.drivers else signal
 
 
-def _read_rows(rows: Any, unit: str, where: Location) -> Points:
+def _read_rows(rows: Any, unit: str, where: Location) -> Iterator[tuple[float, float]]:
     if not isinstance(rows, list):
         raise ParameterError(
             f'{where} is {abridged(rows)}; it must be a list of instants and values, such as [["5 s", 1], ["15 s", 0]].'
         )
-    return tuple(_read_point(row, unit, where) for row in rows)
-
-
-def _read_point(row: Any, unit: str, where: Location) -> tuple[float, float]:
-    if not (isinstance(row, list) and len(row) == 2):
-        raise ParameterError(
-            f'{where} contains {abridged(row)}; each item must be an instant and a value, such as ["5 s", 1].'
-        )
-    return read_finite_number(row[0], "s", where), read_finite_number(row[1], unit, where)
+    for row in rows:
+        if not (isinstance(row, list) and len(row) == 2):
+            text = f'{where} contains {abridged(row)}; each item must be an instant and a value, such as ["5 s", 1].'
+            raise ParameterError(text)
+        yield read_finite_number(row[0], "s", where), read_finite_number(row[1], unit, where)
 
 
 def _read_file_points(

@@ -24,7 +24,7 @@ from ...bench.identify.group_refits import LEVEL, degrees_of_freedom, root_mean_
 from ...bench.identify.prediction import PlantUncertainty
 from ...bench.identify.prediction.dynamic import NORMAL_QUANTILE
 from ...bench.segment import estimate_noise, maximum_rate
-from ...core import Array, ParameterError, tree
+from ...core import ParameterError, tree
 from ...physics.plant.plant import Plant
 from ..library import Location, ParameterUncertainty, custom_field, located_errors
 from .values import BySignal, table_reader
@@ -57,7 +57,8 @@ def fit_uncertainty(fit: DynamicFit, cross: Sequence[Mapping[str, float]] = ()) 
     known = {name: value for name, value in deviations.items() if value > 0.0}
     records = [model.experiment.recording for model in models]
     table: dict[str, Any] = {"deviations": known, "records": len(models), **({"factors": factors} if factors else {})}
-    ranges = {name: _ends([record[name] for record in records]) for name in deviations}
+    columns = {name: np.concatenate([record[name] for record in records]) for name in deviations}
+    ranges = {name: [float(np.nanmin(each)), float(np.nanmax(each))] for name, each in columns.items()}
     return {**table, "ranges": ranges, "rates": {n: maximum_rate(records, n) for n in deviations}, **_covariance(fit)}
 
 
@@ -65,11 +66,6 @@ def _noise(fit: DynamicFit, name: str) -> float:
     """The rms noise of a quantity [SI] from the second differences of its residuals, which contain no model error."""
     residuals = [fit.residuals(i)[name] for i in range(len(fit.problem.record_models))]
     return root_mean_square([estimate_noise(each[np.isfinite(each)]) for each in residuals])
-
-
-def _ends(columns: Sequence[Array]) -> list[float]:
-    values = np.concatenate(columns)
-    return [float(np.nanmin(values)), float(np.nanmax(values))]
 
 
 def _covariance(fit: DynamicFit) -> dict[str, Any]:

@@ -87,9 +87,7 @@ class PlantModel:
         if "observed" in tables:
             observed = read_observed(tables["observed"], plant, location.at("observed"))
         if not observed:
-            raise ParameterError(
-                f"{location}: the scenario of the plant states no observed quantities; give them in [observed]."
-            )
+            raise ParameterError(f"{location}: the scenario states no observed quantities; give them in [observed].")
         shared = {"plant": self.tables["plant"], "input": self.tables.get("input", {}), **tables}
         deviations = {name: deviation for name, (deviation, _) in observed.items()}
         return [

@@ -23,7 +23,7 @@ Components are tables with `model` and their parameters; new components need no 
 """
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -96,7 +96,6 @@ class ScenarioTables:
 
 
 TABLES = ("title", *SCENARIO_TABLES, "observed", "uncertainty")
-RUN = tuple(field.name for field in dataclasses.fields(RunTable))
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -188,14 +187,15 @@ def _build_run(
         signal = build_control_loop(read.input, plant, signal_units(plant, initial_state), in_input)
     with located_errors(in_input):
         problem = Problem(plant, signal, run.duration, initial_state, run.start_time, run.output_times, run.integrator)
-    check_columns(read.output.columns, list(run_column_units(problem)), location.inside("output"))
+    known = list(run_column_units(problem))
+    check_known(f"{location.inside('output')}: the run has no column", read.output.columns, known)
     return Scenario(
         title=read.title.strip() or Path(location.file).stem,
         problem=problem,
         columns=read.output.columns,
         uncertainty=read.uncertainty,
         observed=read.observed,
-        defaults=tuple(key for key in RUN if key not in tables["run"]),
+        defaults=tuple(field.name for field in dataclasses.fields(RunTable) if field.name not in tables["run"]),
     )
 
 
@@ -212,11 +212,5 @@ def initial_pressure(tables: Mapping[str, Any], location: Location, plant: Plant
     if not isinstance(start, Mapping) or set(start) - {"pressure"}:
         return None
     with ambient_pressure(plant.ambient.pressure):
-        return read_finite_number(
-            start.get("pressure", 0.0), "Pa", f"{location.inside('run').inside('initial_state')}, pressure"
-        )
-
-
-def check_columns(columns: Sequence[str], known: Sequence[str], location: Location) -> None:
-    """Raise ParameterError for a column that a run does not have."""
-    check_known(f"{location}: the run has no column", columns, known)
+        place = location.inside("run").inside("initial_state").at("pressure")
+        return read_finite_number(start.get("pressure", 0.0), "Pa", place)

@@ -31,9 +31,12 @@ MAX_LISTED_CHANGES = 6
 
 def run_chapter(scenario: Scenario, recording: Recording) -> Chapter:
     """Return the chapter of a run, complete or up to its early end."""
-    loop = scenario.problem.input if isinstance(scenario.problem.input, ControlLoop) else None
-    caption, columns = f"{scenario.title}: simulated time series.", _plotted_columns(recording)
-    plots = [Plot("run", caption, partial(recording.plot, *columns))]
+    problem, reached = scenario.problem, float(recording["time"][-1])
+    loop = problem.input if isinstance(problem.input, ControlLoop) else None
+    early = f", ended early at {reached:.4g} s; the last note gives the reason" if reached < problem.end_time else ""
+    of_plant = [name for name in recording if not name.startswith((SETPOINT, MEASURED, COMMAND))]
+    columns = [name for quantity in PLOTTED for name in of_plant if name.rpartition(".")[2] == quantity]
+    plots = [Plot("run", f"{scenario.title}: simulated time series.", partial(recording.plot, *columns))]
     if loop is not None:
         plots.insert(0, loop_plot(scenario, loop, recording))
     if scenario.plant.inputs:
@@ -41,7 +44,7 @@ def run_chapter(scenario: Scenario, recording: Recording) -> Chapter:
     return Chapter(
         name="simulation",
         title=scenario.title,
-        summary=f"{_describe_duration(scenario, recording)} {len(recording)} rows; all columns are in recording.csv.",
+        summary=f"Simulation of {problem.duration:g} s{early}. {len(recording)} rows; recording.csv has all columns.",
         plots=tuple(plots),
         tables=(
             _range_table(scenario, recording),
@@ -76,18 +79,6 @@ def _scale(name: str, declared: str | None) -> tuple[float, str]:
         return 1.0, declared or ""
     factor, unit = display_scale(name)
     return factor, unit.removesuffix("-")
-
-
-def _describe_duration(scenario: Scenario, recording: Recording) -> str:
-    reached, problem = float(recording["time"][-1]), scenario.problem
-    if reached < problem.end_time:
-        return f"Simulation of {problem.duration:g} s, ended early at {reached:.4g} s; the last note gives the reason."
-    return f"Simulation of {problem.duration:g} s."
-
-
-def _plotted_columns(recording: Recording) -> list[str]:
-    columns = [name for name in recording if not name.startswith((SETPOINT, MEASURED, COMMAND))]
-    return [name for quantity in PLOTTED for name in columns if name.rpartition(".")[2] == quantity]
 
 
 def _input_plot(scenario: Scenario, recording: Recording) -> Plot:
@@ -201,8 +192,7 @@ def controller_table(scenario: Scenario, loop: ControlLoop) -> Table:
     """Return the parameters of a controller, in the units that follow from its measurement and manipulated input."""
     units = run_column_units(scenario.problem)
     y, u = (units.get(names[0]) or "1" for names in (loop.controller.measured_columns, loop.controller.inputs))
-    table = parameter_table(
-        loop.controller, "controller", f"Parameters of the controller, {type(loop.controller).__name__}"
-    )
+    title = f"Parameters of the controller, {type(loop.controller).__name__}"
+    table = parameter_table(loop.controller, "controller", title)
     resolved = [relative_unit(str(unit), y, u) for unit in table.columns["unit"]]
     return dataclasses.replace(table, columns={**table.columns, "unit": TableColumn(resolved)})

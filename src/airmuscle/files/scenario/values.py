@@ -92,23 +92,18 @@ def read_observed(table: Any, plant: Plant, where: Location) -> dict[str, tuple[
     for name, value in table.items():
         entry = value if isinstance(value, Mapping) else {"deviation": value}
         check_keys(entry, ("deviation", "column"), where.inside(name))
-        deviation = Number(signal_unit(name, plant) or "1", positive=True)(
-            entry.get("deviation"), plant, where.at(name)
-        )
-        observed[name] = deviation, read_text(entry, "column", where.inside(name), needed=False) or name
+        number = Number(signal_unit(name, plant) or "1", positive=True)
+        column = read_text(entry, "column", where.inside(name), needed=False) or name
+        observed[name] = number(entry.get("deviation"), plant, where.at(name)), column
     if not observed:
-        raise ParameterError(
-            f'{where}: no output is given; write pressure = "500 Pa", the standard deviation of its sensor.'
-        )
+        raise ParameterError(f'{where} is empty; write pressure = "500 Pa", the standard deviation of its sensor.')
     return observed
 
 
 def read_paths(value: Any, plant: Plant, where: Location) -> tuple[ParameterPaths, ...]:
     """Paths of parameters; an item may also be a list of paths with one common value. Raises ParameterError."""
     if not isinstance(value, list):
-        raise ParameterError(
-            f'{where} is {abridged(value)}; it must be a list of paths, such as ["circuit.fill.conductance"].'
-        )
+        raise ParameterError(f'{where} is {abridged(value)}; it must be a list of paths, such as ["gas.exponent"].')
     known = [leaf.path for leaf in tree.leaves(plant)]
     for item in value:
         paths = item if isinstance(item, list) and item else [item]
@@ -129,9 +124,7 @@ def read_bounds(value: Any, plant: Plant, where: Location) -> dict[str, tuple[fl
         check_keys({path: pair}, tuple(declared), where)
         place = where.at(path)
         if not isinstance(pair, list) or len(pair) != 2:
-            raise ParameterError(
-                f"{place} is {abridged(pair)}; it must be a list of minimum and maximum, such as [1.01, 1.4]."
-            )
+            raise ParameterError(f"{place} is {abridged(pair)}; it must be [minimum, maximum], such as [1.01, 1.4].")
         low, high = (read_finite_number(end, declared[path].unit, place) for end in pair)
         lower, upper = declared[path].bounds
         if low < lower or high > upper:

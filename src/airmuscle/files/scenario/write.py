@@ -22,9 +22,7 @@ def scenario_text(scenario: Scenario) -> str:
     tables = _tables(scenario)
     text = tables_toml(tables)
     if _tables(build_scenario(tomllib.loads(text), Location(scenario.title, "", Path()))) != tables:
-        raise ParameterError(
-            f"scenario '{scenario.title}': a file does not describe all of it; write it as a program in Python."
-        )
+        raise ParameterError(f"scenario '{scenario.title}': a file does not describe it all; write a Python program.")
     return text
 
 
@@ -44,18 +42,16 @@ def _tables(scenario: Scenario) -> dict[str, Any]:
             f"scenario '{scenario.title}': a file does not describe a continued run, or output times that are not "
             "equidistant; write it as a program in Python."
         )
-    run: dict[str, Any] = {"duration": problem.duration, "start_time": problem.start_time}
-    if problem.output_times is not None:
-        run["output_times"] = problem.output_times
-    run["initial_state"] = dict(scenario.initial_state)
-    if problem.integrator is not None:
-        run["integrator"] = problem.integrator
+    run: dict[str, Any] = {
+        "duration": problem.duration, "start_time": problem.start_time, "output_times": problem.output_times,
+        "initial_state": dict(scenario.initial_state), "integrator": problem.integrator,
+    }  # fmt: skip
     signal = problem.input
     return {
         "title": scenario.title,
         "plant": {key: value for key, value in model_table(scenario.plant).items() if key != "model"},
         "input": _loop_table(signal, scenario.plant) if isinstance(signal, ControlLoop) else _signal_table(signal),
-        "run": run,
+        "run": {key: value for key, value in run.items() if value is not None},
         **({"output": {"columns": list(scenario.columns)}} if scenario.columns else {}),
     }
 
