@@ -4,7 +4,7 @@ import functools
 from typing import ClassVar
 
 from ...core import ParameterError, Reference, Value, model, ops, parameter, published
-from ...engine.loop import Commanded, Measurement, Memory, Sampled, SisoController, commands, range_of
+from ...engine.loop import Measurement, Memory, Sampled, SisoController, commands, range_of
 from .sliding_mode import SLIDING_MEMORY, sliding_variable
 
 ASTROM_HAGGLUND1995 = published("astrom-hagglund-1995")
@@ -30,8 +30,6 @@ class PID(SisoController):
 
     references: ClassVar[tuple[Reference, ...]] = (ASTROM_HAGGLUND1995,)
 
-    measured: str
-    commanded: Commanded
     gain: float = parameter("u/y", "K", "proportional gain")
     integral_time: float = parameter("s", "T_i", "integral time; 0: no integral", bounds=(0.0, 1e6), default=0.0)
     derivative_time: float = parameter("s", "T_d", "derivative time; 0: no derivative", bounds=(0.0, 1e6), default=0.0)
@@ -95,8 +93,6 @@ class OnOffController(SisoController):
 
     references: ClassVar[tuple[Reference, ...]] = (ASTROM_HAGGLUND1995,)
 
-    measured: str
-    commanded: Commanded
     hysteresis: float = parameter(
         "y", "H", "width between switching on and off", bounds=(0.0, float("inf")), default=0.0
     )
@@ -124,8 +120,6 @@ class DeadZoneController(SisoController):
 
     references: ClassVar[tuple[Reference, ...]] = (ASTROM_HAGGLUND1995,)
 
-    measured: str
-    commanded: Commanded
     zone: float = parameter("y", "Z", "half width of the dead zone", bounds=(0.0, 1e9))
     release: float = parameter(
         "1", "z", "share of the dead zone at which a valve closes", bounds=(0.0, 1.0), default=0.5

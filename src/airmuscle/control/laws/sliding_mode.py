@@ -3,7 +3,7 @@
 from typing import ClassVar
 
 from ...core import Reference, Value, model, ops, parameter, published
-from ...engine.loop import Commanded, Measurement, Memory, Sampled, SisoController, commands, range_of
+from ...engine.loop import Measurement, Memory, Sampled, SisoController, commands, range_of
 
 SLIDING_MEMORY: Memory = {"started": 0.0, "error": 0.0, "error_rate": 0.0}
 """Whether it has started (0 or 1), the last error and its filtered derivative."""
@@ -36,8 +36,6 @@ class SlidingMode(SisoController):
 
     references: ClassVar[tuple[Reference, ...]] = (SLOTINE_SASTRY1983,)
 
-    measured: str
-    commanded: Commanded
     amplitude: float = parameter("u", "K", "command outside the boundary layer")
     sliding_time: float = parameter("s", "T_s", "time constant of the error on s = 0", bounds=(0.0, 1e3), default=0.0)
     boundary_layer: float = parameter("y", "phi", "half width of the boundary layer", bounds=(0.0, 1e9), default=0.0)
@@ -74,8 +72,6 @@ class SuperTwisting(SisoController):
 
     references: ClassVar[tuple[Reference, ...]] = (LEVANT1993,)
 
-    measured: str
-    commanded: Commanded
     proportional: float = parameter("u/y^0.5", "k_1", "gain of the square root, in SI units", bounds=(0.0, 1e12))
     integral: float = parameter("u/s", "k_2", "rate of the integral", bounds=(0.0, 1e12))
     sliding_time: float = parameter("s", "T_s", "time constant of the error on s = 0", bounds=(0.0, 1e3), default=0.0)

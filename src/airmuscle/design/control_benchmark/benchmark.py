@@ -115,10 +115,6 @@ class BenchmarkResult(ShortRepr):
         return f"{counted(len(self.seeds), 'search')} on {counted(len(self.truths), 'truth')}"
 
     @property
-    def _by_name(self) -> dict[tuple[str, int], ContenderResult]:
-        return {(each.name, each.seed): each for each in self.results}
-
-    @property
     def groups(self) -> tuple[Group, ...]:
         """The groups that have contenders."""
         return tuple(group for group in Group if self.contenders(group))
@@ -130,10 +126,8 @@ class BenchmarkResult(ShortRepr):
 
     def values(self, contender: str, task: str, metric: str, group: Group = Group.MODELS) -> Array:
         """A metric of a contender in a task, (searches, truths); infinite where a run ended early."""
-        runs = [
-            [self._by_name[contender, seed].runs[RunKey(group, truth, task)].metrics for truth in self.truths]
-            for seed in self.seeds
-        ]
+        of_seeds = {each.seed: each.runs for each in self.results if each.name == contender}
+        runs = [[of_seeds[seed][RunKey(group, truth, task)].metrics for truth in self.truths] for seed in self.seeds]
         return np.array([[math.inf if m is None else float(getattr(m, metric)) for m in row] for row in runs])
 
     def metric(self, contender: str, task: str, metric: str, group: Group = Group.MODELS) -> Spread:
@@ -213,8 +207,7 @@ def benchmark_controllers(
 def _benchmark_task(
     options: Mapping[str, Any], task: tuple[Contender, tuple[ContenderResult, ...]]
 ) -> tuple[ContenderResult, ...]:
-    contender, tuned_as = task
-    return benchmark_contender(contender=contender, tuned_as=tuned_as, **options)
+    return benchmark_contender(contender=task[0], tuned_as=task[1], **options)
 
 
 def benchmark_contender(

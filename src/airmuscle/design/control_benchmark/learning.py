@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from ...control.laws.iterative_learning import IterativeLearning
-from ...core import Array, ParameterError, ShortRepr, leaves
+from ...core import Array, ParameterError, ShortRepr, check_whole, leaves
 from ...engine.loop import Driver, WithSensors
 from ...engine.run import simulate
 from ...physics.plant.plant import Plant
@@ -57,8 +57,7 @@ def learn(
             f"learn: contender '{contender.name}' has no set points '{SIGNAL}' and '{RATE}', which are learned, or is "
             "no ControlLaw."
         )
-    if trials < 2:
-        raise ParameterError(f"learn: {trials} trials; give at least 2.")
+    check_whole("learn", "trials", trials, 2)
     signals = task_signals(joint, task)
     count = round(task.duration / joint.sample_time)
     lead = next((leaf.value for leaf in leaves(law) if leaf.path.endswith("lead_time")), 0.0)

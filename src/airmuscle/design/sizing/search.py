@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterable
 
 import numpy as np
 
-from ...core import AirmuscleError, AirmuscleWarning, ParameterError, ShortRepr, SolveError
+from ...core import AirmuscleError, AirmuscleWarning, ParameterError, ShortRepr, SolveError, check_whole
 from ...files.library import LAWS, Entry, list_laws, list_products, load_law, own_length, read_toml
 from .choice import MuscleChoice, Requirement, SortKey, UnsuitableMuscle, by_air, rank
 from .joint import JointSearch
@@ -164,8 +164,7 @@ def choose(entry: Entry, requirement: Requirement, conditions: SizingConditions,
 
     Raises SolveError or ParameterError, with the reason, if there are none.
     """
-    if isinstance(count, bool) or not isinstance(count, int) or count < 1:
-        raise ParameterError(f"choose: count is {count!r}; it must be an integer of at least 1.")
+    check_whole("choose", "count", count, 1)
     kind = LiftSearch if isinstance(requirement, LiftRequirement) else JointSearch
     search: Search = kind(requirement, conditions, count)  # type: ignore[arg-type]
     lengths = length_range(entry, conditions.max_length)

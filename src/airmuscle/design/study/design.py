@@ -8,6 +8,7 @@ import abc
 import dataclasses
 import math
 from collections.abc import Sequence
+from typing import ClassVar
 
 import numpy as np
 
@@ -71,23 +72,23 @@ class Grid(Design):
 class SampledDesign(Design):
     """Random design of `count` points, reproducible by its seed."""
 
+    balanced: ClassVar[bool] = False
+    """Whether the points are balanced only if their number is a power of two."""
     count: int = custom_field(read_count, "number of points")
     seed: int = custom_field(read_count, "seed of the random number generator", default=0)
 
     def __post_init__(self) -> None:
         if self.count < 1:
             raise ParameterError(f"{type(self).__name__}: count is {self.count}; it must be at least 1.")
-
-    def run_count(self, variations: Sequence[Variation]) -> int:
-        return self.count
-
-    def _check_power_of_two(self) -> None:
-        if self.count & (self.count - 1):
+        if self.balanced and self.count & (self.count - 1):
             below = 1 << (self.count.bit_length() - 1)
             raise ParameterError(
                 f"{type(self).__name__}: count is {self.count}; Sobol points are balanced only if their number is a "
                 f"power of two. Use {below} or {2 * below}."
             )
+
+    def run_count(self, variations: Sequence[Variation]) -> int:
+        return self.count
 
 
 class MonteCarlo(SampledDesign):
@@ -113,9 +114,7 @@ class LatinHypercube(SampledDesign):
 class Sobol(SampledDesign):
     """Scrambled Sobol points, a low-discrepancy sequence; `count` is a power of two. A larger count adds points."""
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self._check_power_of_two()
+    balanced: ClassVar[bool] = True
 
     def _unit_points(self, variations: Sequence[Variation]) -> Array:
         return _sobol_points(len(variations), self.count, self.seed)
@@ -128,9 +127,7 @@ class Saltelli(SampledDesign):
     from B, and the run B. Saltelli et al., Computer Physics Communications 181 (2010) 259-270.
     """
 
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        self._check_power_of_two()
+    balanced: ClassVar[bool] = True
 
     def run_count(self, variations: Sequence[Variation]) -> int:
         return self.count * (len(variations) + 2)

@@ -36,10 +36,6 @@ class CaseMetrics(ShortRepr):
     def __len__(self) -> int:
         return len(self.index)
 
-    def part(self, rows: npt.NDArray[np.intp]) -> "CaseMetrics":
-        """The metrics of some of the sets of gains."""
-        return CaseMetrics(self.index[rows], self.air[rows], self.travel[rows], self.completed[rows])
-
 
 Objective = Callable[[CaseMetrics], npt.ArrayLike]
 
@@ -74,11 +70,11 @@ class RobustObjective:
         values = np.full(len(metrics), np.inf)
         complete = np.flatnonzero(np.isfinite(metrics.index).all(axis=1))
         if complete.size:
-            part = metrics.part(complete)
-            worst = np.quantile(part.index, self.quantile, axis=1)
-            values[complete] = part.index.mean(axis=1) + self.quantile_weight * worst
-            values[complete] += self.air_weight * part.air.mean(axis=1)
-            values[complete] += self.travel_weight * part.travel.mean(axis=1)
+            index, air, travel = (each[complete] for each in (metrics.index, metrics.air, metrics.travel))
+            worst = np.quantile(index, self.quantile, axis=1)
+            values[complete] = index.mean(axis=1) + self.quantile_weight * worst
+            values[complete] += self.air_weight * air.mean(axis=1)
+            values[complete] += self.travel_weight * travel.mean(axis=1)
         return values
 
 
@@ -174,12 +170,9 @@ class Tuning(ShortRepr):
     @property
     def on_bound(self) -> Mapping[str, float]:
         """The best gains that lie on a bound of their range, within 1 % of it."""
-        near = {}
-        for each in self.ranges:
-            place = float(each.to_unit(np.array(self.gains[each.path])))
-            if not 0.01 <= place <= 0.99:
-                near[each.path] = self.gains[each.path]
-        return near
+        gains = self.gains
+        places = {each.path: float(each.to_unit(np.array(gains[each.path]))) for each in self.ranges}
+        return {path: gains[path] for path, place in places.items() if not 0.01 <= place <= 0.99}
 
     @property
     def references(self) -> list[Reference]:

@@ -173,9 +173,7 @@ def load_scenario_loop(path: str | Path) -> ScenarioLoop:
             f"{location}: there is no [input.controller]; tune needs a controller with its gains, sample_time and "
             "setpoint. Of a plant of the library write a scenario file with [plant] library and [input.controller]."
         )
-    file = Path(path)
-    text = file.read_bytes().decode("utf-8-sig")
-    return ScenarioLoop(file, text, tables, scenario)
+    return ScenarioLoop(Path(path), Path(path).read_bytes().decode("utf-8-sig"), tables, scenario)
 
 
 def _tuned(known: Sequence[Leaf]) -> list[Leaf]:

@@ -141,6 +141,7 @@ def commands(commanded: Commanded, output: Value) -> dict[str, Value]:
     return {commanded.positive: ops.maximum(output, 0.0), commanded.negative: ops.maximum(-output, 0.0)}
 
 
+@model
 class SisoController(ControlLaw):
     """A control law that compares one column, `measured`, with its set point; `commanded` is the manipulated input."""
 

@@ -132,10 +132,9 @@ def recorded_pressures(plant: Plant, recording: Recording) -> dict[str, float]:
     columns = [name for name in recording if name.rpartition(".")[2] == PRESSURE]
     found = {}
     for prefix in plant.prefixes:
-        own = [name for name in columns if name.startswith(prefix)]
-        own.sort(key=lambda name: name != f"{prefix}{PRESSURE}")
-        if own:
-            found[f"{prefix}{PRESSURE}"] = first_value(recording, own[0])
+        muscle = f"{prefix}{PRESSURE}"
+        if own := [name for name in columns if name.startswith(prefix)]:
+            found[muscle] = first_value(recording, muscle if muscle in own else own[0])
     return found
 
 
