@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import functools
+import gc
 import importlib
 import inspect
 import re
@@ -34,7 +35,21 @@ def name_of(path: Path) -> str:
 
 @functools.cache
 def tree_of(path: Path) -> ast.Module:
-    return ast.parse(path.read_text(encoding="utf-8"))
+    gc.disable()  # whose searches among the nodes, which all remain, take longer than parsing
+    try:
+        return ast.parse(path.read_text(encoding="utf-8"))
+    finally:
+        gc.enable()
+
+
+def statements(tree: ast.Module) -> list[ast.AST]:
+    """The statements of a file, also those inside others; expressions contain none."""
+    found: list[ast.AST] = [tree]
+    for node in found:  # which grows meanwhile
+        for block in ("body", "orelse", "handlers", "finalbody", "cases"):
+            inner = getattr(node, block, None)
+            found += inner if isinstance(inner, list) else ()
+    return found
 
 
 # Files and functions
@@ -65,7 +80,7 @@ def test_functions_have_40_lines_at_most():
         f"{name_of(path)}:{node.lineno} {node.name}": body_length(node)
         - (node.body[0].lineno - node.lineno if path.parent == kernels else 0)
         for path in FILES
-        for node in ast.walk(tree_of(path))
+        for node in statements(tree_of(path))
         if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef)
     }
     assert {name: n for name, n in lengths.items() if n > 40} == {}
@@ -101,7 +116,7 @@ def imported(path: Path) -> set[str]:
     """Full names of the modules that a file of the package imports, with relative imports resolved."""
     package = ["airmuscle", *path.relative_to(SOURCE).parts[:-1]]
     modules: set[str] = set()
-    for node in ast.walk(tree_of(path)):
+    for node in statements(tree_of(path)):
         if isinstance(node, ast.Import):
             modules |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom):
@@ -121,7 +136,7 @@ def test_the_rooms_have_60_arrows_and_10_floors_at_most():
         below[room] |= {name.split(".")[1] for name in imported(path) if "." in name}
     for path in (ROOT / "benchmarks").glob("*.py"):
         names = {
-            name for node in ast.walk(tree_of(path)) if isinstance(node, ast.ImportFrom) for name in [node.module or ""]
+            name for node in statements(tree_of(path)) if isinstance(node, ast.ImportFrom) for name in [node.module or ""]
         }
         below["benchmarks"] |= {name.split(".")[1] for name in names if name.startswith("airmuscle.")}
     rooms = {path.parent.name for path in SOURCE.glob("*/__init__.py")}
@@ -223,7 +238,7 @@ def is_own(node: ast.AST) -> bool:
 def own_imports_below_the_top(path: Path) -> list[ast.AST]:
     """Imports from airmuscle inside functions, classes and conditions."""
     tree = tree_of(path)
-    return [node for node in ast.walk(tree) if is_own(node) and node not in tree.body]
+    return [node for node in statements(tree) if is_own(node) and node not in tree.body]
 
 
 def test_own_imports_are_at_the_top_of_a_file():
@@ -284,7 +299,7 @@ def is_module(name: str) -> bool:
 
 def names_outside_faces(code: str) -> Iterator[str]:
     """Imported modules that are no rooms, and imported names that are not in `__all__` of their room."""
-    for node in ast.walk(ast.parse(code)):
+    for node in statements(ast.parse(code)):
         if isinstance(node, ast.ImportFrom) and is_own(node):
             face = face_of(node.module) if node.module.count(".") <= 1 else None
             if face is None:
@@ -327,7 +342,7 @@ def test_tests_import_inner_modules_119_times_at_most():
     inner = [
         (path, node.module)
         for path in (ROOT / "tests").rglob("*.py")
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        for node in statements(tree_of(path))
         if isinstance(node, ast.ImportFrom) and (node.module or "").startswith("airmuscle.")
         if (face := face_of(node.module)) is None
         or any(not (alias.name in face or is_module(f"{node.module}.{alias.name}")) for alias in node.names)
