@@ -136,7 +136,10 @@ def test_the_rooms_have_60_arrows_and_10_floors_at_most():
         below[room] |= {name.split(".")[1] for name in imported(path) if "." in name}
     for path in (ROOT / "benchmarks").glob("*.py"):
         names = {
-            name for node in statements(tree_of(path)) if isinstance(node, ast.ImportFrom) for name in [node.module or ""]
+            name
+            for node in statements(tree_of(path))
+            if isinstance(node, ast.ImportFrom)
+            for name in [node.module or ""]
         }
         below["benchmarks"] |= {name.split(".")[1] for name in names if name.startswith("airmuscle.")}
     rooms = {path.parent.name for path in SOURCE.glob("*/__init__.py")}

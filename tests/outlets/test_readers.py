@@ -279,7 +279,9 @@ def test_tdms_channels_without_a_common_time(tmp_path: Path):
         parts = {"p [kPa]": PRESSURE, "F [N]": FORCE[:7]}
         file.write_segment([nptdms.ChannelObject("g", name, values) for name, values in parts.items()])
     said = refusal(ColumnError, tmp_path / "run.tdms")
-    assert "run.tdms: the channels have different rows (p [kPa] 40, F [N] 7), and no time is stated for p [kPa]." in said
+    assert (
+        "run.tdms: the channels have different rows (p [kPa] 40, F [N] 7), and no time is stated for p [kPa]." in said
+    )
 
 
 def test_tdms_channels_with_different_start_times_share_their_common_time(tmp_path: Path):
