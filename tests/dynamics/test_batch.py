@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 from joints import chosen_muscle, joint, joint_start
 
-from airmuscle.core import StateVariable, System, model, ops, parameter, parts_of, tree
+from airmuscle.core import StateVariable, System, model, ops, parameter, tree
 from airmuscle.engine import (
     ZERO_INPUT,
     BatchSolution,
@@ -621,7 +621,7 @@ def test_rows_that_go_together_are_checked_at_once(monkeypatch):
     check, checked = variations.check_together, []
     monkeypatch.setattr(variations, "check_together", lambda part: (checked.append(part), check(part)))
     assert variations.variations_of(plant, columns, None).values.shape == (4, len(paths))
-    assert [type(part) for part in checked] == [type(part) for _, part in parts_of(plant)]
+    assert [type(part) for part in checked] == [type(part) for _, part in variations.parts_of(plant)]
 
 
 def test_a_limit_of_the_validity_range_beyond_its_bounds_names_the_row():

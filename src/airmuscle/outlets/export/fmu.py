@@ -143,14 +143,13 @@ def _instance(
     lowest = [*known.lower_bounds.tolist(), *(-float("inf") for _ in known.input_names)]
     positive = set(known.positive_outputs.tolist())
     lowest += [5e-324 if i in positive else -float("inf") for i in range(len(known.output_names))]
-    rows = "".join(
+    ranges = "".join(
         f"  {{{column}, {c_number(low)}, {c_number(high)}, {c_string(text)}}},\n" for column, low, high, text in limits
     )
     upper, bounds = name.upper(), [leaf.declared.bounds for leaf in system.tunable]
     scales = indicators.scales(initial, np.array(inputs), system.defaults, system.compiled.nominal)
-    indices = {
-        "rows": [row for row, _ in derivatives.places], "columns": [column for _, column in derivatives.places],
-        "pressure_rows": [each.row for each in starts], "air_masses": [each.air_mass for each in starts],
+    indices = {"rows": [row for row, _ in derivatives.places], "columns": [column for _, column in derivatives.places],
+               "pressure_rows": [each.row for each in starts], "air_masses": [each.air_mass for each in starts],
     }  # fmt: skip
     constants = [
         c_strings(f"static const char *const {name}_names[]", known.column_names),
@@ -160,14 +159,11 @@ def _instance(
         c_array(f"static const double {name}_lowest[{upper}_PARAMETERS + 1]", [low for low, _ in bounds], 1),
         c_array(f"static const double {name}_highest[{upper}_PARAMETERS + 1]", [high for _, high in bounds], 1),
         c_array(f"static const double {name}_scales[{upper}_INDICATORS + 1]", scales, 1),
-        *(
-            f"static const int {name}_{key}[] = {{{', '.join(map(str, [*values, 0]))}}};\n"
-            for key, values in indices.items()
-        ),
+        *(f"static const int {name}_{key}[] = {{{', '.join(map(str, [*at, 0]))}}};\n" for key, at in indices.items()),
         c_array(f"static const double {name}_start_pressures[]", [each.pressure for each in starts], 1),
         "/* Ranges that are reported once when a column leaves them. */\n"
         f"static const struct {{\n  int column;\n  double low, high;\n  const char *text;\n}} {name}_limits[] = {{\n"
-        f'{rows}  {{0, 0.0, 0.0, ""}}\n}};\n',
+        f'{ranges}  {{0, 0.0, 0.0, ""}}\n}};\n',
     ]
     return {
         "file": name, "token": token, "partials": str(len(derivatives.places)), "limits": str(len(limits)),
