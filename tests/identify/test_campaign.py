@@ -399,8 +399,8 @@ def test_a_planned_run_is_described_by_its_levels():
 
 def test_the_specimen_that_does_not_follow_the_others_is_noted(monkeypatch):
     """Four muscles of one type; the third has 70 % of the force."""
-    kept = "airmuscle.bench.identify.model_selection.standard_candidates"
-    monkeypatch.setattr(kept, lambda runs: standard_candidates(runs)[2:5])
+    kept = "airmuscle.bench.identify.model_selection.started_candidates"
+    monkeypatch.setattr(kept, lambda runs: (standard_candidates(runs)[2:5], ()))
     random, time, runs = np.random.default_rng(2), np.linspace(0.0, 60.0, 60), []
     contraction = 0.06 - 0.05 * np.cos(2 * np.pi * time / 60.0)
     for name, length in zip("abcd", (0.1, 0.2, 0.28, 0.4), strict=True):

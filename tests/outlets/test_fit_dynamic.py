@@ -248,7 +248,7 @@ REFUSED = {
     "an unknown path in bounds": ('"gas.exponent" =', '"gas.exponen" =', "Did you mean 'gas.exponent'"),
     "bounds upside down": ("[1.01, 1.4]", "[1.4, 1.01]", "the minimum must be less than the maximum"),
     "bounds beyond what can be": ("[1.01, 1.4]", "[1.0, 1.4]", "allowed range: 1.001 to 1.667"),
-    "one bound": ("[1.01, 1.4]", "1.4", r"it must be \[minimum, maximum\]"),
+    "one bound": ("[1.01, 1.4]", "1.4", "it must be [minimum, maximum]"),
     "bounds of another kind": ("[1.01, 1.4]", '["1 m", 1.4]', "unit 'm' cannot be converted to"),
     "a start beyond its bounds": (
         "[1.01, 1.4]",

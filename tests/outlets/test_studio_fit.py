@@ -325,7 +325,7 @@ def result(tmp_path_factory):
     (recording,) = read(folder / "Messung.csv", ColumnMapping(columns=HEADINGS))
     kept = (np.arange(len(recording)) >= 2) & (recording["contraction"] < 0.159)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(model_selection, "standard_candidates", lambda runs: standard_candidates(runs)[1:4])
+        patch.setattr(model_selection, "started_candidates", lambda runs: (standard_candidates(runs)[1:4], ()))
         task = fit_of(app, settings)
         return app, task, compare(recording.rows(kept), leave_out=LevelSplit("contraction"))
 
@@ -380,7 +380,7 @@ def test_the_numbers_are_those_of_the_library(result):
 def test_the_specimen_that_does_not_follow_the_others_is_named(tmp_path):
     text = "Specimen c does not follow the others."
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(model_selection, "standard_candidates", lambda runs: standard_candidates(runs)[1:3])
+        patch.setattr(model_selection, "started_candidates", lambda runs: (standard_candidates(runs)[1:3], ()))
         patch.setattr("airmuscle.outlets.requests.fitting.odd_specimen_notes", lambda errors: [text])
         app = make_app(tmp_path)
         task = fit_of(app, {"columns": COLUMNS, "resting_length": "300 mm"})
@@ -396,7 +396,9 @@ def test_the_muscle_has_the_braid_of_the_page_unless_its_law_has_one(tmp_path, l
     fixed = ("geometry.resting_length", "wall_thickness", "c1", "c2", "c3", "geometry.radius")
     with pytest.MonkeyPatch.context() as patch:
         chosen = [Candidate("own", LAW, fixed)] if laws.start == 0 else None
-        patch.setattr(model_selection, "standard_candidates", lambda runs: chosen or standard_candidates(runs)[laws])
+        patch.setattr(
+            model_selection, "started_candidates", lambda runs: (chosen or standard_candidates(runs)[laws], ())
+        )
         app = make_app(tmp_path)
         task = fit_of(app, {"columns": COLUMNS, "resting_length": "300 mm", **BRAID})
     (tmp_path / "muscle.toml").write_bytes(request(app, "GET", f"/api/fit/task/{task}/muscle.toml").body)

@@ -24,10 +24,13 @@ def remembered(analyse: Analysis) -> Analysis:
     results: weakref.WeakKeyDictionary[Recording, _Known] = weakref.WeakKeyDictionary()
 
     @functools.wraps(analyse)
-    def remembering(recordings: Any, *texts: Any, **options: Any) -> Any:
+    def remembering(*arguments: Any, **options: Any) -> Any:
+        if options or not arguments or not all(isinstance(text, str) for text in arguments[1:]):
+            return analyse(*arguments, **options)
+        recordings, *texts = arguments
         several = (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
-        if options or not several or not all(isinstance(text, str) for text in texts):
-            return analyse(recordings, *texts, **options)
+        if not several:
+            return analyse(*arguments)
         known, key = results.setdefault(several[0], {}), (*map(id, several), *texts)
         stored = known.get(key)
         if stored is None or any(ref() is not each for ref, each in zip(stored[0], several, strict=True)):
