@@ -18,6 +18,7 @@ from airmuscle.papers.hosovsky_plant import (
     FILLING,
     MATRIX,
     MATRIX_BY_VOLUME,
+    SCHEDULE,
     UnpublishedParameters,
     hanging_load,
     latched_load,
@@ -212,9 +213,7 @@ def test_a_component_in_the_limit_of_the_printed_one_changes_nothing(nothing):
 def test_the_effects_are_differences_of_two_runs(effects):
     adiabatic = next(e for e in effects if e.substitution.component == "first law, adiabatic")
     runs = [
-        simulate(
-            plant(NUMBERS, hanging_load(NUMBERS), gas=gas), stages.SCHEDULE, duration=25.0, output_times=adiabatic.time
-        )
+        simulate(plant(NUMBERS, hanging_load(NUMBERS), gas=gas), SCHEDULE, duration=25.0, output_times=adiabatic.time)
         for gas in (Isothermal(), EnergyBalance(0.0))
     ]
     np.testing.assert_allclose(runs[1]["pressure"] - runs[0]["pressure"], adiabatic.pressure, atol=30.0)
@@ -350,7 +349,7 @@ def test_ideal_gas_and_reference_density_are_negligible_causes(effects):
 
 
 def test_the_step_lies_in_the_range_of_the_sensor_only_as_absolute_pressure():
-    absolute, gauge, hysteresis = hosovsky_claims.measurement_claims()
+    absolute, gauge, hysteresis = (claim for row in hosovsky_claims.MEASUREMENT for claim in row.claims(""))
     assert (absolute.reproduced, absolute.verdict) == (pytest.approx(0.548675), HOLDS)
     assert (gauge.verdict, hysteresis.verdict) == (DIFFERS, NOT_TESTABLE)
 

@@ -3,8 +3,6 @@
 The measurements and figures of the paper are lost; its three printed plane curves serve as data.
 """
 
-from collections.abc import Mapping
-
 import numpy as np
 
 import airmuscle as am
@@ -14,20 +12,10 @@ from ..bench.identify.surface.exponential import SurfaceFit, SurfaceProblem, fit
 from ..core import STANDARD_GRAVITY, Array
 from ..physics.muscle.characteristic.borzikova import BORZIKOVA, SAM_30X290, PlaneCurves
 from ..report.chapter import Chapter
-from ..report.claims import AtLeast, Claim, ClaimRow, Equal, Kind
+from ..report.claims import AtLeast, Claim, ClaimRow, Equal, Kind, claims_of
 from ..report.formatting import format_number, typographic
-from .borzikova_surfaces import (
-    AS_EXPONENT,
-    CORRECTED,
-    EXPONENTIAL,
-    MISPRINT_CORRECTED,
-    PRINTED,
-    index_on_curves,
-    plots,
-    round_contraction,
-    sample,
-    surfaces,
-)
+from . import borzikova_surfaces as drawn
+from .borzikova_surfaces import Laws, index_on_curves, plots, round_contraction, sample, surfaces
 from .borzikova_tables import CATALOGUE_TABLE, CATALOGUE_TEXT, tables
 from .run import chapter_texts
 
@@ -37,25 +25,8 @@ MAX_LINEARISATIONS = 50
 MEASURED_DIAMETER = 30
 """Nominal diameter of the measured muscle [mm]."""
 SATURATION = SAM_30X290.curves[0].saturation
-
-Laws = Mapping[str, am.characteristic.ContractionLaw]
-CHOSEN = (
-    ("maximum pressure", "3.5 bar", "inferred: the catalogue pressure; the range is not printed"),
-    ("loads", "45, 130, 260 N", "printed for 4.5, 13, 26 kg"),
-    (r"\(k_\text{max}\)", "40 %", "printed"),
-    ("pressures sampled on each curve", "15, evenly spaced", "chosen: the number of measured points is lost"),
-    (
-        "disturbances",
-        "rounding to 0.5 %; normally distributed noise, standard deviation 0.5 %, seeds 0 to 99",
-        "chosen",
-    ),
-    (
-        r"\(a_{02}\), \(a_{12}\), \(a_{22}\) of the corrected matrix",
-        "−7.55 × 10⁻⁵, 0.002404, −0.002259",
-        "misprint; within rounding of the print",
-    ),
-    ("minimum slope of the monotone fit", "10⁻⁹, scaled", "chosen"),
-)
+SURFACES = (drawn.AS_EXPONENT, drawn.PRINTED, drawn.MISPRINT_CORRECTED, drawn.CORRECTED, drawn.EXPONENTIAL)
+"""Surfaces that are compared with the printed correlation indices."""
 
 
 def chapter() -> Chapter:
@@ -68,7 +39,6 @@ def chapter() -> Chapter:
         tables=tables(curves, laws),
         plots=plots(curves, laws),
         references=(BORZIKOVA,),
-        chosen=CHOSEN,
         **chapter_texts(PAPER),
     )
 
@@ -105,9 +75,8 @@ def fit_gauss_newton(recording: am.Recording, saturation: float) -> SurfaceFit:
     """
     problem = SurfaceProblem.from_recording(recording, saturation, 4, 2)
     targets, weights = problem.linear_targets()
-    coefficients: Array = np.asarray(
-        np.linalg.lstsq(weights[:, None] * problem.design_matrix, weights * targets, rcond=None)[0], dtype=float
-    )
+    design = weights[:, None] * problem.design_matrix
+    coefficients: Array = np.asarray(np.linalg.lstsq(design, weights * targets, rcond=None)[0], dtype=float)
     for _ in range(MAX_LINEARISATIONS):
         error = problem.contraction - problem.predict(coefficients)
         step = np.asarray(np.linalg.lstsq(problem.jacobian(coefficients), error, rcond=None)[0], dtype=float)
@@ -121,13 +90,12 @@ def largest_contraction(curves: PlaneCurves, load: str) -> tuple[float, str]:
     """Return the maximum [%] of the curve at the smallest or largest load."""
     curve = {"smallest": min, "largest": max}[load](curves.curves, key=lambda c: c.force)
     pressures = np.linspace(0.0, curves.max_pressure, 351)
-    heading = f"Maximum of the plane curve at {curve.force:g} N, "
-    heading += "the smallest load" if load == "smallest" else "a smaller load"
-    rest = {
-        "smallest": "The tolerance is chosen. The saturation is approached beyond the range.",
-        "largest": "The text gives no pressure: at a higher one it may hold.",
-    }
-    note = f"{heading}, up to {curves.max_pressure / 1e5:g} bar. {rest[load]}"
+    which, rest = {
+        "smallest": ("the smallest", "The tolerance is chosen. The saturation is approached beyond the range."),
+        "largest": ("a smaller", "The text gives no pressure: at a higher one it may hold."),
+    }[load]
+    place = f"{curve.force:g} N, {which} load, up to {curves.max_pressure / 1e5:g} bar"
+    note = f"Maximum of the plane curve at {place}. {rest}"
     return 100.0 * float(np.max(curve.contraction(pressures))), note
 
 
@@ -161,7 +129,7 @@ CURVES: tuple[ClaimRow, ...] = tuple(
 SURFACE = ClaimRow(
     "correlation index of the surface on the three plane curves, not below the minimum printed for these",
     AtLeast(min(c.printed_index for c in SAM_30X290.curves), 0.0005, derived=True), "1", surface_index,
-    cases={name: (name,) for name in (AS_EXPONENT, PRINTED, MISPRINT_CORRECTED, CORRECTED, EXPONENTIAL)},
+    cases={name: (name,) for name in SURFACES},
     place="equation (1), printed matrix",
 )  # fmt: skip
 RANK = ClaimRow(
@@ -207,12 +175,11 @@ MUSCLE: tuple[ClaimRow, ...] = (
 def claims(curves: PlaneCurves, laws: Laws) -> tuple[Claim, ...]:
     """Return all claims of the paper for these curves and surfaces."""
     data = sample(curves)
-    subjects: tuple[tuple[tuple[ClaimRow, ...], tuple[object, ...]], ...] = (
-        (CURVES, ()),
-        ((SURFACE,), (curves, laws)),
-        ((RANK,), (data,)),
-        ((PROCEDURE,), (round_contraction(data),)),
-        ((LOAD, *CATALOGUE), ()),
-        (MUSCLE, (curves,)),
+    return (
+        *claims_of(CURVES, PAPER),
+        *SURFACE.claims(PAPER, curves, laws),
+        *RANK.claims(PAPER, data),
+        *PROCEDURE.claims(PAPER, round_contraction(data)),
+        *claims_of((LOAD, *CATALOGUE), PAPER),
+        *claims_of(MUSCLE, PAPER, curves),
     )
-    return tuple(claim for rows, subject in subjects for row in rows for claim in row.claims(PAPER, *subject))

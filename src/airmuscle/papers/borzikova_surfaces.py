@@ -12,11 +12,15 @@ import airmuscle as am
 from ..bench.identify.statistics import CorrelationIndex, correlation_index
 from ..bench.identify.surface.basis import LoadRange
 from ..bench.identify.surface.monotonicity import fit_monotone
-from ..core import AirmuscleWarning, autodiff, bar
+from ..core import AirmuscleWarning, Array, autodiff, bar
 from ..core.plotting import BLACK, BLUE, DASHES, LINES, MARKERS, ORANGE, RED, legend_outside, new_figure
 from ..files.library.entry_file import load_law
 from ..physics.muscle.characteristic.borzikova import SAM_30X290, PlaneCurves
 from ..report.chapter import Plot
+from .run import captioned
+
+Laws = Mapping[str, am.characteristic.ContractionLaw]
+"""The surfaces of the chapter by name."""
 
 MISPRINT_INDEX = 2
 """Index of a_02, whose exponent is misprinted, in the coefficients."""
@@ -40,16 +44,14 @@ def surfaces(curves: PlaneCurves = SAM_30X290) -> dict[str, am.characteristic.Co
     assert isinstance(printed, am.characteristic.BorzikovaDirect)
     assert isinstance(corrected, am.characteristic.BorzikovaDirect)
     assert isinstance(exponential, am.characteristic.BorzikovaExponential)
-    saturation = curves.curves[0].saturation
+    k_max, limits = curves.curves[0].saturation, LoadRange.from_law(printed)
     return {
-        AS_EXPONENT: am.characteristic.BorzikovaExponential(
-            printed.coefficients, *LoadRange.from_law(printed), saturation=saturation
-        ),
+        AS_EXPONENT: am.characteristic.BorzikovaExponential(printed.coefficients, *limits, saturation=k_max),
         PRINTED: printed,
         MISPRINT_CORRECTED: with_a02(printed, CORRECTED_A02),
         CORRECTED: corrected,
         EXPONENTIAL: exponential,
-        MONOTONE: fit_monotone(sample(curves), saturation).model,
+        MONOTONE: fit_monotone(sample(curves), k_max).model,
     }
 
 
@@ -94,23 +96,26 @@ def add_noise(recording: am.Recording, seed: int, deviation: float = 0.005) -> a
 PRESSURE, FORCE, CONTRACTION = "gauge pressure [bar]", "force [N]", "contraction [%]"
 
 
-def plots(curves: PlaneCurves, laws: Mapping[str, am.characteristic.ContractionLaw]) -> tuple[Plot, ...]:
+def plots(curves: PlaneCurves, laws: Laws) -> tuple[Plot, ...]:
     """Return all figures of the chapter."""
+    pressures, rows = np.linspace(0.0, curves.max_pressure, 351), curves.curves
+    plane = {f"{c.force:g} N, printed index {c.printed_index:g}": c.contraction(pressures) for c in rows}
+    fitted = {f"{c.force:g} N, monotone fit": laws[MONOTONE].contraction(pressures, c.force) for c in rows}
+    monotone = Plot("borzikova_monotone_fit", _monotone_caption(curves, laws[MONOTONE]), _points(curves, fitted))
     return (
-        dead_zone(curves),
-        points(curves),
-        plane_curves(curves),
-        surface(curves, laws[EXPONENTIAL]),
-        residuals(curves, laws),
+        dead_zone(curves, pressures),
+        captioned("borzikova_points", _points(curves, {})),
+        captioned("borzikova_plane_curves", _points(curves, plane)),
+        surface(curves, laws[EXPONENTIAL], pressures),
+        residuals(curves, laws, pressures),
         violations(laws),
-        monotone_fit(curves, laws[MONOTONE]),
+        monotone,
     )
 
 
-def dead_zone(curves: PlaneCurves) -> Plot:
+def dead_zone(curves: PlaneCurves, pressures: Array) -> Plot:
     """Return Fig. 2: dead zone and saturation."""
     figure, axes = new_figure()
-    pressures = _pressures(curves)
     light, heavy = curves.curves[0], curves.curves[-1]
     for curve, colour, dash in ((light, LINES[0], DASHES[0]), (heavy, LINES[1], DASHES[1])):
         axes.plot(pressures / bar, 100 * curve.contraction(pressures), dash, color=colour, label=f"{curve.force:g} N")
@@ -127,47 +132,44 @@ def dead_zone(curves: PlaneCurves) -> Plot:
     return Plot("borzikova_dead_zone", caption, figure)
 
 
-def points(curves: PlaneCurves) -> Plot:
-    """Return Fig. 3: the points."""
+def _points(curves: PlaneCurves, lines: Mapping[str, Any]) -> Any:
+    """Draw the points of Fig. 3, and a line of contractions over the pressure for each curve, by its label."""
     figure, axes = new_figure()
-    _draw_points(axes, curves)
+    data = sample(curves)
+    for curve, colour, marker in zip(curves.curves, LINES, MARKERS, strict=False):
+        rows = data.rows(data["force"] == curve.force)
+        x, y = rows["pressure"] / bar, 100 * rows["contraction"]
+        axes.plot(x, y, marker, color=colour, label=f"{curve.force:g} N, points of the curve")
+    for (label, contraction), colour, dash in zip(lines.items(), LINES, DASHES, strict=False):
+        pressures = np.linspace(0.0, curves.max_pressure, len(contraction)) / bar
+        axes.plot(pressures, 100 * np.asarray(contraction), color=colour, linestyle=dash, label=label)
+    if lines:
+        axes.axhline(0.0, color=BLACK, linewidth=0.6)
     axes.set(xlabel=PRESSURE, ylabel=CONTRACTION)
     legend_outside(axes)
-    caption = (
-        "Points on the plane curves at 15 evenly spaced pressures for each load; they replace the lost measured points "
-        "of Fig. 3 of the paper."
+    return figure
+
+
+def _monotone_caption(curves: PlaneCurves, law: am.characteristic.ContractionLaw) -> str:
+    """Return the errors of the monotone fit on the plane curves, and their reason."""
+    data = sample(curves)
+    errors = np.asarray(law.contraction(data["pressure"], data["force"])) - data["contraction"]
+    worst = int(np.abs(errors).argmax())
+    return (
+        f"Monotone fit and plane curves: rms error {100 * np.sqrt(np.mean(errors**2)):.2f} %, maximum error "
+        f"{100 * abs(errors[worst]):.1f} % ({data['pressure'][worst] / bar:.2f} bar, {data['force'][worst]:g} N). A "
+        "polynomial of degree 2 in force cannot follow the curves from 45 to 130 N and remain monotone up to 260 N; "
+        "below 0.28 bar the curves themselves are not monotone."
     )
-    return Plot("borzikova_points", caption, figure)
 
 
-def plane_curves(curves: PlaneCurves) -> Plot:
-    """Return Fig. 4: the plane curves."""
-    figure, axes = new_figure()
-    pressures = _pressures(curves)
-    _draw_points(axes, curves)
-    for curve, colour, dash in zip(curves.curves, LINES, DASHES, strict=False):
-        label = f"{curve.force:g} N, printed index {curve.printed_index:g}"
-        axes.plot(pressures / bar, 100 * curve.contraction(pressures), color=colour, linestyle=dash, label=label)
-    axes.axhline(0.0, color=BLACK, linewidth=0.6)
-    axes.set(xlabel=PRESSURE, ylabel=CONTRACTION)
-    legend_outside(axes)
-    caption = (
-        "Plane characteristics, as in Fig. 4 of the paper. The curve at 45 N starts below zero, and the curve at 130 N "
-        "has a maximum at 3.283 bar: these are artefacts of the fits, not properties of the muscle."
-    )
-    return Plot("borzikova_plane_curves", caption, figure)
-
-
-def surface(curves: PlaneCurves, law: am.characteristic.ContractionLaw) -> Plot:
+def surface(curves: PlaneCurves, law: am.characteristic.ContractionLaw, pressures: Array) -> Plot:
     """Return Fig. 5: the surface."""
     figure, axes = new_figure(height=4.4, subplot_kw={"projection": "3d", "computed_zorder": False})
     pressure, force = LoadRange.from_law(law).grid(36, 31)
     contraction = 100 * np.asarray(law.contraction(pressure, force))
-    axes.plot_surface(
-        pressure / bar, force, contraction, cmap="cividis", alpha=0.85, rstride=1, cstride=1,
-        linewidth=0.15, edgecolor=BLACK, zorder=1,
-    )  # fmt: skip
-    pressures = _pressures(curves)
+    style: dict[str, Any] = {"cmap": "cividis", "alpha": 0.85, "linewidth": 0.15, "edgecolor": BLACK}
+    axes.plot_surface(pressure / bar, force, contraction, rstride=1, cstride=1, zorder=1, **style)
     for curve in curves.curves:
         # slightly above the surface, which would otherwise hide half of each line
         height = 100 * curve.contraction(pressures) + 0.4
@@ -175,51 +177,45 @@ def surface(curves: PlaneCurves, law: am.characteristic.ContractionLaw) -> Plot:
     axes.set(xlabel=PRESSURE, ylabel=FORCE, zlabel=CONTRACTION)
     axes.set_box_aspect((1.3, 1.2, 0.9), zoom=0.97)
     axes.view_init(elev=24, azim=-128)
-    caption = (
-        "Exponential surface of equation (1), as in Fig. 5 of the paper, with its three plane curves (red). The "
-        "coefficients of the paper's figure are not printed; those used here reproduce its curves exactly."
-    )
-    return Plot("borzikova_surface", caption, figure)
+    return captioned("borzikova_surface", figure)
 
 
-def residuals(curves: PlaneCurves, laws: Mapping[str, am.characteristic.ContractionLaw]) -> Plot:
+def residuals(curves: PlaneCurves, laws: Laws, pressures: Array) -> Plot:
     """Return the residuals on the curves, and the difference of the two surfaces between them."""
     figure, (left, right) = new_figure(1, 2, width=7.6, height=3.3)
-    pressures = _pressures(curves)
+    corrected, misprint = laws[CORRECTED], laws[MISPRINT_CORRECTED]
     for curve, colour, dash in zip(curves.curves, LINES, DASHES, strict=False):
-        error = laws[CORRECTED].contraction(pressures, curve.force) - curve.contraction(pressures)
+        error = corrected.contraction(pressures, curve.force) - curve.contraction(pressures)
         left.plot(pressures / bar, 100 * error, color=colour, linestyle=dash, label=f"{curve.force:g} N")
+        right.axhline(curve.force, color=BLACK, linewidth=0.8, linestyle=":")
     left.set(xlabel=PRESSURE, ylabel="corrected direct surface $-$ plane curve [%]")
     left.set_title("on the plane curves", fontsize=9)
     left.legend(loc="upper right", frameon=False, fontsize=8)
-    pressure, force = LoadRange.from_law(laws[CORRECTED]).grid(141, 141)
-    difference = 100 * (laws[CORRECTED].contraction(pressure, force) - laws[EXPONENTIAL].contraction(pressure, force))
+    pressure, force = LoadRange.from_law(corrected).grid(141, 141)
+    difference = 100 * (corrected.contraction(pressure, force) - laws[EXPONENTIAL].contraction(pressure, force))
     limit = float(np.ceil(np.abs(difference).max()))
     filled = right.contourf(pressure / bar, force, difference, np.linspace(-limit, limit, 17), cmap="PuOr")
-    for curve in curves.curves:
-        right.axhline(curve.force, color=BLACK, linewidth=0.8, linestyle=":")
     right.set(xlabel=PRESSURE, ylabel=FORCE)
     right.set_title("corrected direct $-$ exponential surface", fontsize=9)
     right.grid(visible=False)
     scale = figure.colorbar(filled, ax=right)
     scale.set_label("difference in contraction [%]", fontsize=9)
     scale.ax.tick_params(labelsize=8)
-    max_error = np.abs(
-        laws[MISPRINT_CORRECTED].contraction(pressures, 260.0) - curves.curve_at(260.0).contraction(pressures)
-    ).max()
+    errors = misprint.contraction(pressures, 260.0) - curves.curve_at(260.0).contraction(pressures)
     caption = (
         r"Left: error of the corrected direct surface on the plane curves (with only \(a_{02}\) corrected, up to "
-        f"{100 * max_error:.0f} % at 260 N). Right: difference of the two surfaces; dotted: loads of the plane curves."
+        f"{100 * np.abs(errors).max():.0f} % at 260 N). Right: difference of the two surfaces; dotted: loads of the "
+        "plane curves."
     )
     return Plot("borzikova_residuals", caption, figure)
 
 
-def violations(laws: Mapping[str, am.characteristic.ContractionLaw]) -> Plot:
+def violations(laws: Laws) -> Plot:
     """Return the regions in which the surfaces increase with force or decrease with pressure."""
-    names = (CORRECTED, EXPONENTIAL, MONOTONE)
+    from matplotlib.patches import Patch
+
     figure, panels = new_figure(1, 3, width=7.6, height=3.3, sharey=True)
-    levels = np.arange(-5, 41, 5)
-    for axes, name in zip(panels, names, strict=True):
+    for axes, name in zip(panels, (CORRECTED, EXPONENTIAL, MONOTONE), strict=True):
         law = laws[name]
         pressure, force = LoadRange.from_law(law).grid(201, 201)
         contraction = 100 * np.asarray(law.contraction(pressure, force))
@@ -227,60 +223,13 @@ def violations(laws: Mapping[str, am.characteristic.ContractionLaw]) -> Plot:
             slope = sign * autodiff.derivative(law, "contraction", pressure, force, wrt=argument)
             if (slope > 0).any():
                 axes.contourf(pressure / bar, force, slope, [0.0, np.inf], colors=[colour], alpha=0.3)
-        lines = axes.contour(pressure / bar, force, contraction, levels, colors=BLACK, linewidths=0.7)
+        lines = axes.contour(pressure / bar, force, contraction, np.arange(-5, 41, 5), colors=BLACK, linewidths=0.7)
         axes.clabel(lines, fmt="%g", fontsize=7)
         axes.set(xlabel=PRESSURE)
         axes.set_title(name, fontsize=9)
         axes.grid(visible=False)
     panels[0].set_ylabel(FORCE)
-    _violation_legend(figure)
-    caption = (
-        "Contraction in per cent (lines) within the validity range, and monotonicity violations: the contraction "
-        "increases with force (red) or decreases with pressure (blue). The monotone fit has none."
-    )
-    return Plot("borzikova_monotonicity", caption, figure)
-
-
-def _violation_legend(figure: Any) -> None:
-    from matplotlib.patches import Patch
-
-    patches = [
-        Patch(color=RED, alpha=0.3, label="contraction increases with force"),
-        Patch(color=BLUE, alpha=0.3, label="contraction decreases with pressure"),
-    ]
+    labels = {RED: "contraction increases with force", BLUE: "contraction decreases with pressure"}
+    patches = [Patch(color=colour, alpha=0.3, label=label) for colour, label in labels.items()]
     figure.legend(handles=patches, loc="outside lower center", ncols=2, frameon=False, fontsize=8)
-
-
-def monotone_fit(curves: PlaneCurves, law: am.characteristic.ContractionLaw) -> Plot:
-    """Return the monotone fit and its errors on the plane curves."""
-    figure, axes = new_figure()
-    pressures = _pressures(curves)
-    _draw_points(axes, curves)
-    for curve, colour, dash in zip(curves.curves, LINES, DASHES, strict=False):
-        fitted = 100 * np.asarray(law.contraction(pressures, curve.force))
-        axes.plot(pressures / bar, fitted, color=colour, linestyle=dash, label=f"{curve.force:g} N, monotone fit")
-    axes.axhline(0.0, color=BLACK, linewidth=0.6)
-    axes.set(xlabel=PRESSURE, ylabel=CONTRACTION)
-    legend_outside(axes)
-    data = sample(curves)
-    errors = np.asarray(law.contraction(data["pressure"], data["force"])) - data["contraction"]
-    worst = int(np.abs(errors).argmax())
-    caption = (
-        f"Monotone fit and plane curves: rms error {100 * np.sqrt(np.mean(errors**2)):.2f} %, maximum error "
-        f"{100 * abs(errors[worst]):.1f} % ({data['pressure'][worst] / bar:.2f} bar, {data['force'][worst]:g} N). A "
-        "polynomial of degree 2 in force cannot follow the curves from 45 to 130 N and remain monotone up to 260 N; "
-        "below 0.28 bar the curves themselves are not monotone."
-    )
-    return Plot("borzikova_monotone_fit", caption, figure)
-
-
-def _pressures(curves: PlaneCurves) -> np.ndarray:
-    return np.linspace(0.0, curves.max_pressure, 351)
-
-
-def _draw_points(axes: Any, curves: PlaneCurves) -> None:
-    data = sample(curves)
-    for curve, colour, marker in zip(curves.curves, LINES, MARKERS, strict=False):
-        rows = data.rows(data["force"] == curve.force)
-        x, y = rows["pressure"] / bar, 100 * rows["contraction"]
-        axes.plot(x, y, marker, color=colour, label=f"{curve.force:g} N, points of the curve")
+    return captioned("borzikova_monotonicity", figure)

@@ -4,35 +4,18 @@ from typing import Any
 
 import numpy as np
 
-import airmuscle as am
-
 from ..core import BLACK, BLUE, LINES, RED, cite, legend_outside, new_figure
 from ..files.library import load_data, load_law
 from ..physics.muscle.characteristic import exponents, maxwell_defect
 from ..report.chapter import Chapter, Plot, Table
+from ..report.claims import claims_of
+from . import hosovsky_claims as claiming
 from . import hosovsky_effects as causing
 from . import hosovsky_fill_and_release as runs
 from . import hosovsky_joint as joining
-from .hosovsky_claims import (
-    describe_ranges,
-    fill_claims,
-    gas_findings,
-    measurement_claims,
-    range_table,
-    ratio_ranges,
-    surface_claims,
-)
-from .hosovsky_plant import (
-    FORCE_MAPS,
-    MATRIX,
-    MATRIX_CATALOGUE,
-    PAPER,
-    UnpublishedParameters,
-    muscle,
-    surface,
-    surface_fit,
-)
-from .run import chapter_texts
+from . import hosovsky_plant as rig
+from .hosovsky_plant import FORCE_MAPS, surface, surface_fit
+from .run import captioned, chapter_texts, titled
 
 MAX_CONTRACTION = 0.26
 """Largest contraction of the figures of the surface [1] (chosen: the free contraction at the largest pressure)."""
@@ -48,37 +31,33 @@ def coefficient_table() -> Table:
     }
     for name in FORCE_MAPS:
         columns[f"{name} [N/bar^j]"] = [plain[name][power] for power in powers]
-    note = (
-        r"\(F = \sum a_{ij}\,\varepsilon^i p^j\) with the contraction \(\varepsilon\) as a ratio and the gauge "
-        r"pressure \(p\) in bar; only within the validity range of the data."
-    )
-    return Table("hosovsky_coefficients", "Fitted coefficients of the contractile surface", columns, note)
+    return titled("hosovsky_coefficients", columns)
 
 
-def chapter(
-    parameters: UnpublishedParameters | None = None, suspected: causing.SuspectedCauses | None = None
-) -> Chapter:
-    """Return the chapter of the report; both arguments contain values that the paper does not print."""
-    parameters, suspected = parameters or UnpublishedParameters(), suspected or causing.SuspectedCauses()
+def chapter() -> Chapter:
+    """Return the chapter of the report, with the chosen values of what the paper does not print."""
+    parameters, suspected = rig.UnpublishedParameters(), causing.SuspectedCauses()
     fill = runs.run_fill(parameters)
     effects = causing.compute_effects(parameters, suspected)
     low, high = runs.release_pair(parameters)
     ranges, joint = runs.range_table(parameters), joining.joint_variation(parameters)
-    ratios = ratio_ranges(parameters, suspected)
-    explanation = f"{causing.describe_effects(effects)} {describe_ranges(ratios)}"
+    ratios = claiming.ratio_ranges(parameters, suspected)
+    explanation = f"{causing.describe_effects(effects)} {claiming.describe_ranges(ratios)}"
+    valve = runs.valve_figure(rig.MATRIX, fill.plant.ambient.temperature)
+    shown = (hill_model(), surface_in_space(), isobars(), valve, runs.figure_3(fill))
     return Chapter(
-        PAPER,
+        rig.PAPER,
         claims=(
-            *surface_claims(surface_fit()),
-            *fill_claims(fill, explanation),
-            *measurement_claims(),
+            *claims_of(claiming.SURFACE, rig.PAPER, surface_fit()),
+            *claiming.fill_claims(fill, explanation),
+            *claims_of(claiming.MEASUREMENT, rig.PAPER),
             *runs.claims(low, high, ranges),
             *joining.claims(joint),
-            *gas_findings(effects),
+            *claiming.gas_findings(effects),
         ),
         tables=(
             causing.effect_table(effects),
-            range_table(ratios),
+            claiming.range_table(ratios),
             ranges,
             joining.joint_table(joint),
             coefficient_table(),
@@ -86,48 +65,25 @@ def chapter(
             _extrapolation_table(fill, low, high),
             *_time_series(fill, low, high),
         ),
-        plots=_plots(fill, effects, low, high),
-        references=(*cite(fill.plant), MATRIX_CATALOGUE, *cite(load_law(FORCE_MAPS[0]))),
-        chosen=(*parameters.as_rows(), *suspected.as_rows()),
-        **chapter_texts(PAPER),
+        plots=(*shown, causing.effect_plot(effects), runs.figure_4(low, high)),
+        references=(*cite(fill.plant), rig.MATRIX_CATALOGUE, *cite(load_law(FORCE_MAPS[0]))),
+        chosen=(*rig.chosen_rows(parameters), *rig.chosen_rows(suspected)),
+        **chapter_texts(rig.PAPER),
     )
 
 
-def _plots(
-    fill: runs.FillRun, effects: tuple[causing.Effect, ...], low: runs.Release, high: runs.Release
-) -> tuple[Plot, ...]:
-    """Return all figures in the order of the report."""
-    return (
-        hill_model(),
-        surface_in_space(),
-        isobars(),
-        runs.valve_figure(MATRIX, fill.plant.ambient.temperature),
-        runs.figure_3(fill),
-        causing.effect_plot(effects),
-        runs.figure_4(low, high),
-    )
-
-
-def maxwell_table(parameters: UnpublishedParameters) -> Table:
+def maxwell_table(parameters: rig.UnpublishedParameters) -> Table:
     """Return the Maxwell defects of the fitted surfaces and of the law of the measured muscles."""
-    shape = muscle(parameters).geometry
-    laws: dict[str, tuple[am.characteristic.Characteristic, am.geometry.Geometry]]
-    laws = {f"surface fitted to {name}, without the limits": (surface_fit(name).model, shape) for name in FORCE_MAPS}
-    for name in ("dmsp-20-300", "dmsp-10-250"):
-        entry = load_law(name)
-        laws[f"Martens-Boblan 2017, {name}"] = (entry.characteristic, entry.muscle.geometry)
-    validity_ranges = [
-        surface(FORCE_MAPS[0]).validity_range,
-        surface(FORCE_MAPS[1]).validity_range,
-        *(load_law(n).validity_range for n in ("dmsp-20-300", "dmsp-10-250")),
-    ]
-    defects = [
-        maxwell_defect(law, volume, validity_range)
-        for (law, volume), validity_range in zip(laws.values(), validity_ranges, strict=True)
-        if validity_range
-    ]
+    shape = rig.muscle(parameters).geometry
+    fitted = [(f"surface fitted to {name}, without the limits", surface_fit(name).model, shape,
+               surface(name).validity_range) for name in FORCE_MAPS]  # fmt: skip
+    entries = {name: load_law(name) for name in ("dmsp-20-300", "dmsp-10-250")}
+    measured = [(f"Martens-Boblan 2017, {name}", entry.characteristic, entry.muscle.geometry, entry.validity_range)
+                for name, entry in entries.items()]  # fmt: skip
+    laws = [*fitted, *measured]
+    defects = [maxwell_defect(law, volume, limits) for _, law, volume, limits in laws if limits]
     columns: dict[str, list[Any]] = {
-        "muscle": list(laws),
+        "muscle": [name for name, *_ in laws],
         r"largest \(\left|\frac{\partial F}{\partial p} + \frac{\text{d}V}{\text{d}L}\right|\) [mm2]": [
             d.worst * 1e6 for d in defects
         ],
@@ -135,36 +91,31 @@ def maxwell_table(parameters: UnpublishedParameters) -> Table:
         "at pressure [kPa]": [d.pressure / 1e3 for d in defects],
         "at contraction [%]": [d.contraction * 100 for d in defects],
     }
-    note = (
-        "Points with a positive force within the validity range of the data. The integral of the defect over an area "
-        "in the plane of pressure and length is an energy."
-    )
-    return Table("hosovsky_maxwell", "Maxwell defect of fitted muscles over their validity ranges", columns, note)
+    return titled("hosovsky_maxwell", columns)
 
 
 def _extrapolation_table(fill: runs.FillRun, low: runs.Release, high: runs.Release) -> Table:
     """Return the times and extents of extrapolation beyond the data of the surface, by run."""
-    runs = {"fill and discharge": fill.adaptive, f"release from {low.pressure / 1e3:g} kPa": low.run}
-    runs[f"release from {high.pressure / 1e3:g} kPa"] = high.run
-    extrapolations = [
-        (name, note) for name, run in runs.items() for note in run.notes if "outside the validity range" in note
-    ]
-    columns = {"run": [name for name, _ in extrapolations], "extrapolation": [note for _, note in extrapolations]}
-    return Table("hosovsky_boxes", "Extrapolation beyond the data of the contractile surface", columns)
+    named = {"fill and discharge": fill.adaptive}
+    named |= {f"release from {each.pressure / 1e3:g} kPa": each.run for each in (low, high)}
+    found = [(name, note) for name, run in named.items() for note in run.notes if "outside the validity range" in note]
+    return titled("hosovsky_boxes", {"run": [name for name, _ in found], "extrapolation": [note for _, note in found]})
 
 
 def _time_series(fill: runs.FillRun, low: runs.Release, high: runs.Release) -> tuple[Table, ...]:
     """Return the time series of Figs. 3 and 4; only written to files."""
-    runs = {"hosovsky_fill": fill.adaptive, "hosovsky_release_low": low.run, "hosovsky_release_high": high.run}
+    named = {"hosovsky_fill": fill.adaptive, "hosovsky_release_low": low.run, "hosovsky_release_high": high.run}
     names = (("time", "s"), ("pressure", "Pa"), ("contraction", "1"), ("position", "m"), ("force", "N"))
     return tuple(
         Table(key, key.replace("_", " "), {f"{n} [{unit}]": run[n] for n, unit in names}, shown=False)
-        for key, run in runs.items()
+        for key, run in named.items()
     )
 
 
 def hill_model() -> Plot:
     """Return Fig. 1: contractile element, damper and parallel spring side by side, nonlinear spring in series."""
+    from matplotlib.patches import Rectangle
+
     figure, axes = new_figure(height=2.6)
     axes.set(xlim=(-0.3, 10.6), ylim=(-0.4, 4.6), aspect="equal")
     axes.axis("off")
@@ -175,7 +126,7 @@ def hill_model() -> Plot:
         axes.plot([0, 1.4], [height] * 2, **line)
         axes.plot([4.6, 6.0], [height] * 2, **line)
     axes.plot([6.0, 6.0], [0.7, 3.5], **line)
-    axes.add_patch(_rectangle((1.4, 3.1), 3.2, 0.8, BLUE))
+    axes.add_patch(Rectangle((1.4, 3.1), 3.2, 0.8, facecolor=BLUE, edgecolor=BLACK, alpha=0.25))
     _spring(axes, 1.4, 4.6, 2.1, BLACK)
     _damper(axes, 1.4, 4.6, 0.7)
     axes.plot([6.0, 6.6], [2.1] * 2, **line)
@@ -187,19 +138,7 @@ def hill_model() -> Plot:
     axes.text(3.0, 1.2, "damper $F_\\mathrm{TL}$", ha="center", fontsize=8)
     axes.text(7.8, 0.75, "series spring,\nnonlinear", ha="center", fontsize=8, color=RED)
     axes.text(9.9, 2.35, "$F_\\mathrm{E}$", ha="center", fontsize=8)
-    return Plot(
-        "hosovsky_fig1",
-        "Hill's muscle model, as in Fig. 1. Equation (1) contains the contractile element, the damper and the parallel "
-        "spring. The nonlinear series spring (red) is left out in (1); it is an option here, and its effect is "
-        "among those of the suspected causes.",
-        figure,
-    )
-
-
-def _rectangle(corner: tuple[float, float], width: float, height: float, colour: str) -> Any:
-    from matplotlib.patches import Rectangle
-
-    return Rectangle(corner, width, height, facecolor=colour, edgecolor=BLACK, alpha=0.25)
+    return captioned("hosovsky_fig1", figure)
 
 
 def _spring(axes: Any, begin: float, end: float, height: float, colour: str) -> None:
@@ -215,9 +154,7 @@ def _damper(axes: Any, begin: float, end: float, height: float) -> None:
     middle, half = 0.5 * (begin + end), 0.35
     line = {"color": BLACK, "linewidth": 1.4}
     axes.plot([begin, middle - 0.5], [height] * 2, **line)
-    axes.plot(
-        [middle + 0.6, middle - 0.5, middle - 0.5, middle + 0.6], height + half * np.array([1, 1, -1, -1]), **line
-    )
+    axes.plot(middle + np.array([0.6, -0.5, -0.5, 0.6]), height + half * np.array([1, 1, -1, -1]), **line)
     axes.plot([middle + 0.1] * 2, [height - 0.8 * half, height + 0.8 * half], **line)
     axes.plot([middle + 0.1, end], [height] * 2, **line)
 
@@ -228,24 +165,15 @@ def surface_in_space() -> Plot:
     figure, axes = new_figure(height=4.4, subplot_kw={"projection": "3d", "computed_zorder": False})
     contraction, pressure = np.meshgrid(np.linspace(0.0, MAX_CONTRACTION, 40), np.linspace(0.0, 675e3, 40))
     force = np.asarray(law.force(pressure, contraction))
-    axes.plot_surface(
-        100 * contraction, pressure / 1e3, force, cmap="cividis", alpha=0.85, rstride=1, cstride=1,
-        linewidth=0.15, edgecolor=BLACK, zorder=1,
-    )  # fmt: skip
-    shown = (data["force"] > 0) & (data["force"] <= 1200) & (data["contraction"] >= 0)
-    axes.plot(
-        100 * data["contraction"][shown], data["pressure"][shown] / 1e3, data["force"][shown], ".",
-        color=RED, markersize=3, zorder=2,
-    )  # fmt: skip
+    style: dict[str, Any] = {"cmap": "cividis", "alpha": 0.85, "linewidth": 0.15, "edgecolor": BLACK}
+    axes.plot_surface(100 * contraction, pressure / 1e3, force, rstride=1, cstride=1, zorder=1, **style)
+    points = data.rows((data["force"] > 0) & (data["force"] <= 1200) & (data["contraction"] >= 0))
+    x, y = 100 * points["contraction"], points["pressure"] / 1e3
+    axes.plot(x, y, points["force"], ".", color=RED, markersize=3, zorder=2)
     axes.set(xlabel="contraction [%]", ylabel="gauge pressure [kPa]", zlabel="force [N]")
     axes.set_box_aspect((1.3, 1.2, 0.9), zoom=0.95)
     axes.view_init(elev=24, azim=38)
-    return Plot(
-        "hosovsky_fig2",
-        "Contractile surface of 21 coefficients, as in Fig. 2, limited to 0 to 1200 N: force over contraction and "
-        "pressure, fitted to a measured DMSP-20-300 (points). The coefficients of the paper are not printed.",
-        figure,
-    )
+    return captioned("hosovsky_fig2", figure)
 
 
 def isobars() -> Plot:
@@ -260,5 +188,4 @@ def isobars() -> Plot:
     axes.axhline(1200.0, color="0.4", linewidth=0.8, linestyle=":")
     axes.set(xlabel="contraction [%]", ylabel="force [N]", xlim=(0, 27), ylim=(-30, 1700))
     legend_outside(axes, title="gauge pressure")
-    caption = "Contractile surface (lines) fitted to a measured DMSP-20-300 (points), limited to 0 to 1200 N (dotted)."
-    return Plot("hosovsky_surface", caption, figure)
+    return captioned("hosovsky_surface", figure)

@@ -12,19 +12,13 @@ import airmuscle as am
 from ..bench.identify.variable_projection import uncensored_rank
 from ..physics.muscle.characteristic.contractile_surface import exponents
 from ..report.chapter import Table
-from ..report.claims import AtMost, Claim, ClaimRow, Equal, Kind
+from ..report.claims import AtMost, Claim, ClaimRow, Equal, Kind, claims_of
 from ..report.formatting import format_unit
-from .hosovsky_effects import (
-    PRINTED,
-    Effect,
-    SuspectedCauses,
-    effect_of,
-    fill_discharge_ratio,
-    run_fill_of,
-    substitutions,
-)
+from . import hosovsky_effects as causing
+from .hosovsky_effects import Effect, SuspectedCauses, effect_of, substitutions
 from .hosovsky_fill_and_release import FillRun, end_of_choked_flow
 from .hosovsky_plant import FILLING, PAPER, SUPPLY_PRESSURE, VOLUME_FLOW_RATIO, UnpublishedParameters, surface
+from .run import titled
 
 STRONGER = 1.2
 """Ratio above which filling is affected more than discharging, by at least a fifth (chosen)."""
@@ -54,19 +48,21 @@ class RatioRange:
 
 def ratio_ranges(parameters: UnpublishedParameters, suspected: SuspectedCauses) -> tuple[RatioRange, ...]:
     """Simulate fill and discharge at the low end, the chosen value and the high end of each parameter."""
-    base = run_fill_of(PRINTED, parameters)
+    base = causing.run_fill_of(causing.PRINTED, parameters)
+
+    def ratio(name: str, value: float) -> float:
+        varied = replace(suspected, **{name: replace(getattr(suspected, name), value=value)})
+        chosen = next(s for s in substitutions(parameters, varied) if s.varied == name)
+        effect = effect_of(base, chosen, causing.run_fill_of(chosen, parameters))
+        small = abs(effect.largest("pressure", FILLING)) < SMALLEST_EFFECT
+        return math.nan if small else causing.fill_discharge_ratio(effect)
+
     result = []
     for name in (s.varied for s in substitutions(parameters, suspected) if s.varied):
         item = getattr(suspected, name)
-        values = (item.low, item.value, item.high)
-        ratios = []
-        for value in values:
-            varied = replace(suspected, **{name: replace(item, value=value)})
-            chosen = next(s for s in substitutions(parameters, varied) if s.varied == name)
-            effect = effect_of(base, chosen, run_fill_of(chosen, parameters))
-            small = abs(effect.largest("pressure", FILLING)) < SMALLEST_EFFECT
-            ratios.append(math.nan if small else fill_discharge_ratio(effect))
-        result.append(RatioRange(item.meaning, item.unit, values, (ratios[0], ratios[1], ratios[2])))
+        low, middle, high = values = (item.low, item.value, item.high)
+        ratios = (ratio(name, low), ratio(name, middle), ratio(name, high))
+        result.append(RatioRange(item.meaning, item.unit, values, ratios))
     return tuple(result)
 
 
@@ -81,12 +77,7 @@ def range_table(ranges: tuple[RatioRange, ...]) -> Table:
     for i, place in enumerate(places):
         ratios = [None if math.isnan(r.ratios[i]) else float(f"{r.ratios[i]:.3g}") for r in ranges]
         columns[f"ratio at the {place} [1]"] = ratios
-    note = (
-        "Ratio of the largest pressure change during filling to that during discharging. No value: the component "
-        "equals the printed one."
-    )
-    title = "Filling and discharging over the ranges of the suspected causes"
-    return Table("hosovsky_effect_ranges", title, columns, note)
+    return titled("hosovsky_effect_ranges", columns)
 
 
 def describe_ranges(ranges: tuple[RatioRange, ...]) -> str:
@@ -174,11 +165,6 @@ GAS = {
 }  # fmt: skip
 
 
-def surface_claims(fit: am.Fit) -> tuple[Claim, ...]:
-    """Return the checks of the contractile surface: number and rank of its coefficients, force limits."""
-    return tuple(claim for row in SURFACE for claim in row.claims(PAPER, fit))
-
-
 def fill_claims(fill: FillRun, explanation: str = "") -> tuple[Claim, ...]:
     """Return the claims on valve, solver and fill; `explanation` describes the causes of the deviations."""
     choke_end, step = end_of_choked_flow(fill.plant)
@@ -186,21 +172,17 @@ def fill_claims(fill: FillRun, explanation: str = "") -> tuple[Claim, ...]:
     return (
         VALVE.claim(PAPER, "", fill),
         choked.claim(PAPER, "", choke_end / 1e3, ""),
-        *(claim for row in FILL for claim in row.claims(PAPER, fill)),
+        *claims_of(FILL, PAPER, fill),
         DEVIATIONS.claim(PAPER, "", None, explanation),
     )
 
 
-def measurement_claims() -> tuple[Claim, ...]:
-    """Return the claims on sensor range and hysteresis, which concern the measurement."""
-    return tuple(claim for row in MEASUREMENT for claim in row.claims(PAPER))
-
-
 def gas_findings(effects: tuple[Effect, ...]) -> tuple[Claim, ...]:
     """Return the effects of the ideal gas and of the reference density, compared with a negligible change."""
+    changes = {each.substitution.component: each.largest("pressure", FILLING) for each in effects}
     return tuple(
-        row.claim(PAPER, "", abs(e.largest("pressure", FILLING)) / 1e3)
-        for e in effects
+        row.claim(PAPER, "", abs(change) / 1e3)
+        for component, change in changes.items()
         for key, row in GAS.items()
-        if e.substitution.cause == "gas law" and e.substitution.component.startswith(key)
+        if component.startswith(key)
     )

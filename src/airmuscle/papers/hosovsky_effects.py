@@ -16,21 +16,14 @@ import airmuscle as am
 from ..core import DASHES, LINES, Array, new_figure
 from ..report.chapter import Plot, Table
 from ..report.formula import to_mathtext
-from .hosovsky_plant import (
-    DISCHARGING,
-    DURATION,
-    FILLING,
-    MATRIX,
-    MATRIX_BY_VOLUME,
-    SCHEDULE,
-    ChosenValue,
-    UnpublishedParameters,
-    hanging_load,
-    plant,
-)
+from . import hosovsky_plant as rig
+from .hosovsky_plant import MATRIX, ChosenValue, UnpublishedParameters, hanging_load, plant
+from .run import captioned, titled
 
 SPACING = 4e-3
 """Output step [s]."""
+PHASES = {"filling": rig.FILLING, "discharging": rig.DISCHARGING}
+"""Beginning and end of both phases [s]."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -57,10 +50,6 @@ class SuspectedCauses:
         5e-3, 2e-3, 2e-2, "m", "series spring of Fig. 1, stretch at which the force is twice the linear one"
     )
     dead_volume: ChosenValue = ChosenValue(2e-5, 5e-6, 4e-5, "m3", "volume of fittings and ports at the muscle")
-
-    def as_rows(self) -> tuple[tuple[str, str, str], ...]:
-        """Return (meaning, value with unit and range, source) of every parameter for the report."""
-        return tuple(getattr(self, field.name).as_row() for field in dataclasses.fields(self))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -126,7 +115,7 @@ def substitutions(parameters: UnpublishedParameters, suspected: SuspectedCauses)
         Substitution("volume", "viscoelastic wall", {"wall": wall}),
         Substitution("volume", f"fittings of {dead * 1e6:g} cm³", {"tube": fittings}),
         Substitution("gas law", "second virial coefficient of air", {"gas": am.physics.VirialGas()}),
-        Substitution("gas law", r"volume flow of (11), \(P_0 Q\)", {"valve": MATRIX_BY_VOLUME}),
+        Substitution("gas law", r"volume flow of (11), \(P_0 Q\)", {"valve": rig.MATRIX_BY_VOLUME}),
         Substitution(COMBINED, r"line, \(b\), first law, spring, wall",
                      {"gas": heat, "spring": hardening, "wall": wall, "valve": critical,
                       "tube": dataclasses.replace(lumped, gas=heat)}),
@@ -158,9 +147,8 @@ def compute_effects(parameters: UnpublishedParameters, suspected: SuspectedCause
 
 def run_fill_of(substitution: Substitution, parameters: UnpublishedParameters) -> am.Recording:
     """Simulate fill and discharge of the plant with a substituted component."""
-    return am.simulate(
-        substitution.plant(parameters), SCHEDULE, duration=DURATION, integrator=am.Rodas4(1e-7), output_times=SPACING
-    )
+    options: dict[str, Any] = {"integrator": am.Rodas4(1e-7), "output_times": SPACING}
+    return am.simulate(substitution.plant(parameters), rig.SCHEDULE, duration=rig.DURATION, **options)
 
 
 def effect_of(base: am.Recording, substitution: Substitution, run: am.Recording) -> Effect:
@@ -168,7 +156,7 @@ def effect_of(base: am.Recording, substitution: Substitution, run: am.Recording)
     time, pressure, contraction = base["time"], run[substitution.pressure_column], run["contraction"]
     filling, discharging = (
         _response_time(run["time"], pressure, *phase) - _response_time(time, base["pressure"], *phase)
-        for phase in (FILLING, DISCHARGING)
+        for phase in PHASES.values()
     )
     changes = pressure - base["pressure"], contraction - base["contraction"]
     return Effect(substitution, time, *changes, (filling, discharging))
@@ -183,21 +171,16 @@ def _response_time(time: Array, pressure: Array, begin: float, end: float) -> fl
 
 def effect_table(effects: tuple[Effect, ...]) -> Table:
     """Return the largest changes during filling and discharging, the delays, and the ratio of both phases."""
-    phases = (("filling", FILLING), ("discharging", DISCHARGING))
     columns: dict[str, list[Any]] = {"cause": [e.substitution.cause for e in effects],
                                      "substituted component": [e.substitution.component for e in effects]}  # fmt: skip
     for column, unit, size in (("pressure", "kPa", 1e3), ("contraction", "% of length", 0.01)):
-        for phase_name, phase in phases:
-            heading = f"{column}, {phase_name}: largest change [{unit}]"
+        for name, phase in PHASES.items():
+            heading = f"{column}, {name}: largest change [{unit}]"
             columns[heading] = [_round(e.largest(column, phase) / size) for e in effects]
-    for i, (phase_name, _) in enumerate(phases):
-        columns[f"{phase_name}: delay at 90 % [ms]"] = [_round(round(e.delays[i] * 1e3, 3)) for e in effects]
+    for i, name in enumerate(PHASES):
+        columns[f"{name}: delay at 90 % [ms]"] = [_round(round(e.delays[i] * 1e3, 3)) for e in effects]
     columns["pressure, ratio of filling to discharging [1]"] = [_round(fill_discharge_ratio(e)) for e in effects]
-    note = (
-        "One component of the printed plant is substituted at a time; all values are chosen. A ratio above 1 means "
-        "that filling is affected more than discharging, as observed in the paper."
-    )
-    return Table("hosovsky_effects", "Effects of the suspected causes of the deviations in Fig. 3", columns, note)
+    return titled("hosovsky_effects", columns)
 
 
 def _round(value: float) -> float:
@@ -207,7 +190,7 @@ def _round(value: float) -> float:
 
 def fill_discharge_ratio(effect: Effect) -> float:
     """Return the ratio of the largest pressure changes during filling and during discharging."""
-    return abs(effect.largest("pressure", FILLING) / effect.largest("pressure", DISCHARGING))
+    return abs(effect.largest("pressure", rig.FILLING) / effect.largest("pressure", rig.DISCHARGING))
 
 
 def effect_plot(effects: tuple[Effect, ...]) -> Plot:
@@ -219,24 +202,20 @@ def effect_plot(effects: tuple[Effect, ...]) -> Plot:
         panels[0].set_ylabel(f"{cause}\nchange [kPa]")
         panels[2].set_ylabel("change [% of L₀]")
         panels[3].legend(loc="upper left", bbox_to_anchor=(1.02, 1.0), borderaxespad=0.0)
-    titles = [f"{column}\n{phase}" for column in ("pressure", "contraction") for phase in ("filling", "discharging")]
+    titles = [f"{column}\n{phase}" for column in ("pressure", "contraction") for phase in PHASES]
     for j, title in enumerate(titles):
         axes[0, j].set_title(title)
         axes[-1, j].set_xlabel("time since opening [s]")
     figure.align_ylabels(axes[:, 0])
     figure.align_ylabels(axes[:, 2])
-    caption = (
-        "Effects of the suspected causes during fill and discharge: changes relative to the printed plant (isothermal "
-        "gas, constant spring, rigid wall, no line) after the opening of the fill and of the discharge valve."
-    )
-    return Plot("hosovsky_effects", caption, figure)
+    return captioned("hosovsky_effects", figure)
 
 
 def _draw_row(panels: Any, row: list[Effect]) -> None:
     """Draw one row: both phases of the pressure on one scale, both of the contraction on another."""
     for i, effect in enumerate(row):
         style = {"color": LINES[i], "linestyle": DASHES[i], "label": to_mathtext(effect.substitution.component)}
-        for j, (phase, duration) in enumerate(((FILLING, 3.0), (DISCHARGING, 4.0))):
+        for j, (phase, duration) in enumerate(((rig.FILLING, 3.0), (rig.DISCHARGING, 4.0))):
             since = effect.time - phase[0]
             shown = (since >= -0.1) & (since <= duration)
             panels[j].plot(since[shown], effect.pressure[shown] / 1e3, **style)
@@ -267,4 +246,4 @@ def describe_effects(effects: tuple[Effect, ...]) -> str:
 
 
 def _fill_change(effect: Effect) -> float:
-    return abs(effect.largest("pressure", FILLING))
+    return abs(effect.largest("pressure", rig.FILLING))

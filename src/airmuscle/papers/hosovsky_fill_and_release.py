@@ -13,19 +13,9 @@ from ..core import BLACK, DASHES, LINES, legend_below, new_figure
 from ..report.chapter import Plot, Table
 from ..report.claims import AtLeast, AtMost, Claim, ClaimRow
 from ..report.formatting import format_unit
-from .hosovsky_plant import (
-    DISCHARGING,
-    DURATION,
-    FILLING,
-    FORCE_MAPS,
-    MATRIX,
-    PAPER,
-    SCHEDULE,
-    UnpublishedParameters,
-    hanging_load,
-    latched_load,
-    plant,
-)
+from . import hosovsky_plant as rig
+from .hosovsky_plant import FORCE_MAPS, MATRIX, UnpublishedParameters, hanging_load, latched_load, plant
+from .run import captioned
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -39,7 +29,7 @@ class FillRun:
     @property
     def filled(self) -> float:
         """Absolute pressure [Pa] when the fill valve closes."""
-        row = np.searchsorted(self.adaptive["time"], FILLING[1])
+        row = np.searchsorted(self.adaptive["time"], rig.FILLING[1])
         return float(self.adaptive["pressure"][row]) + self.plant.ambient.pressure
 
     def difference(self, name: str) -> float:
@@ -51,7 +41,7 @@ def run_fill(parameters: UnpublishedParameters, valve: am.Valve = MATRIX) -> Fil
     """Simulate 25 s with ode8 at 1e-4 s, as printed, and with Rodas4 at rtol = 1e-8."""
     system = plant(parameters, hanging_load(parameters), valve=valve)
     printed, adaptive = (
-        am.solve(am.Problem(system, SCHEDULE, DURATION, integrator=method))
+        am.solve(am.Problem(system, rig.SCHEDULE, rig.DURATION, integrator=method))
         for method in (am.DormandPrince8(1e-4), am.Rodas4(1e-8))
     )
     return FillRun(system, printed, adaptive.recording)
@@ -68,11 +58,9 @@ def figure_3(fill: FillRun) -> Plot:
     axes[1].plot(run["time"], run["position"] * 1e3, color=LINES[1])
     axes[1].set(ylabel="displacement [mm]", xlabel="time [s]")
     for axis in axes:
-        for begin, end in (FILLING, DISCHARGING):
+        for begin, end in (rig.FILLING, rig.DISCHARGING):
             axis.axvspan(begin, end, color="0.93", zorder=0)
-    return Plot(
-        "hosovsky_fig3", "Fill (5 to 15 s) and discharge (19 to 25 s), as in Fig. 3; shaded: one valve is open.", figure
-    )
+    return captioned("hosovsky_fig3", figure)
 
 
 def valve_figure(valve: am.Valve, temperature: float) -> Plot:
@@ -86,19 +74,14 @@ def valve_figure(valve: am.Valve, temperature: float) -> Plot:
     axes.annotate("choked", (valve.critical_ratio / 2, 0.35), ha="center")
     axes.annotate("subsonic", ((1 + valve.critical_ratio) / 2, 0.35), ha="center")
     axes.set(xlabel="pressure ratio $p_2/p_1$", ylabel="mass flow [g/s]", ylim=(0, None), xlim=(0, 1))
-    return Plot(
-        "hosovsky_valve",
-        r"Mass flow of the MATRIX valve by ISO 6358 for an absolute upstream pressure of 650 kPa, \(b = 0.433\); "
-        "laminar above 0.999.",
-        figure,
-    )
+    return captioned("hosovsky_valve", figure)
 
 
 def end_of_choked_flow(plant: am.Plant) -> tuple[float, float]:
     """Return the absolute muscle pressure [Pa] at which the choked flow ends, and the pressure step of a row [Pa]."""
-    instants = np.append(np.arange(FILLING[0], FILLING[0] + 1.0, 1e-4), DURATION)
-    run = am.simulate(plant, SCHEDULE, duration=DURATION, integrator=am.Rodas4(1e-8), output_times=instants)
-    filling = (run["time"] >= FILLING[0]) & (run["time"] < FILLING[0] + 1.0)
+    instants = np.append(np.arange(rig.FILLING[0], rig.FILLING[0] + 1.0, 1e-4), rig.DURATION)
+    run = am.simulate(plant, rig.SCHEDULE, duration=rig.DURATION, integrator=am.Rodas4(1e-8), output_times=instants)
+    filling = (run["time"] >= rig.FILLING[0]) & (run["time"] < rig.FILLING[0] + 1.0)
     flow, pressure = run["mass_flow"][filling], run["pressure"][filling] + plant.ambient.pressure
     subsonic = int(np.argmax(flow < flow.max() * (1 - 1e-9)))
     return float(pressure[subsonic]), float(np.diff(pressure).max())
@@ -148,14 +131,8 @@ def release(
     The muscle is released `RELEASED_AT` seconds after the start; `duration` [s] includes that time.
     """
     system = plant(parameters, latched_load(), data=data)
-    run = am.simulate(
-        system,
-        RELEASE_SCHEDULE,
-        duration=duration,
-        initial_state=system.state_at(pressure=pressure),
-        integrator=am.Rodas4(1e-9),
-        output_times=1e-3,
-    )
+    options: dict[str, Any] = {"initial_state": system.state_at(pressure=pressure), "output_times": 1e-3}
+    run = am.simulate(system, RELEASE_SCHEDULE, duration=duration, integrator=am.Rodas4(1e-9), **options)
     free = run["time"] >= RELEASED_AT
     ratio, rate = damping(run["time"][free], run["position"][free], run["speed"][free])
     return Release(pressure, run, float(run["acceleration"][free][0]), float(run["contraction"].max()), ratio, rate)
@@ -182,10 +159,8 @@ def damping(time: npt.NDArray[Any], position: npt.NDArray[Any], speed: npt.NDArr
 
 def release_pair(parameters: UnpublishedParameters, data: str = FORCE_MAPS[0]) -> tuple[Release, Release]:
     """Simulate the releases from both initial pressures; the lower one first."""
-    return (
-        release(parameters, parameters.low_pressure.value, data),
-        release(parameters, parameters.high_pressure.value, data),
-    )
+    low, high = (release(parameters, each.value, data) for each in (parameters.low_pressure, parameters.high_pressure))
+    return low, high
 
 
 def compare_releases(low: Release, high: Release) -> dict[str, float]:
@@ -204,23 +179,15 @@ def compare_releases(low: Release, high: Release) -> dict[str, float]:
 
 def range_table(parameters: UnpublishedParameters) -> Table:
     """Return the four statements for both ends of the range of every chosen value, and for the second force map."""
-    cases = [
-        ("nominal values", parameters, FORCE_MAPS[0]),
-        ("surface fitted to the tool table", parameters, FORCE_MAPS[1]),
-    ]
-    for name, value in parameters.range_ends():
-        if name == "load":  # used during fill and discharge only
-            continue
-        unit = getattr(parameters, name).unit
-        cases.append((f"{name.replace('_', ' ')} {value:g} {unit}", parameters.with_value(name, value), FORCE_MAPS[0]))
+    named = zip(("nominal values", "surface fitted to the tool table"), FORCE_MAPS, strict=True)
+    cases = [(name, parameters, data) for name, data in named]
+    for name, item in rig.chosen_values(parameters).items():
+        if name != "load":  # used during fill and discharge only
+            cases += [(f"{name.replace('_', ' ')} {end:g} {item.unit}", parameters.with_value(name, end), FORCE_MAPS[0])
+                      for end in (item.low, item.high)]  # fmt: skip
     values = [compare_releases(*release_pair(case, data)) for _, case, data in cases]
     columns: dict[str, Any] = {"varied parameter": [name for name, _, _ in cases]}
-    for key, unit in (
-        ("acceleration", "m/s2"),
-        ("contraction", "% of length"),
-        ("relative damping", "1"),
-        ("absolute damping", "1"),
-    ):
+    for key, unit in zip(STATEMENTS, ("m/s2", "% of length", "1", "1"), strict=True):
         columns[f"{key}, difference [{unit}]"] = [row[key] for row in values]
     note = (
         "Damping differences are relative to the larger value; they are comparable up to "
@@ -239,7 +206,7 @@ def claims(low: Release, high: Release, ranges: Table) -> tuple[Claim, ...]:
             f"Initial gauge pressures {low.pressure / 1e3:g} and {high.pressure / 1e3:g} kPa (chosen). Each chosen "
             f"value varied alone over its range: {min(column):.3g} to {max(column):.3g} {format_unit(row.unit)}"
         )
-        result.append(row.claim(PAPER, "nominal values", values[key], f"{note.rstrip()}; {outcome}."))
+        result.append(row.claim(rig.PAPER, "nominal values", values[key], f"{note.rstrip()}; {outcome}."))
     return tuple(result)
 
 
@@ -254,6 +221,4 @@ def figure_4(low: Release, high: Release) -> Plot:
     axes[0].set_ylabel("contraction [%]")
     axes[1].set(ylabel="acceleration [m/s²]", xlabel="time after the release [s]", xlim=(-0.2, 3.0))
     legend_below(figure, axes[0])
-    return Plot(
-        "hosovsky_fig4", "Quick release of 30 kg from zero contraction at two initial pressures, as in Fig. 4.", figure
-    )
+    return captioned("hosovsky_fig4", figure)

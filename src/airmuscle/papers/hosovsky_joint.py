@@ -3,7 +3,8 @@
 import dataclasses
 import functools
 import itertools
-from collections.abc import Iterator, Sequence
+from collections import Counter
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -13,8 +14,9 @@ from ..design.study.distributions import Uniform
 from ..report.chapter import Table
 from ..report.claims import AtLeast, Claim
 from ..report.formatting import format_quantity, format_unit
-from .hosovsky_fill_and_release import RELEASED_AT, STATEMENTS, Release, agrees, compare_releases, release
+from .hosovsky_fill_and_release import RELEASED_AT, STATEMENTS, agrees, compare_releases, release
 from .hosovsky_plant import FORCE_MAPS, PAPER, UnpublishedParameters
+from .run import titled
 
 VARIED = ("stiffness", "damping", "length", "braid_angle", "low_pressure", "high_pressure")
 """The chosen values on which the quick release depends."""
@@ -67,64 +69,35 @@ class JointVariation:
 
 def joint_variation(parameters: UnpublishedParameters) -> JointVariation:
     """Return the four statements at all corners of the ranges, for both force maps, and at Sobol points within them."""
-    cases = [
-        _case(f"corners, {data}", point, data, _cached_release) for data in FORCE_MAPS for point in _corners(parameters)
-    ]
-    cases += [_case("Sobol set", point, FORCE_MAPS[0], _release) for point in _sobol(parameters)]
-    return JointVariation(tuple(cases))
+    run = functools.cache(release)  # corners share their releases
+    nominal = {"low_pressure": parameters.low_pressure, "high_pressure": parameters.high_pressure}
 
+    def case(design: str, values: Sequence[float], data: str) -> JointCase:
+        point = parameters
+        for name, value in zip(VARIED, values, strict=True):
+            point = point.with_value(name, value)
+        shared = dataclasses.replace(point, **nominal)
+        low, high = (run(shared, pressure.value, data, RELEASED_AT + OBSERVED)
+                     for pressure in (point.low_pressure, point.high_pressure))  # fmt: skip
+        return JointCase(design, point, compare_releases(low, high))
 
-def _case(design: str, point: UnpublishedParameters, data: str, run: Any) -> JointCase:
-    low, high = (run(_without_pressures(point), pressure.value, data)
-                 for pressure in (point.low_pressure, point.high_pressure))  # fmt: skip
-    return JointCase(design, point, compare_releases(low, high))
-
-
-def _without_pressures(point: UnpublishedParameters) -> UnpublishedParameters:
-    """The values on which one release depends, so that corners share their releases."""
-    nominal = UnpublishedParameters()
-    return dataclasses.replace(point, low_pressure=nominal.low_pressure, high_pressure=nominal.high_pressure)
-
-
-def _release(parameters: UnpublishedParameters, pressure: float, data: str) -> Release:
-    return release(parameters, pressure, data, RELEASED_AT + OBSERVED)
-
-
-_cached_release = functools.lru_cache(maxsize=256)(_release)
-
-
-def _corners(parameters: UnpublishedParameters) -> Iterator[UnpublishedParameters]:
-    ends = [(getattr(parameters, name).low, getattr(parameters, name).high) for name in VARIED]
-    return (_at(parameters, point) for point in itertools.product(*ends))
-
-
-def _sobol(parameters: UnpublishedParameters) -> Iterator[UnpublishedParameters]:
-    ranges = [getattr(parameters, name) for name in VARIED]
-    points = Sobol(SOBOL_POINTS).values([Uniform(value.low, value.high) for value in ranges])
-    return (_at(parameters, point.tolist()) for point in points)
-
-
-def _at(parameters: UnpublishedParameters, point: Sequence[float]) -> UnpublishedParameters:
-    for name, value in zip(VARIED, point, strict=True):
-        parameters = parameters.with_value(name, value)
-    return parameters
+    ranges = [(getattr(parameters, name).low, getattr(parameters, name).high) for name in VARIED]
+    corners = list(itertools.product(*ranges))
+    sobol = Sobol(SOBOL_POINTS).values([Uniform(low, high) for low, high in ranges]).tolist()
+    cases = [case(f"corners, {data}", point, data) for data in FORCE_MAPS for point in corners]
+    return JointVariation((*cases, *(case("Sobol set", point, FORCE_MAPS[0]) for point in sobol)))
 
 
 def joint_table(joint: JointVariation) -> Table:
     """Return the share of the joint variations for which each statement holds, and its extreme values."""
-    designs = list(dict.fromkeys(case.design for case in joint.cases))
+    counts = Counter(case.design for case in joint.cases)
     columns: dict[str, list[Any]] = {"statement": list(STATEMENTS)}
-    for design in designs:
-        count = sum(case.design == design for case in joint.cases)
+    for design, count in counts.items():
         columns[f"holds, {design}, {count} cases [%]"] = [100 * joint.share(key, design) for key in STATEMENTS]
     columns["minimum"] = [float(np.nanmin(joint.values(key))) for key in STATEMENTS]
     columns["maximum"] = [float(np.nanmax(joint.values(key))) for key in STATEMENTS]
     columns["worst case"] = [joint.worst(key).describe() for key in STATEMENTS]
-    note = (
-        "All chosen values are varied together over their ranges: every combination of their ends, and a scrambled "
-        "Sobol set (seed 0, uniform). Minimum and maximum of the differences in the units of the table above."
-    )
-    return Table("hosovsky_release_joint", "Quick release with all chosen values varied together", columns, note)
+    return titled("hosovsky_release_joint", columns)
 
 
 def claims(joint: JointVariation) -> tuple[Claim, ...]:
@@ -132,10 +105,8 @@ def claims(joint: JointVariation) -> tuple[Claim, ...]:
     result = []
     for key, row in STATEMENTS.items():
         values, worst = joint.values(key), joint.worst(key)
-        shares = "; ".join(
-            f"{design} {100 * joint.share(key, design):.3g} %"
-            for design in dict.fromkeys(c.design for c in joint.cases)
-        )
+        designs = dict.fromkeys(case.design for case in joint.cases)
+        shares = "; ".join(f"{design} {100 * joint.share(key, design):.3g} %" for design in designs)
         note = (
             f"Share of {len(joint.cases)} combinations of all chosen values for which it holds: {shares}. Values "
             f"{np.nanmin(values):.3g} to {np.nanmax(values):.3g} {format_unit(row.unit)}".rstrip()

@@ -2,6 +2,8 @@
 
 import dataclasses
 import functools
+from collections.abc import Iterator
+from typing import Any
 
 import airmuscle as am
 
@@ -50,11 +52,6 @@ class ChosenValue:
     meaning: str
     source: str = CHOSEN
 
-    def as_row(self) -> tuple[str, str, str]:
-        """Return (meaning, value with unit and range, source) for the report."""
-        low, high = (typographic(format_number(end)) for end in (self.low, self.high))
-        return self.meaning, f"{format_quantity(self.value, self.unit)} (range {low} to {high})", self.source
-
 
 @dataclasses.dataclass(frozen=True)
 class UnpublishedParameters:
@@ -74,14 +71,17 @@ class UnpublishedParameters:
         """Return the parameters with another value of one of them."""
         return dataclasses.replace(self, **{name: dataclasses.replace(getattr(self, name), value=value)})
 
-    def range_ends(self) -> tuple[tuple[str, float], ...]:
-        """Return (name, value) for both ends of the range of every parameter."""
-        items = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
-        return tuple((name, end) for name, item in items.items() for end in (item.low, item.high))
 
-    def as_rows(self) -> tuple[tuple[str, str, str], ...]:
-        """Return (meaning, value with unit and range, source) of every parameter for the report."""
-        return tuple(getattr(self, field.name).as_row() for field in dataclasses.fields(self))
+def chosen_values(parameters: Any) -> dict[str, ChosenValue]:
+    """Return the chosen values of a dataclass by their names."""
+    return {field.name: getattr(parameters, field.name) for field in dataclasses.fields(parameters)}
+
+
+def chosen_rows(parameters: Any) -> Iterator[tuple[str, str, str]]:
+    """Return (meaning, value with unit and range, source) of every chosen value of a dataclass for the report."""
+    for each in chosen_values(parameters).values():
+        low, high = (typographic(format_number(end)) for end in (each.low, each.high))
+        yield each.meaning, f"{format_quantity(each.value, each.unit)} (range {low} to {high})", each.source
 
 
 @functools.cache

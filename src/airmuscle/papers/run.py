@@ -5,7 +5,7 @@ import functools
 import importlib
 import time
 import tomllib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, as_completed
 from importlib import resources
 from pathlib import Path
@@ -14,7 +14,7 @@ from typing import Any
 from ..core import check_writable
 from ..engine.processes import process_pool
 from ..files.library.files import complete_name
-from ..report.chapter import Chapter
+from ..report.chapter import Chapter, Plot, Table
 from ..report.write import with_rendered_figures, write_report
 
 PAPERS: dict[str, str] = {
@@ -95,6 +95,22 @@ def _all_texts() -> dict[str, Any]:
 def chapter_texts(paper: str) -> dict[str, Any]:
     """Return the texts of a chapter as arguments of `Chapter`; line breaks within a paragraph are spaces."""
     texts = _all_texts()[paper]
-    tables = {key: tuple((k, " ".join(v.split())) for k, v in value.items())
+    rows = {key: tuple(map(tuple, value)) for key, value in texts.items() if isinstance(value, list)}
+    tables = {key: tuple((k, _in_one_line(v)) for k, v in value.items())
               for key, value in texts.items() if isinstance(value, dict)}  # fmt: skip
-    return {**texts, **tables}
+    return {**texts, **rows, **tables}
+
+
+def captioned(name: str, figure: Any) -> Plot:
+    """Return a figure of a chapter with its caption in texts.toml."""
+    return Plot(name, _in_one_line(_all_texts()["figures"][name]), figure)
+
+
+def titled(name: str, columns: Mapping[str, Any], **options: Any) -> Table:
+    """Return a table of a chapter with its title and note in texts.toml, except those among the `options`."""
+    texts = {key: _in_one_line(text) for key, text in _all_texts()["tables"][name].items()}
+    return Table(name, columns=columns, **{**texts, **options})
+
+
+def _in_one_line(text: str) -> str:
+    return " ".join(text.split())

@@ -14,21 +14,7 @@ from ..physics.muscle.characteristic.saga2007 import RUBBER_TEST_STRAIN
 from ..report.claims import AtLeast, AtMost, Claim, ClaimRow, Equal, Kind
 from . import saga2007_muscle as values
 from .saga2007_joint import FEED_FORWARD
-from .saga2007_muscle import (
-    DEFAULT,
-    INTERPRETATIONS,
-    LARGE,
-    LINES,
-    PAPER,
-    PRESSURE,
-    SMALL,
-    THICK_WALL,
-    Law,
-    exact_mechanics,
-    exact_meridian,
-    interpretation,
-    interpretation_name,
-)
+from .saga2007_muscle import DEFAULT, INTERPRETATIONS, LINES, PAPER, PRESSURE, Law, exact_meridian
 from .saga2007_previous import PREVIOUS_MODEL
 
 LOW_PRESSURE = 0.04e6
@@ -42,11 +28,11 @@ HIGHER_PRESSURE = 2.0
 FIRST_PERCENT = 0.01
 """Contraction at which the largest force is taken [1] (chosen): at 0 inextensible fibres hold any force."""
 
-B, A = interpretation_name(2, 1, "B"), interpretation_name(2, 1, "A")
+B, A = values.interpretation_name(2, 1, "B"), values.interpretation_name(2, 1, "A")
 """Names of the default, and of the printed model with line A."""
-MECHANICS = {f"exact mechanics, line {name}": exact_mechanics(line) for name, line in LINES.items()}
+MECHANICS = {f"exact mechanics, line {name}": values.exact_mechanics(line) for name, line in LINES.items()}
 EXACT = {f"exact meridian, line {name}": exact_meridian(line) for name, line in LINES.items()}
-PRINTED: dict[str, am.characteristic.Saga2007] = {B: DEFAULT, A: interpretation(LINES["A"], 2.0, 1.0)}
+PRINTED: dict[str, am.characteristic.Saga2007] = {B: DEFAULT, A: values.interpretation(LINES["A"], 2.0, 1.0)}
 LAWS: Mapping[str, Law] = {**PRINTED, **MECHANICS, **EXACT}
 """Default, printed model, the two of exact mechanics, and the exact meridian with both rubber lines."""
 
@@ -146,12 +132,13 @@ ROWS: Mapping[str, ClaimRow] = {
          for name, exact in ((OUTLINE, False), ("exact outline without rubber", True))}, place="Fig. 4"),
     "little change": ClaimRow("A large contraction requires little change of the pressure",
         AtMost(100 * LITTLE_CHANGE, chosen=True), "%", values.pressure_change,
-        f"Relative change of the pressure from {100 * SMALL:g} to {100 * LARGE:g} % contraction; the bound is chosen.",
+        f"Relative change of the pressure from {100 * values.SMALL:g} to {100 * values.LARGE:g} % contraction; the "
+        "bound is chosen.",
         _each(LAWS, 0.0, 100.0), place="text"),
     "thick wall": ClaimRow("A thicker wall, to endure pressure, sacrifices contraction at low pressure", RISES, "1",
-        values.wall_ratio, f"Ratio of the pressures for 5 % without load, with a wall of {1e3 * THICK_WALL:g} mm "
-        "(chosen) and with that of Table 1: above 1, the contraction needs a higher pressure.",
-        _each({**PRINTED, **EXACT}), place="text"),
+        values.wall_ratio, "Ratio of the pressures for 5 % without load, with a wall of "
+        f"{1e3 * values.THICK_WALL:g} mm (chosen) and with that of Table 1: above 1, the contraction needs a higher "
+        "pressure.", _each({**PRINTED, **EXACT}), place="text"),
     "previous model": PREVIOUS_MODEL,
 }  # fmt: skip
 """All rows by name, in the order of the report."""
@@ -160,8 +147,3 @@ ROWS: Mapping[str, ClaimRow] = {
 def claim(row: str, *arguments: Any) -> Claim:
     """Return the claim of one row for other arguments than those of its cases."""
     return ROWS[row].claim(PAPER, "", *arguments)
-
-
-def all_claims() -> tuple[Claim, ...]:
-    """Return all claims, also those for which other interpretations or models give other verdicts."""
-    return tuple(found for row in ROWS.values() for found in row.claims(PAPER))

@@ -10,17 +10,10 @@ from ..core import BLACK, DASHES, LINES, legend_outside, new_figure
 from ..physics.muscle.characteristic.saga2007 import RUBBER_TEST_STRAIN
 from ..report.chapter import Plot
 from ..report.formula import to_mathtext
+from . import saga2007_muscle as values
+from .run import captioned
 from .saga2007_joint import feed_forward_figure
-from .saga2007_muscle import (
-    DEFAULT,
-    FIG_2,
-    INTERPRETATIONS,
-    circular_meridian,
-    exact_meridian,
-    interpretation,
-    pressure_along,
-    with_rings,
-)
+from .saga2007_muscle import DEFAULT, INTERPRETATIONS, circular_meridian, exact_meridian, pressure_along
 from .saga2007_muscle import LINES as RUBBER
 from .saga2007_pairs import errors, ideal_errors
 from .saga2007_previous import previous_model_figure
@@ -31,25 +24,24 @@ MPA = 1e-6
 
 def plots() -> tuple[Plot, ...]:
     """Return all figures in the order of the report."""
-    drawn = (
-        previous_model_figure,
-        outlines,
-        rubber,
-        contraction_over_pressure,
-        force_over_contraction,
-        snap_through,
-        interpretations,
-        pairs,
-        feed_forward_figure,
+    return (
+        previous_model_figure(),
+        outlines(),
+        rubber(),
+        contraction_over_pressure(),
+        force_over_contraction(),
+        snap_through(),
+        interpretations(),
+        pairs(),
+        feed_forward_figure(),
     )
-    return tuple(draw() for draw in drawn)
 
 
 def outlines() -> Plot:
     """Return Fig. 2: the parabola at six contractions, and the exact outline without rubber."""
     figure, axes = new_figure(height=3.3)
     reference = exact_meridian(RUBBER["A"]).geometry
-    for i, c in enumerate((0.0, *FIG_2)):
+    for i, c in enumerate((0.0, *values.FIG_2)):
         for tube, dash in ((DEFAULT.geometry, "-"), (reference, ":")):
             x, r = tube.outline(c)
             label = f"{100 * c:g} %" if dash == "-" else None
@@ -57,12 +49,7 @@ def outlines() -> Plot:
     axes.plot([], [], ":", color=BLACK, label="exact,\nwithout rubber")
     axes.set(xlabel="position along the axis [mm]", ylabel="radius [mm]", xlim=(-40, 40), ylim=(0, 30))
     legend_outside(axes, title="contraction")
-    return Plot(
-        "saga2007_outlines",
-        "Outlines as in Fig. 2 of the paper, by (2) and (3) (solid), and the exact outline of inextensible fibres "
-        "without rubber (dotted). The arc of the parabola is shorter than the fibre, by 4.7 % at 25 % contraction.",
-        figure,
-    )
+    return captioned("saga2007_outlines", figure)
 
 
 def rubber() -> Plot:
@@ -75,12 +62,7 @@ def rubber() -> Plot:
             axes.plot(strain, line.stress(strain) * MPA, dash, color=LINES[i], label=label)
     axes.set(xlabel="hoop strain", ylabel="hoop stress [MPa]", xlim=(0, 4), ylim=(0, 1.4))
     axes.legend(loc="upper left")
-    return Plot(
-        "saga2007_rubber",
-        "Hoop stress of the rubber, as in Fig. 4 of the paper, in its two interpretations; dotted: beyond the end of "
-        "the test at strain 3, which the muscle reaches at 21.1 % contraction.",
-        figure,
-    )
+    return captioned("saga2007_rubber", figure)
 
 
 def _draw_contraction(axes: Any, law: am.characteristic.Saga2007, force: float, i: int, label: str) -> None:
@@ -98,7 +80,7 @@ def contraction_over_pressure() -> Plot:
     figure, (left, right) = new_figure(1, 2, width=7.2, height=3.4, sharey=True)
     for i, (force, load) in enumerate(((100.0, "100 N"), (0.0, "no load"))):
         for n, rings in enumerate(("no rings", "1 ring", "2 rings")):
-            _draw_contraction(left, with_rings(DEFAULT, n), force, 3 * i + n, f"{rings}, {load}")
+            _draw_contraction(left, values.with_rings(DEFAULT, n), force, 3 * i + n, f"{rings}, {load}")
     for i, force in enumerate((0.0, 50.0, 100.0, 200.0)):
         _draw_contraction(right, DEFAULT, force, i, f"{force:g} N")
     ticks = (0.0, 0.05, 0.1, 0.15)
@@ -106,13 +88,7 @@ def contraction_over_pressure() -> Plot:
     right.set(xlabel="gauge pressure [MPa]", xlim=(0, 0.16), xticks=ticks)
     left.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2)
     right.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, title="no rings")
-    return Plot(
-        "saga2007_contraction",
-        r"Contraction over pressure as in Fig. 8 of the paper (\(w = 2\), \(q = 1\), line B); its load is not stated "
-        "and its measured points are lost. Thin: the pressure falls with contraction. There the muscle snaps through, "
-        "and equal segments between rings contract unequally, so that a real muscle does not follow this solution.",
-        figure,
-    )
+    return captioned("saga2007_contraction", figure)
 
 
 def force_over_contraction() -> Plot:
@@ -122,31 +98,21 @@ def force_over_contraction() -> Plot:
     reference = exact_meridian(DEFAULT.rubber)
     for i, pressure in enumerate((0.08e6, 0.11e6, 0.16e6)):
         label = f"{pressure * MPA:g} MPa"
-        axes.plot(100 * contraction, DEFAULT.force(pressure, contraction), color=LINES[i], label=f"{label}, (19)")
-        axes.plot(
-            100 * contraction,
-            reference.shape_at_pressure(pressure, contraction).force,
-            "--",
-            color=LINES[i],
-            label=f"{label}, exact",
-        )
-        circle = circular_meridian(DEFAULT.rubber).force(pressure, contraction)
-        axes.plot(100 * contraction, circle, ":", color=LINES[i], label=f"{label}, circle")
+        for model, dash, force in (
+            ("(19)", "-", DEFAULT.force(pressure, contraction)),
+            ("exact", "--", reference.shape_at_pressure(pressure, contraction).force),
+            ("circle", ":", circular_meridian(DEFAULT.rubber).force(pressure, contraction)),
+        ):
+            axes.plot(100 * contraction, force, dash, color=LINES[i], label=f"{label}, {model}")
     axes.set(xlabel="contraction [%]", ylabel="tension [N]", xlim=(0, 40), ylim=(0, 400))
     legend_outside(axes)
-    return Plot(
-        "saga2007_force",
-        r"Tension over contraction at constant pressure, line B: the printed balances (19) with \(w = 2\), "
-        r"\(q = 1\), the exact meridian, and the circular meridian with virtual work. The deviation of (19) is due to "
-        "the factor 2 of (17).",
-        figure,
-    )
+    return captioned("saga2007_force", figure)
 
 
 def snap_through() -> Plot:
     """Return pressure over contraction with line A: snap-through."""
     figure, (left, right) = new_figure(1, 2, width=7.2, height=3.4)
-    law = interpretation(RUBBER["A"], 2.0, 1.0)
+    law = values.interpretation(RUBBER["A"], 2.0, 1.0)
     for i, force in enumerate((0.0, 30.0, law.snap_through_load, 120.0)):
         _draw_pressure(left, law, force, i, f"{force:.3g} N")
     for i, (name, law) in enumerate((n, r) for n, r in INTERPRETATIONS.items() if n.endswith("A")):
@@ -155,13 +121,7 @@ def snap_through() -> Plot:
     right.set(xlabel="contraction [%]", xlim=(0, 50), ylim=(0, 0.12))
     left.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, title="$w = 2$, $q = 1$")
     right.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=2, title="no load")
-    return Plot(
-        "saga2007_snap",
-        "Line A: below a limiting load (72.4 N for the printed model) the pressure falls at the beginning of the "
-        "contraction to a minimum (dot) and rises again: a snap-through as in a balloon. Only rising branches are "
-        "stable.",
-        figure,
-    )
+    return captioned("saga2007_snap", figure)
 
 
 def _draw_pressure(axes: Any, law: am.characteristic.Saga2007, force: float, i: int, label: str) -> None:
@@ -186,13 +146,8 @@ def interpretations() -> Plot:
         axes.plot(100 * CONTRACTION, reference, color=BLACK, lw=2.0, label="exact meridian")
         axes.set(xlabel="contraction [%]", title=f"line {name}, 100 N", xlim=(0, 40), ylim=(0, 0.3))
     panels[0].set_ylabel("gauge pressure [MPa]")
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=3)
-    return Plot(
-        "saga2007_readings",
-        "Pressure required at a load of 100 N: the interpretations of (19) and the exact meridian of the same muscle.",
-        figure,
-    )
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
+    return captioned("saga2007_readings", figure)
 
 
 def pairs() -> Plot:
@@ -212,11 +167,5 @@ def pairs() -> Plot:
         axes.axhline(0, color=BLACK, lw=0.6)
         axes.set(xlabel="contraction [%]", title=title, xlim=(0, 40), ylim=(-60, 60))
     panels[0].set_ylabel("error relative to the exact meridian [%]")
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=2, fontsize=7)
-    return Plot(
-        "saga2007_pairs",
-        "Errors of all pairs of assumed outline and closure. Virtual work is insensitive to small errors of the "
-        "outline; the end balance depends on its end slope. The circle with the middle balance is the previous model.",
-        figure,
-    )
+    figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=2, fontsize=7)
+    return captioned("saga2007_pairs", figure)

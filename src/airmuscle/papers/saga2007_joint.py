@@ -16,15 +16,10 @@ from ..core import BLACK, DASHES, Array, legend_outside, new_figure
 from ..core import LINES as COLOURS
 from ..report.chapter import Plot, Table
 from ..report.claims import AtMost, ClaimRow, Kind
-from .saga2007_muscle import (
-    LENGTH,
-    LINES,
-    circular_meridian,
-    exact_mechanics,
-    exact_meridian,
-    interpretation,
-    pressure_along,
-)
+from ..report.formula import to_mathtext
+from . import saga2007_muscle as values
+from .run import captioned, titled
+from .saga2007_muscle import LENGTH, LINES, circular_meridian, exact_meridian, pressure_along
 
 RADIUS, OFFSET, TENSION = 0.012, 0.08, 50.0
 """Pulley radius [m], contraction of both muscles at angle 0, and tension of both muscles [N] (chosen)."""
@@ -46,8 +41,8 @@ GRID = 31
 def models(line: am.characteristic.RubberLine) -> dict[str, am.characteristic.Characteristic]:
     """Return the models that compute the pressures, by name, for one rubber line."""
     return {
-        r"printed, \(w = 2\), \(q = 1\)": interpretation(line, 2.0, 1.0),
-        "exact mechanics of the parabola": exact_mechanics(line),
+        r"printed, \(w = 2\), \(q = 1\)": values.interpretation(line, 2.0, 1.0),
+        "exact mechanics of the parabola": values.exact_mechanics(line),
         "circular meridian, virtual work": circular_meridian(line),
         "exact meridian": exact_meridian(line),
     }
@@ -112,10 +107,11 @@ def max_angle_error(name: str, line: str) -> float:
         return float("nan")
     at = int(errors.argmax())
     span = (LINE[max(at - 1, 0)], LINE[min(at + 1, len(LINE) - 1)])
-    refined = minimize_scalar(
-        lambda angle: -abs(angle_errors(name, line, (float(angle),))[0]), bounds=span, method="bounded",
-        options={"xatol": 1e-3},
-    )  # fmt: skip
+
+    def negative(angle: float) -> float:
+        return -abs(float(angle_errors(name, line, (float(angle),))[0]))
+
+    refined = minimize_scalar(negative, bounds=span, method="bounded", options={"xatol": 1e-3})
     return float(max(errors[at], -refined.fun))
 
 
@@ -140,17 +136,16 @@ def feed_forward_table() -> Table:
     """Return the angles that the exact pair reaches."""
     rows = [(name, line) for line in LINES for name in models(LINES[line])]
     columns: dict[str, list[Any]] = {"model": [name for name, _ in rows], "rubber line": [line for _, line in rows]}
-    for i, angle in enumerate(np.degrees(ANGLES)):
-        columns[f"angle for {angle:g} degrees [degree]"] = [
-            round(float(np.degrees(reached_angles(name, line)[i])), 3) for name, line in rows
-        ]
+    reached = np.degrees([reached_angles(name, line) for name, line in rows])
+    for angle, column in zip(np.degrees(ANGLES), reached.T.tolist(), strict=True):
+        columns[f"angle for {angle:g} degrees [degree]"] = [round(each, 3) for each in column]
     note = (
         "The model gives the pressures of both muscles for the wanted angle at equal tensions; the pair has the exact "
         "meridian. No value: both muscles are slack, because both pressures are below those at which the exact "
         f"muscle has a tension of {SLACK_TENSION:g} N (chosen). The last row of each line checks the computation: the "
         "exact model reaches each angle."
     )
-    return Table("saga2007_feed_forward", "Angle of a pair of muscles under feed-forward control", columns, note)
+    return titled("saga2007_feed_forward", columns, note=note)
 
 
 def feed_forward_figure() -> Plot:
@@ -161,16 +156,9 @@ def feed_forward_figure() -> Plot:
         for i, name in enumerate(list(models(LINES[line]))[:-1]):
             error = np.degrees(angle_errors(name, line))
             both = np.concatenate([-error[::-1], [0.0], error])
-            axis.plot(
-                wanted, both, linestyle=DASHES[i], color=COLOURS[i], label=name.replace(r"\(", "$").replace(r"\)", "$")
-            )
+            axis.plot(wanted, both, linestyle=DASHES[i], color=COLOURS[i], label=to_mathtext(name))
         axis.axhline(0.0, color=BLACK, linewidth=0.6)
         axis.set(xlabel="wanted angle [degree]", title=f"rubber line {line}")
     axes[0].set_ylabel("error of the angle [degree]")
     legend_outside(axes[1])
-    return Plot(
-        "saga2007_feed_forward",
-        "Feed-forward control of an antagonistic pair: the pressures are those of a model, the pair has the exact "
-        "meridian; steady state without friction. With the pressures of the printed model both muscles are slack.",
-        figure,
-    )
+    return captioned("saga2007_feed_forward", figure)

@@ -5,7 +5,7 @@ closures. The previous model, Ferraresi et al. 2001, is the circle with the bala
 """
 
 import functools
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,6 +17,7 @@ from ..physics.muscle.characteristic.rubber import RubberIntegral
 from ..physics.muscle.geometry.meridian import Segment
 from ..physics.muscle.geometry.straight_fibre import FibreTube
 from ..report.chapter import Table
+from .run import titled
 from .saga2007_muscle import DIAMETER, EVEN_SPREAD, LENGTH, LINES, WALL, exact_meridian
 
 OUTLINES: dict[str, FibreTube] = {
@@ -98,34 +99,34 @@ def balance_pressure(balance: ForceBalance, force: float) -> Array:
         return np.where(balance.area > 0, (force + balance.rubber) / balance.area, np.nan)
 
 
+Pair = tuple[str, str]
+"""Names of an outline and a closure."""
+
+
 @functools.lru_cache(maxsize=16)
-def _all_balances(
-    rubber: am.characteristic.RubberLine, contraction: tuple[float, ...]
-) -> dict[tuple[str, str], ForceBalance]:
-    """Return the balances of all 15 pairs (outline, closure); cached, as they do not depend on the load."""
-    contractions = np.array(contraction)
+def _all_balances(rubber: am.characteristic.RubberLine, contraction: tuple[float, ...]) -> dict[Pair, ForceBalance]:
+    """Return the balances of all 15 pairs; cached, as they do not depend on the load."""
     return {
         (outline, closure): balance
         for outline, tube in OUTLINES.items()
-        for closure, balance in force_balances(tube, rubber, contractions).items()
+        for closure, balance in force_balances(tube, rubber, np.array(contraction)).items()
     }
 
 
-def pressures(rubber: am.characteristic.RubberLine, force: float, contraction: Array) -> dict[tuple[str, str], Array]:
-    """Return the pressure [Pa] of each of the 15 pairs (outline, closure)."""
-    return {
-        pair: balance_pressure(balance, force) for pair, balance in _all_balances(rubber, tuple(contraction)).items()
-    }
+def pressures(rubber: am.characteristic.RubberLine, force: float, contraction: Array) -> dict[Pair, Array]:
+    """Return the pressure [Pa] of each of the 15 pairs."""
+    balances = _all_balances(rubber, tuple(contraction))
+    return {pair: balance_pressure(balance, force) for pair, balance in balances.items()}
 
 
-def ideal_errors(contraction: Array) -> dict[tuple[str, str], Array]:
+def ideal_errors(contraction: Array) -> dict[Pair, Array]:
     """Return the relative error of F/p of each pair, compared with the exact meridian, both without rubber [1]."""
     reference = np.asarray(am.geometry.PleatedTube(LENGTH, DIAMETER).effective_area(contraction))
     balances = _all_balances(am.characteristic.RubberLine(0.0, 0.0), tuple(contraction))
     return {pair: balance.area / reference - 1 for pair, balance in balances.items()}
 
 
-def errors(rubber: am.characteristic.RubberLine, force: float, contraction: Array) -> dict[tuple[str, str], Array]:
+def errors(rubber: am.characteristic.RubberLine, force: float, contraction: Array) -> dict[Pair, Array]:
     """Return the relative pressure error of each pair, compared with the exact meridian with rubber [1].
 
     NaN where either of the two is undefined.
@@ -135,36 +136,33 @@ def errors(rubber: am.characteristic.RubberLine, force: float, contraction: Arra
 
 
 def pressure_table(
-    name: str, title: str, rows: Sequence[tuple[str, float, Array]], note: str, contraction: Array = CONTRACTIONS,
-    kind: str = "model", digits: int = 6,
+    name: str, rows: Sequence[tuple[str, float, Array]], contraction: Array = CONTRACTIONS, kind: str = "model",
+    digits: int = 6,
 ) -> Table:  # fmt: skip
     """Return a table of pressures [Pa] over contraction by model and load [N]."""
     columns: dict[str, list[Any]] = {kind: [r[0] for r in rows], "load [N]": [r[1] for r in rows]}
     for i, c in enumerate(contraction):
         columns[f"pressure at {100 * c:g} % [MPa]"] = [round(float(r[2][i]) / 1e6, digits) for r in rows]
-    return Table(name, title, columns, note)
+    return titled(name, columns)
 
 
-def tables() -> tuple[Table, ...]:
-    """Return the errors of the 15 pairs without rubber, and with rubber at two loads."""
-    result = [_table("ideal", "tension per pressure, without rubber", ideal_errors(CONTRACTIONS))]
+NOTE = (
+    r"Compared with the exact meridian of the same muscle; \(w = 1\), \(M = m/\pi\), rubber along the arc. No "
+    "value: beyond the pole, or no exact outline (line A without load at 1 %). The previous model is the circle "
+    "with the middle balance; its printed sum over the fibres is 1.3 % smaller than that used here."
+)
+
+
+def tables() -> Iterator[Table]:
+    """Yield the errors of the 15 pairs without rubber, and with rubber at two loads."""
+    found = {"ideal": ("tension per pressure, without rubber", ideal_errors(CONTRACTIONS))}
     for name, line in LINES.items():
         for force in (0.0, 100.0):
-            title = f"pressure with rubber line {name} at {force:g} N"
-            result.append(_table(f"{name}_{force:g}N".lower(), title, errors(line, force, CONTRACTIONS)))
-    return tuple(result)
-
-
-def _table(name: str, title: str, rows: dict[tuple[str, str], Array]) -> Table:
-    columns: dict[str, list[Any]] = {
-        "outline": [outline for outline, _ in rows],
-        "closure": [closure for _, closure in rows],
-    }
-    for i, c in enumerate(CONTRACTIONS):
-        columns[f"error at {100 * c:g} % [%]"] = [round(100 * float(row[i]), 2) for row in rows.values()]
-    note = (
-        r"Compared with the exact meridian of the same muscle; \(w = 1\), \(M = m/\pi\), rubber along the arc. No "
-        "value: beyond the pole, or no exact outline (line A without load at 1 %). The previous model is the circle "
-        "with the middle balance; its printed sum over the fibres is 1.3 % smaller than that used here."
-    )
-    return Table(f"saga2007_pairs_{name}", f"Error of the pairs of outline and closure: {title}", columns, note)
+            what = f"pressure with rubber line {name} at {force:g} N"
+            found[f"{name}_{force:g}N".lower()] = what, errors(line, force, CONTRACTIONS)
+    for key, (what, rows) in found.items():
+        columns: dict[str, list[Any]] = {"outline": [outline for outline, _ in rows]}
+        columns["closure"] = [closure for _, closure in rows]
+        for i, c in enumerate(CONTRACTIONS):
+            columns[f"error at {100 * c:g} % [%]"] = [round(100 * float(row[i]), 2) for row in rows.values()]
+        yield Table(f"saga2007_pairs_{key}", f"Error of the pairs of outline and closure: {what}", columns, NOTE)

@@ -12,6 +12,7 @@ from ..core import BLACK, DASHES, LINES, ParameterError, SolveError, new_figure
 from ..report.chapter import Plot, Table
 from ..report.claims import AtLeast, ClaimRow
 from . import saga2007_pairs as pairs
+from .run import captioned
 from .saga2007_muscle import DIAMETER, LENGTH, PRESSURE, WALL, exact_meridian
 from .saga2007_muscle import LINES as RUBBER
 
@@ -147,15 +148,10 @@ def radii_at_contraction() -> tuple[float, str]:
 
 PREVIOUS_MODEL = ClaimRow(
     "Fig. 1: centre and radius of the circular meridian change with pressure: ratio of the radii",
-    AtLeast(RADIUS_CHANGE, chosen=True),
-    "1",
-    lambda radii: radii(),
-    cases={
-        f"line A, constant load of {FIG_1_LOAD:g} N": (radii_at_load,),
-        "line A, constant contraction": (radii_at_contraction,),
-    },
-    place="Fig. 1, equations (A) and (B)",
-)
+    AtLeast(RADIUS_CHANGE, chosen=True), "1", lambda radii: radii(), place="Fig. 1, equations (A) and (B)",
+    cases={f"line A, constant load of {FIG_1_LOAD:g} N": (radii_at_load,),
+           "line A, constant contraction": (radii_at_contraction,)},
+)  # fmt: skip
 
 
 def previous_model_table() -> Table:
@@ -163,22 +159,17 @@ def previous_model_table() -> Table:
     contraction = pairs.CONTRACTIONS
     rows: list[tuple[str, float, Any]] = []
     for name, line in RUBBER.items():
-        narrow = Ferraresi2001(line, initial_radius=INITIAL_RADIUS_RATIO * DIAMETER / 2)
+        printed = Ferraresi2001(line)
+        narrow = dataclasses.replace(printed, initial_radius=INITIAL_RADIUS_RATIO * printed.end_radius)
         for force in (0.0, 100.0):
-            even = pairs.pressures(line, force, contraction)["circle", "middle balance"]
-            rows.append((f"(A), (B) as printed, line {name}", force, Ferraresi2001(line).pressure(contraction, force)))
-            rows.append((f"with evenly distributed fibres, line {name}", force, even))
-            rows.append((f"as printed, ri = {INITIAL_RADIUS_RATIO:g} r0, line {name}", force,
-                         narrow.pressure(contraction, force)))  # fmt: skip
-            exact = np.asarray(exact_meridian(line).shape_at_force(contraction, force).pressure)
-            rows.append((f"exact meridian, line {name}", force, exact))
-    note = (
-        r"The printed sum over the fibres is \(\cot(\pi/N)\) = 5.027 for 16 fibres; evenly distributed fibres give "
-        r"\(N/\pi\) = 5.093. The initial radius is that of the ends unless stated (chosen: it is not printed for this "
-        "muscle). No value: no exact outline (line A without load at 1 %)."
-    )
-    title = "Previous model: circular meridian with equations (A) and (B)"
-    return pairs.pressure_table("saga2007_previous", title, rows, note)
+            pressures = {
+                "(A), (B) as printed": printed.pressure(contraction, force),
+                "with evenly distributed fibres": pairs.pressures(line, force, contraction)["circle", "middle balance"],
+                f"as printed, ri = {INITIAL_RADIUS_RATIO:g} r0": narrow.pressure(contraction, force),
+                "exact meridian": np.asarray(exact_meridian(line).shape_at_force(contraction, force).pressure),
+            }
+            rows += [(f"{model}, line {name}", force, pressure) for model, pressure in pressures.items()]
+    return pairs.pressure_table("saga2007_previous", rows)
 
 
 def previous_model_figure() -> Plot:
@@ -201,9 +192,4 @@ def previous_model_figure() -> Plot:
     axes.axhline(0.0, color=BLACK, linewidth=0.8, linestyle="-.")
     axes.set(xlabel="position along the axis [mm]", ylabel="radius [mm]", aspect="equal")
     axes.legend(loc="upper left", bbox_to_anchor=(1.02, 1.0), title="pressure, contraction")
-    return Plot(
-        "saga2007_fig1",
-        f"Circular meridian of the previous model at two pressures and a load of {FIG_1_LOAD:g} N, as in Fig. 1: "
-        "centre (dot) and radius move, R1 < R2. By equations (A) and (B) as printed, with line A.",
-        figure,
-    )
+    return captioned("saga2007_fig1", figure)

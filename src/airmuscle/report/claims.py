@@ -169,6 +169,11 @@ class ClaimRow:
         return tuple(self.claim(paper, case, *subject, *arguments) for case, arguments in self.cases.items())
 
 
+def claims_of(rows: Iterable[ClaimRow], paper: str, *subject: Any) -> tuple[Claim, ...]:
+    """Return the claims of the rows of a table, each in all its cases."""
+    return tuple(claim for row in rows for claim in row.claims(paper, *subject))
+
+
 @dataclasses.dataclass(frozen=True)
 class Statement:
     """A statement with all the cases for which it is evaluated."""
