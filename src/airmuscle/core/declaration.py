@@ -88,7 +88,7 @@ def model(cls: type[T]) -> type[T]:
 
 def forwarded(path: str) -> Any:
     """A property that is that of a part: `forwarded("inner.states")`."""
-    return property(operator.attrgetter(path), doc=f"That of `{path.rpartition('.')[0]}`.")
+    return property(operator.attrgetter(path), doc=f"That of `{path.rpartition('.')[0] or path}`.")
 
 
 def parameters(obj: Any) -> tuple[Parameter, ...]:

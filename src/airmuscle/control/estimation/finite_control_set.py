@@ -8,6 +8,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from ...core import Array, ParameterError, Reference, ShortRepr, SolveError, Status, check_field_types, published
+from ...core.declaration import forwarded
 from ...core.errors import check_known
 from ...engine.compile.cache.kernel import Kernel
 from ...engine.compile.function import augmented_rates
@@ -17,7 +18,6 @@ from .estimates import StateEstimate
 from .riccati import check_numbers, check_sample_time
 from .state_estimator import StateEstimator
 
-QI2019 = published("qi-2019")
 MAX_SEQUENCES = 1_000_000
 """Maximum number of sequences of modes (chosen)."""
 _choose = Kernel("choose_mode", "best_mode_sequence")
@@ -66,7 +66,7 @@ class FiniteControlSet(ShortRepr, Controller):
     Reference: Qi, Bone and Zhang (2019).
     """
 
-    references: ClassVar[tuple[Reference, ...]] = (QI2019,)
+    references: ClassVar[tuple[Reference, ...]] = (published("qi-2019"),)
 
     estimator: StateEstimator
     first: StateEstimate = dataclasses.field(repr=False)
@@ -101,9 +101,7 @@ class FiniteControlSet(ShortRepr, Controller):
         """The fields without the arrays of the compiled search, which belong to one process."""
         return {**self.__dict__, "_searches": []}
 
-    @property
-    def measured_columns(self) -> tuple[str, ...]:
-        return self.estimator.measured
+    measured_columns = forwarded("estimator.measured")
 
     @property
     def setpoints(self) -> tuple[str, ...]:

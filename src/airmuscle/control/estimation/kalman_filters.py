@@ -12,8 +12,6 @@ from ...recording.recording import Recording
 from .estimates import BoundFilter, StateEstimate
 from .state_estimator import StateEstimator
 
-BAR_SHALOM2001 = published("bar-shalom-2001")
-RAUCH1965 = published("rauch-1965")
 _predict_extended = Kernel("predict_extended", "kalman_filter")
 _correct_extended = Kernel("correct_extended", "kalman_filter")
 
@@ -32,7 +30,7 @@ class ExtendedKalmanFilter(StateEstimator):
     Reference: Bar-Shalom, Li and Kirubarajan (2001), chapters 5 and 10.
     """
 
-    references: ClassVar[tuple[Reference, ...]] = (BAR_SHALOM2001, RAUCH1965)
+    references: ClassVar[tuple[Reference, ...]] = (published("bar-shalom-2001"), published("rauch-1965"))
 
     def transition(self, state: Array, inputs: Sequence[float]) -> tuple[Array, Array]:
         """The state (n,) one sample later, and its derivative by the state now (n, n)."""
@@ -104,8 +102,6 @@ def consistency_band(dimension: int, runs: int, probability: float = 0.95) -> tu
     return low, high
 
 
-JULIER_UHLMANN2004 = published("julier-uhlmann-2004")
-WAN_VAN_DER_MERWE2000 = published("wan-van-der-merwe-2000")
 _predict_unscented = Kernel("predict_unscented", "kalman_filter")
 _correct_unscented = Kernel("correct_unscented", "kalman_filter")
 
@@ -125,7 +121,9 @@ class UnscentedKalmanFilter(StateEstimator):
     References: Julier and Uhlmann (2004); Wan and van der Merwe (2000).
     """
 
-    references: ClassVar[tuple[Reference, ...]] = (JULIER_UHLMANN2004, WAN_VAN_DER_MERWE2000)
+    references: ClassVar[tuple[Reference, ...]] = tuple(
+        map(published, ("julier-uhlmann-2004", "wan-van-der-merwe-2000"))
+    )
 
     alpha: float = 1.0
     beta: float = 2.0

@@ -15,7 +15,6 @@ from ..laws.linear_model_predictive import TOLERANCES, UNLIMITED
 from .estimates import StateEstimate
 from .kalman_filters import ExtendedKalmanFilter
 
-RAO2003 = published("rao-2003")
 MAX_HORIZON, STEPS, SETTLED = 200, 20, 1e-9
 """Maximum number of samples of a window; Gauss-Newton steps, and the step in standard deviations that ends them
 (chosen)."""
@@ -59,7 +58,7 @@ class MovingHorizonEstimator(ShortRepr):
     Reference: Rao, Rawlings and Mayne (2003).
     """
 
-    references: ClassVar[tuple[Reference, ...]] = (RAO2003,)
+    references: ClassVar[tuple[Reference, ...]] = (published("rao-2003"),)
 
     filter: ExtendedKalmanFilter
     horizon: int = within(1, MAX_HORIZON, default=10)

@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from ...core import Parameter, ParameterError, Reference, Value, leaves, model, ops, parameter, published, unflatten
+from ...core.declaration import forwarded
 from ...core.errors import check_known
 from ...core.system import select_prefix, united, with_prefix
 from ...engine.loop import ControlLaw, EnclosingLaw, Measurement, Memory, Sampled, parameter_units
@@ -60,9 +61,7 @@ class Cascade(ControlLaw):
         own = tuple(name for name in self.inner.setpoints if name not in self.outer.inputs)
         return united(self.outer.setpoints, own)
 
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        return self.inner.inputs
+    inputs = forwarded("inner.inputs")
 
     @property
     def initial_memory(self) -> dict[str, float]:
@@ -112,9 +111,7 @@ class WithFeedForward(ControlLaw):
     def setpoints(self) -> tuple[str, ...]:
         return united(self.feedback.setpoints, self.feed_forward.setpoints)
 
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        return self.feed_forward.inputs
+    inputs = forwarded("feed_forward.inputs")
 
     @property
     def initial_memory(self) -> dict[str, float]:
@@ -131,9 +128,6 @@ class WithFeedForward(ControlLaw):
         return commands, {**with_prefix("feed_forward.", first), **with_prefix("feedback.", second)}
 
 
-RUGH_SHAMMA2000 = published("rugh-shamma-2000")
-
-
 @model
 class GainSchedule(EnclosingLaw):
     """theta(z) = theta_i + (theta_(i+1) - theta_i) (z - z_i)/(z_(i+1) - z_i) for z_i <= z <= z_(i+1), constant beyond.
@@ -144,7 +138,7 @@ class GainSchedule(EnclosingLaw):
     Reference: Rugh and Shamma (2000).
     """
 
-    references: ClassVar[tuple[Reference, ...]] = (RUGH_SHAMMA2000,)
+    references: ClassVar[tuple[Reference, ...]] = (published("rugh-shamma-2000"),)
 
     law: ControlLaw
     scheduled: str

@@ -88,11 +88,6 @@ def _tustin(coefficients: tuple[Value, ...], k: Value) -> tuple[Value, Value, Va
     return second + first + 1.0, 2.0 - 2.0 * second, second - first + 1.0
 
 
-SMITH1957 = published("smith-1957")
-HARA1988 = published("hara-1988")
-TOMIZUKA1989 = published("tomizuka-1989")
-
-
 @model
 class SmithPredictor(EnclosingLaw):
     """u = law(y_k + x_k - x_(k-n)),   x_(k+1) = a x_k + (1 - a) K u_k,   a = exp(-h/T): feedback without the dead time.
@@ -103,7 +98,7 @@ class SmithPredictor(EnclosingLaw):
     a disturbance. The memory starts at rest with u = 0. Reference: Smith (1957).
     """
 
-    references: ClassVar[tuple[Reference, ...]] = (SMITH1957,)
+    references: ClassVar[tuple[Reference, ...]] = (published("smith-1957"),)
 
     law: ControlLaw
     column: str
@@ -157,7 +152,7 @@ class RepetitiveControl(EnclosingLaw):
     References: Hara et al. (1988); Tomizuka, Tsao and Chew (1989).
     """
 
-    references: ClassVar[tuple[Reference, ...]] = (HARA1988, TOMIZUKA1989)
+    references: ClassVar[tuple[Reference, ...]] = (published("hara-1988"), published("tomizuka-1989"))
 
     law: ControlLaw
     column: str

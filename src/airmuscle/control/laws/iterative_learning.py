@@ -8,8 +8,6 @@ import numpy.typing as npt
 
 from ...core import Array, ParameterError, Reference, model, parameter, published
 
-AMANN1996 = published("amann-1996")
-BRISTOW2006 = published("bristow-2006")
 MAX_SAMPLES = 4000
 """Maximum number of samples of a trial, whose matrices have the square of it (chosen)."""
 
@@ -28,7 +26,7 @@ class IterativeLearning:
     References: Amann, Owens and Rogers (1996); Bristow, Tharayil and Alleyne (2006).
     """
 
-    references: ClassVar[tuple[Reference, ...]] = (AMANN1996, BRISTOW2006)
+    references: ClassVar[tuple[Reference, ...]] = (published("amann-1996"), published("bristow-2006"))
     from_file: ClassVar[bool] = False
 
     sample_time: float = parameter("s", "h", "sample time", bounds=(1e-6, 1e3), fitted=False)

@@ -47,7 +47,6 @@ class CondensedProblem(ShortRepr):
 
 
 RAWLINGS2017 = published("rawlings-2017")
-GOLDFARB_IDNANI1983 = published("goldfarb-idnani-1983")
 CHISCI2001 = published("chisci-2001")
 _sample = Kernel("predictive_sample", "predictive")
 UNLIMITED, TOLERANCES = 1e30, (1e-9, 1e-6, 1e-12, 1e-9)
@@ -126,7 +125,7 @@ class LinearModelPredictive(ShortRepr, MultivariableController):
     its end the target; `notes` states how often. `design_predictive` designs it for a linearised plant.
     """
 
-    references: ClassVar[tuple[Reference, ...]] = (RAWLINGS2017, GOLDFARB_IDNANI1983, CHISCI2001)
+    references: ClassVar[tuple[Reference, ...]] = (RAWLINGS2017, published("goldfarb-idnani-1983"), CHISCI2001)
 
     measured: tuple[str, ...]
     controlled: tuple[str, ...]

@@ -117,9 +117,6 @@ class MotionFeedForward(OpenLoopLaw):
         return {self.commanded: motion}
 
 
-ARMSTRONG1994 = published("armstrong-1994")
-
-
 @model
 class FrictionFeedForward(OpenLoopLaw):
     """u = A clip(v_r/v_0, -1, 1).
@@ -130,7 +127,7 @@ class FrictionFeedForward(OpenLoopLaw):
     Reference: Armstrong-Hélouvry, Dupont and Canudas de Wit (1994).
     """
 
-    references: ClassVar[tuple[Reference, ...]] = (ARMSTRONG1994,)
+    references: ClassVar[tuple[Reference, ...]] = (published("armstrong-1994"),)
 
     speed: str
     commanded: str

@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from typing import ClassVar
 
 from ...core import ParameterError, Reference, Value, model, ops, parameter, published
+from ...core.declaration import forwarded
 from ...core.system import select_prefix, united, with_prefix
 from ...engine.loop import Commanded, ControlLaw, Measurement, Memory, Sampled, commands, range_of
 from ...physics.muscle.characteristic.tondu_lopez2000 import TONDU_LOPEZ_2000
@@ -78,13 +79,8 @@ class ProportionalFeedback(ControlLaw):
                 "give one input, or one SplitRange, for each column."
             )
 
-    @property
-    def measured_columns(self) -> tuple[str, ...]:
-        return self.controlled
-
-    @property
-    def setpoints(self) -> tuple[str, ...]:
-        return self.controlled
+    measured_columns = forwarded("controlled")
+    setpoints = forwarded("controlled")
 
     def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
         result: dict[str, Value] = {}
@@ -104,9 +100,6 @@ class ProportionalFeedback(ControlLaw):
         return result
 
 
-SKOGESTAD_POSTLETHWAITE2005 = published("skogestad-postlethwaite-2005")
-
-
 @model
 class Decentralised(ControlLaw):
     """Decentralised control: independent control laws, such as one pressure controller for each muscle of a joint.
@@ -115,7 +108,7 @@ class Decentralised(ControlLaw):
     Reference: Skogestad and Postlethwaite (2005), chapter 10.
     """
 
-    references: ClassVar[tuple[Reference, ...]] = (SKOGESTAD_POSTLETHWAITE2005,)
+    references: ClassVar[tuple[Reference, ...]] = (published("skogestad-postlethwaite-2005"),)
 
     laws: tuple[ControlLaw, ...]
 

@@ -21,9 +21,6 @@ def sliding_variable(
     return error + sliding_time * rate, {"started": 1.0, "error": error, "error_rate": rate}
 
 
-SLOTINE_SASTRY1983 = published("slotine-sastry-1983")
-
-
 @model
 class SlidingMode(SisoController):
     """u = u_0 + K sat(s/phi),   s = e + T_s e',   e = r - y.
@@ -34,7 +31,7 @@ class SlidingMode(SisoController):
     Reference: Slotine and Sastry (1983).
     """
 
-    references: ClassVar[tuple[Reference, ...]] = (SLOTINE_SASTRY1983,)
+    references: ClassVar[tuple[Reference, ...]] = (published("slotine-sastry-1983"),)
 
     amplitude: float = parameter("u", "K", "command outside the boundary layer")
     sliding_time: float = parameter("s", "T_s", "time constant of the error on s = 0", bounds=(0.0, 1e3), default=0.0)
@@ -55,9 +52,6 @@ class SlidingMode(SisoController):
         return commands(self.commanded, ops.clip(self.equivalent_output + self.amplitude * saturated, low, high)), later
 
 
-LEVANT1993 = published("levant-1993")
-
-
 @model
 class SuperTwisting(SisoController):
     """u = k_1 sqrt|s| sign(s) + w,   w' = k_2 sign(s),   s = e + T_s e',   e = r - y.
@@ -70,7 +64,7 @@ class SuperTwisting(SisoController):
     Reference: Levant (1993).
     """
 
-    references: ClassVar[tuple[Reference, ...]] = (LEVANT1993,)
+    references: ClassVar[tuple[Reference, ...]] = (published("levant-1993"),)
 
     proportional: float = parameter("u/y^0.5", "k_1", "gain of the square root, in SI units", bounds=(0.0, 1e12))
     integral: float = parameter("u/s", "k_2", "rate of the integral", bounds=(0.0, 1e12))

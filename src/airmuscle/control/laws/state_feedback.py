@@ -97,10 +97,6 @@ def product(matrix: tuple[Value, ...], vector: list[Value], rows: int = 0) -> li
     return [sum((matrix[i * width + j] * vector[j] for j in range(width)), 0.0) for i in range(rows)]
 
 
-SPONG2020 = published("spong-2020")
-FLIESS1995 = published("fliess-1995")
-
-
 @model
 class ComputedTorque(ControlLaw):
     """tau = tau_m(theta, omega, a),   a = a_r + 2 zeta w_0 (omega_r - omega) + w_0^2 (theta_r - theta).
@@ -116,7 +112,7 @@ class ComputedTorque(ControlLaw):
     References: Spong, Hutchinson and Vidyasagar (2020), chapter 9; Fliess et al. (1995).
     """
 
-    references: ClassVar[tuple[Reference, ...]] = (SPONG2020, FLIESS1995)
+    references: ClassVar[tuple[Reference, ...]] = (published("spong-2020"), published("fliess-1995"))
 
     inverse: AntagonisticInverse
     commanded: tuple[str, ...]

@@ -12,8 +12,6 @@ from ...physics.muscle.muscle import Muscle
 from ...physics.muscle.series import ElasticSeriesElement
 from .open_loop import OpenLoopLaw
 
-ANDERSON_BJORCK1973 = published("anderson-bjorck-1973")
-
 
 @model
 class StaticInverse:
@@ -31,7 +29,7 @@ class StaticInverse:
     References: Saga et al. (2007) for the purpose; Anderson and Björck (1973) for the root.
     """
 
-    references: ClassVar[tuple[Reference, ...]] = (SAGA_2007, ANDERSON_BJORCK1973)
+    references: ClassVar[tuple[Reference, ...]] = (SAGA_2007, published("anderson-bjorck-1973"))
 
     law: ForceLaw | Muscle
     min_pressure: float = parameter(

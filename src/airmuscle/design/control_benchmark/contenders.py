@@ -9,6 +9,7 @@ from typing import Any, ClassVar, NamedTuple
 from ...control.laws import Cascade, CoContraction, ProportionalFeedback
 from ...control.laws.pressures import DIFFERENCE
 from ...core import ParameterError, Value, check_field_types, leaves, model, one_line, ops
+from ...core.declaration import forwarded
 from ...core.system import select_prefix, united, with_prefix
 from ...engine.loop import ControlLaw, Controller, Measurement, Memory, Sampled, SigmaDelta, SplitRange, WithSensors
 from ...engine.run.compiled_law import LawSample
@@ -39,9 +40,7 @@ class PassedSignals(ControlLaw):
     columns: tuple[str, ...] = ()
     commanded: tuple[str, ...] = ()
 
-    @property
-    def measured_columns(self) -> tuple[str, ...]:
-        return self.columns
+    measured_columns = forwarded("columns")
 
     @property
     def setpoints(self) -> tuple[str, ...]:
@@ -88,18 +87,14 @@ class SensedController(Controller):
     sensors: WithSensors
     stuck: StuckValve | None = None
 
-    @property
-    def measured_columns(self) -> tuple[str, ...]:
-        return self.sensors.law.measured_columns
+    measured_columns = forwarded("sensors.law.measured_columns")
 
     @property
     def setpoints(self) -> tuple[str, ...]:
         further = [name for name in self.actuation.setpoints if not name.startswith(COMMANDED)]
         return tuple(dict.fromkeys((*self.controller.setpoints, *further)))
 
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        return self.actuation.inputs
+    inputs = forwarded("actuation.inputs")
 
     @functools.cached_property
     def _compiled(self) -> tuple[LawSample, LawSample]:

@@ -12,6 +12,7 @@ from ...control.laws.linear_model_predictive import RAWLINGS2017, LinearModelPre
 from ...control.laws.pressures import DIFFERENCE
 from ...control.laws.state_feedback import FRANKLIN1998, StateFeedback
 from ...core import Reference, Value, model, ops, parameter, select_prefix, united, with_prefix
+from ...core.declaration import forwarded
 from ...engine.loop import ControlLaw, Controller, EnclosingLaw, LawDesign, Measurement, Memory, Sampled
 from ...physics.analysis.linear_model import LinearModel
 from .joints import ENCODER_STEP, BenchmarkJoint
@@ -217,17 +218,13 @@ class AlongMotion(Controller):
     deviation: ControlLaw
     design: JointDesign
 
-    @property
-    def measured_columns(self) -> tuple[str, ...]:
-        return self.deviation.measured_columns
+    measured_columns = forwarded("deviation.measured_columns")
 
     @property
     def setpoints(self) -> tuple[str, ...]:
         return united(self.deviation.setpoints, self.feed_forward.setpoints)
 
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        return self.feed_forward.inputs
+    inputs = forwarded("feed_forward.inputs")
 
     def init(self) -> MotionMemory:
         return MotionMemory(self.feed_forward.init(), self.deviation.init(), self.design.predictive.init())

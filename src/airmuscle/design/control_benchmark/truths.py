@@ -37,7 +37,6 @@ MAX_EXTRA_DELAY = 2
 PRESLIDING = 5e-4
 """Deflection of a muscle at which its friction slides [m] (chosen)."""
 CRITICAL_RATIO = (2.0 / (HEAT_CAPACITY_RATIO + 1.0)) ** (HEAT_CAPACITY_RATIO / (HEAT_CAPACITY_RATIO - 1.0))
-SAINT_VENANT1839 = published("saint-venant-wantzel-1839")
 
 
 @model
@@ -49,7 +48,7 @@ class IsentropicNozzle(Orifice):
     (1839).
     """
 
-    references: ClassVar[tuple[Reference, ...]] = (SAINT_VENANT1839,)
+    references: ClassVar[tuple[Reference, ...]] = (published("saint-venant-wantzel-1839"),)
     from_file: ClassVar[bool] = False
 
     conductance: float = parameter("m3/(s Pa)", "C", "sonic conductance, fully open", bounds=(0.0, 1e-5))

@@ -10,7 +10,6 @@ import numpy.typing as npt
 from ...core import Array, ParameterError, Reference, check_field_types, published
 from .tracking import waveform_amplitude
 
-ASTROM_HAGGLUND1984 = published("astrom-hagglund-1984")
 UNSETTLED = 0.05
 """Relative change in the last tenth of a step response from which on it is not settled (chosen)."""
 DEAD_BAND = 0.25
@@ -67,7 +66,7 @@ ProcessModel = FirstOrderDeadTime | IntegratorDeadTime
 class UltimatePoint:
     """The point of the frequency response at a phase of -180 degrees: ultimate gain K_u [u/y] and period T_u [s]."""
 
-    references: ClassVar[tuple[Reference, ...]] = (ASTROM_HAGGLUND1984,)
+    references: ClassVar[tuple[Reference, ...]] = (published("astrom-hagglund-1984"),)
 
     gain: float
     period: float

@@ -22,11 +22,6 @@ from .process_models import (
     integrator_of_step,
 )
 
-SKOGESTAD2003 = published("skogestad-2003")
-ASTROM_HAGGLUND2004 = published("astrom-hagglund-2004")
-ZIEGLER_NICHOLS1942 = published("ziegler-nichols-1942")
-TYREUS_LUYBEN1992 = published("tyreus-luyben-1992")
-
 
 @dataclasses.dataclass(frozen=True)
 class RuleSettings:
@@ -37,9 +32,9 @@ class RuleSettings:
     integral_time: float
     derivative_time: float = 0.0
     setpoint_weight: float = 1.0
-    references: ClassVar[tuple[Reference, ...]] = (
-        SKOGESTAD2003, ASTROM_HAGGLUND2004, ZIEGLER_NICHOLS1942, TYREUS_LUYBEN1992
-    )  # fmt: skip
+    references: ClassVar[tuple[Reference, ...]] = tuple(
+        map(published, ("skogestad-2003", "astrom-hagglund-2004", "ziegler-nichols-1942", "tyreus-luyben-1992"))
+    )
 
     def __post_init__(self) -> None:
         check_field_types(self)

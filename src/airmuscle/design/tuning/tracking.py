@@ -78,9 +78,6 @@ def _two_arcs(phase: Array, values: Array, extrema: Array) -> tuple[float, float
     return residual, 0.25 * float(high + back_high - low - back_low)
 
 
-GRAHAM_LATHROP1953 = published("graham-lathrop-1953")
-
-
 @dataclasses.dataclass(frozen=True)
 class TrackingIndex(abc.ABC):
     """An index of the control error e = r - y of a run, with set point r and controlled column y of the plant.
@@ -173,7 +170,7 @@ class IntegralAbsoluteError(TrackingIndex):
 class IntegralTimeAbsoluteError(TrackingIndex):
     """Integral of time-multiplied absolute error (ITAE): integral (t - t_begin) |e| dt; Graham and Lathrop (1953)."""
 
-    references: ClassVar[tuple[Reference, ...]] = (GRAHAM_LATHROP1953,)
+    references: ClassVar[tuple[Reference, ...]] = (published("graham-lathrop-1953"),)
     time_unit: ClassVar[str] = "s^2"
 
     def of_magnitude(self, time: Array, magnitude: Array) -> Array:
