@@ -267,7 +267,7 @@ def test_a_column_that_a_set_point_follows_is_there(tmp_path: Path):
 
 def test_a_record_has_no_controller(tmp_path: Path):
     from airmuscle.files.library import Location
-    from airmuscle.files.scenario.inputs import build_input_signal
+    from airmuscle.files.scenario.values import build_input_signal
 
     with pytest.raises(
         ParameterError,

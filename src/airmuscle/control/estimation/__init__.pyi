@@ -5,8 +5,8 @@ from .kalman_filters import ExtendedKalmanFilter as ExtendedKalmanFilter
 from .kalman_filters import UnscentedKalmanFilter as UnscentedKalmanFilter
 from .kalman_filters import consistency_band as consistency_band
 from .kalman_filters import normalised_error_squared as normalised_error_squared
-from .lqg import design_adrc as design_adrc
-from .lqg import design_lqg as design_lqg
+from .linear_design import design_adrc as design_adrc
+from .linear_design import design_lqg as design_lqg
 from .moving_horizon import MovingHorizonEstimator as MovingHorizonEstimator
 from .nonlinear_model_predictive import NonlinearModelPredictive as NonlinearModelPredictive
 from .predictive_design import PredictiveControl as PredictiveControl

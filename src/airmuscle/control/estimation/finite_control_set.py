@@ -15,7 +15,7 @@ from ...engine.compile.function import augmented_rates
 from ...engine.compile.program import compile_system
 from ...engine.loop.controller import Controller, Measurement
 from .estimates import StateEstimate
-from .riccati import check_numbers, check_sample_time
+from .linear_design import check_numbers, check_sample_time
 from .state_estimator import StateEstimator
 
 MAX_SEQUENCES = 1_000_000

@@ -13,8 +13,8 @@ from ...physics.analysis.linear_model import linearise
 from ...physics.analysis.sampled_model import held
 from ..laws.linear_model_predictive import RAWLINGS2017
 from .estimates import StateEstimate
+from .linear_design import check_numbers, check_sample_time, regulator
 from .predictive_program import MAX_HORIZON, PredictiveProgram, check_limits
-from .riccati import check_numbers, check_sample_time, regulator
 from .state_estimator import StateEstimator
 
 

@@ -20,8 +20,7 @@ from ..laws.linear_model_predictive import (
     PredictiveMemory,
     TargetMap,
 )
-from .predictive_program import MAX_HORIZON, check_limits
-from .riccati import (
+from .linear_design import (
     DISTURBANCE,
     check_numbers,
     check_sample_time,
@@ -31,6 +30,7 @@ from .riccati import (
     sampled_plant,
     steady_target,
 )
+from .predictive_program import MAX_HORIZON, check_limits
 
 SLACK_WEIGHT = 1e4
 """Weight of the slack of a limited column, relative to the permitted deviation of 1 (chosen)."""

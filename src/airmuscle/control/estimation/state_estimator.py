@@ -14,7 +14,7 @@ from ...engine.compile.program import CompiledSystem, compile_system
 from ...engine.loop.control_loop import COMMAND
 from ...recording.recording import Recording
 from .estimates import BoundFilter, Innovation, MeasuredRows, Pass, StateEstimate
-from .riccati import DISTURBANCE, check_numbers
+from .linear_design import DISTURBANCE, check_numbers
 
 UNKNOWN = 1e30
 """Factor of the variance of a missing measurement."""

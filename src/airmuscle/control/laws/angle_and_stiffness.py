@@ -8,8 +8,7 @@ from ...engine.loop import ControlLaw, Measurement, Memory, Sampled
 from ...physics.mechanism.base import Mechanism
 from ...physics.muscle.characteristic.tondu_lopez2000 import TONDU_LOPEZ_2000
 from ...physics.muscle.muscle import Muscle
-from .open_loop import check_pair
-from .static_inverse import check_invertible, pressure_between, static_force
+from .open_loop import check_invertible, check_pair, pressure_between, static_force
 
 TONIETTI_BICCHI2002 = published("tonietti-bicchi-2002")
 

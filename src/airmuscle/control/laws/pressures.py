@@ -9,7 +9,7 @@ from ...core.system import select_prefix, united, with_prefix
 from ...engine.loop import Commanded, ControlLaw, Measurement, Memory, Sampled, commands, range_of
 from ...physics.muscle.characteristic.tondu_lopez2000 import TONDU_LOPEZ_2000
 from .open_loop import OpenLoopLaw, check_pair
-from .pid import ASTROM_HAGGLUND1995
+from .single_column import ASTROM_HAGGLUND1995
 
 DIFFERENCE = "difference"
 """Name of the set point that an outer controller commands: half the difference of both pressures [Pa]."""

@@ -6,7 +6,7 @@ from typing import Any, ClassVar, NamedTuple, TypeVar
 
 import numpy as np
 
-from ...control.estimation.lqg import GAO2003, HAN2009, design_adrc, design_lqg
+from ...control.estimation.linear_design import GAO2003, HAN2009, design_adrc, design_lqg
 from ...control.estimation.predictive_design import design_predictive
 from ...control.laws.linear_model_predictive import RAWLINGS2017, LinearModelPredictive
 from ...control.laws.pressures import DIFFERENCE

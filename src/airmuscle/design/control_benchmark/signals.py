@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from ...control.laws.angle_and_stiffness import AntagonisticInverse
 from ...control.laws.enclosing import WithStuckValve
-from ...control.laws.static_inverse import static_force
+from ...control.laws.open_loop import static_force
 from ...core import Array, ParameterError, check_known, published
 from ...engine.loop import ControlLaw, Controller, ControlLoop, Driver, SampledSignal
 from ...physics.plant.plant import Plant

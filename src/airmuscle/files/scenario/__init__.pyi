@@ -1,4 +1,3 @@
-from .campaign import campaign_scenarios as campaign_scenarios
 from .identification import DynamicFitSetup as DynamicFitSetup
 from .identification import load_dynamic_fit as load_dynamic_fit
 from .initial_state import build_initial_conditions as build_initial_conditions
@@ -12,5 +11,6 @@ from .schema import muscle_schema as muscle_schema
 from .schema import scenario_schema as scenario_schema
 from .simulation_chapter import MAX_DRIVER_SEGMENTS as MAX_DRIVER_SEGMENTS
 from .simulation_chapter import describe_input as describe_input
+from .write import campaign_scenarios as campaign_scenarios
 from .write import save_scenario as save_scenario
 from .write import scenario_text as scenario_text

@@ -45,8 +45,7 @@ from ...physics.plant.plant import Plant
 from ...recording.columns import column_units
 from ..library import PLANT_READER, Location, custom_field, located_errors, origin, read_parameter, read_table
 from ..library.build import build
-from .inputs import build_input_signal, read_drivers
-from .values import Number
+from .values import Number, build_input_signal, read_drivers
 
 
 def build_law(table: Any, plant: Plant, units: Mapping[str, str], location: Location, sample_time: float) -> Controller:

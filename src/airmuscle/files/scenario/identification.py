@@ -49,8 +49,8 @@ from ..library import build_plant, custom_field, read_toml, scenario_toml
 from ..library.files import Location, check_keys, located_errors, read_table, read_text
 from . import values
 from .initial_state import build_initial_conditions, pressure_names
-from .inputs import build_input_signal
 from .plant_uncertainty import fit_uncertainty
+from .values import build_input_signal
 
 
 def _read_mapping(value: Any, plant: Plant, where: Location) -> ColumnMapping:

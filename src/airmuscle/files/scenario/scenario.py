@@ -6,7 +6,7 @@
     gas = "Isothermal"                          optional; WallHeatTransfer by default
     [plant.circuit]                             model = "FillDischarge" with supply, fill and discharge
     [plant.mechanism]                           model = "HangingMass", mass = "5 kg"
-    [input]                                     see inputs.py; with a controller, controller.py
+    [input]                                     see values.py; with a controller, controller.py
     fill = [["5 s", 1], ["15 s", 0]]            each input of the plant: instants, and the value from each instant on
     [run]
     duration = "25 s"
@@ -38,9 +38,8 @@ from ..library import SCENARIO_TABLES, build_plant, custom_field, is_path, list_
 from ..library.files import Location, check_keys, located_errors, read_finite_number, read_table
 from .controller import build_control_loop, signal_units
 from .initial_state import build_initial_state, read_initial_table
-from .inputs import build_input_signal
 from .plant_uncertainty import read_plant_uncertainty
-from .values import Number, read_observed, required_table, table_reader
+from .values import Number, build_input_signal, read_observed, required_table, table_reader
 
 MAX_ROWS = 2_000_000
 """Maximum number of rows of a run that a command writes (chosen): 300 MB of a plant with one muscle."""

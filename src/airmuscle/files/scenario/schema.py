@@ -22,7 +22,7 @@ from ...physics.pneumatics.valve import Orifice
 from ..library import PREDICTED, StatedBand, is_code_allowed, model_class, model_names, only_class, plant_file
 from ..library.entry import CONDITIONS, PATHS, Check, Entry
 from ..library.fields import is_required, options, origin
-from . import controller, initial_state, inputs, plant_uncertainty, scenario, values
+from . import controller, initial_state, plant_uncertainty, scenario, values
 from .controller import plant_fields
 
 Schema = dict[str, Any]
@@ -158,7 +158,7 @@ class _ModelSchemas:
             return self._reference(plant_uncertainty.UncertaintyTable)
         if reader is initial_state.read_initial_table:
             return _by_name(_quantity("m"))
-        if reader is inputs.read_drivers:
+        if reader is values.read_drivers:
             each = {"anyOf": [self.kind(Driver), _table({"library": _TEXT}, ("library",))]}
             return _by_name({"anyOf": [*each["anyOf"], _list_of(each)]})
         return _by_name(_TEXT)
@@ -201,7 +201,7 @@ def _plant(models: _ModelSchemas) -> Schema:
 def _input(models: _ModelSchemas) -> Schema:
     """Table of input signals; keys that are not reserved are inputs with their rows."""
     point = {"type": "array", "prefixItems": [_quantity("s"), _quantity("")], "minItems": 2, "maxItems": 2}
-    reserved = models.table(inputs.SignalTable)["properties"]
+    reserved = models.table(values.SignalTable)["properties"]
     reserved["model"] = {"enum": ["Schedule", "SampledSignal"]}
     signal = {
         "type": "object",

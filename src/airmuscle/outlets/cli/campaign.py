@@ -25,7 +25,7 @@ from ...core.errors import AirmuscleError, ColumnError, FileError, Identificatio
 from ...core.tree import fingerprint
 from ...engine.compile.cache.store import cache_folder, read_private
 from ...files.library import Entry, campaign_entry, resting_lengths, to_toml
-from ...files.scenario.campaign import RecordScenario, campaign_scenarios
+from ...files.scenario.write import RecordScenario, campaign_scenarios
 from ...physics.muscle.geometry import Geometry
 from ...recording import Recording
 from ...report.data import as_json
