@@ -121,9 +121,9 @@ class UnscentedKalmanFilter(StateEstimator):
     References: Julier and Uhlmann (2004); Wan and van der Merwe (2000).
     """
 
-    references: ClassVar[tuple[Reference, ...]] = tuple(
-        map(published, ("julier-uhlmann-2004", "wan-van-der-merwe-2000"))
-    )
+    references: ClassVar[tuple[Reference, ...]] = (
+        published("julier-uhlmann-2004"), published("wan-van-der-merwe-2000"),
+    )  # fmt: skip
 
     alpha: float = 1.0
     beta: float = 2.0

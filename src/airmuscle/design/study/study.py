@@ -1,21 +1,4 @@
-"""Study files: a scenario, its varied parameters, the design of experiments and the metrics.
-
-title = "Spread of two valves"                     optional
-scenario = "fill_discharge.toml"                   a scenario file next to this one; or the tables [scenario.plant],
-                                                   [scenario.input] and [scenario.run] of a scenario
-chunk_size = 32                                    optional: number of runs that are saved together
-[vary]                                             varied parameters by their paths, see paths.py
-"mechanism.mass" = ["5 kg", "10 kg"]               levels; also { model = "Range", low = , high = , count = }
-"circuit.fill.conductance" = { model = "Normal", mean = "...", std = "..." }             see distributions.py
-[follow]                                           optional: parameters that take the value of a varied parameter
-"circuit.discharge.conductance" = "circuit.fill.conductance"
-[design]
-model = "LatinHypercube"                           see design.py
-count = 256
-seed = 1
-[metrics]                                          see metrics.py
-contraction = { model = "Final", column = "contraction" }
-"""
+"""Study files: a scenario, its varied parameters, the design of experiments and the metrics; docs/study.md."""
 
 import dataclasses
 from collections.abc import Mapping, Sequence

@@ -32,9 +32,10 @@ class RuleSettings:
     integral_time: float
     derivative_time: float = 0.0
     setpoint_weight: float = 1.0
-    references: ClassVar[tuple[Reference, ...]] = tuple(
-        map(published, ("skogestad-2003", "astrom-hagglund-2004", "ziegler-nichols-1942", "tyreus-luyben-1992"))
-    )
+    references: ClassVar[tuple[Reference, ...]] = (
+        published("skogestad-2003"), published("astrom-hagglund-2004"), published("ziegler-nichols-1942"),
+        published("tyreus-luyben-1992"),
+    )  # fmt: skip
 
     def __post_init__(self) -> None:
         check_field_types(self)

@@ -1,14 +1,6 @@
 """Entries of the library: muscles and laws, valves, products and plants, with sources, provenance and verified checks.
 
-The fields of an entry are the keys of its file, see build.py. A valve file, for example:
-
-    title = "..."                   what it is, and which of its paths
-    provenance = "data sheet"       origin of the numbers
-    [valve]                         flow law and its parameters; the path to the muscle if the paths differ
-    [exhaust]                       optional: the path to the surroundings, if its values differ
-    [switching_times]               optional: opening_delay and closing_delay, as published
-    [[check]]                       published flows that the law must reproduce
-    [[reference]]                   sources
+The fields of an entry are the keys of its file, see build.py, docs/muscle-file.md and docs/valves.md.
 """
 
 import dataclasses

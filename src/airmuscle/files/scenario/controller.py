@@ -1,31 +1,8 @@
-"""Table [input.controller] of a scenario: controller, sample time and set point of a closed loop.
+"""Table [input.controller] of a scenario: controller, sample time and set point of a closed loop; docs/control.md.
 
-[input]
-hold = [["0 s", 1]]                         inputs that the controller does not command, as in an open loop
-[input.controller]
-model = "PID"                               a controller and its parameters, in any unit that fits its signals
-measured = "pressure"                       controlled variable: a state or output of the plant
-commanded = "fill"                          an input; or { model = "SplitRange", positive = "fill", negative = "vent" }
-gain = "0.4 1/bar"
-integral_time = "300 ms"
-sample_time = "5 ms"
-[input.controller.setpoint]               input signal of the set point: rows, model, file, columns, period
-pressure = [["0 s", "1 bar"], ["2 s", "3 bar"]]
-[input.drivers]                           as in an open loop
-
-Tables of laws that contain other laws, sensors and models of the plant, at any depth:
-
-[input.controller]
-model = "Cascade"
-minimum = ["0 bar"]                         in the unit of the outer command
-maximum = ["5 bar"]
-[input.controller.outer]                    a law is a table; a list of laws is an array of tables
-model = "PID"
-[input.controller.inner]
-model = "PID"
-
-Numbers are SI or texts with a unit that fits the signals of the law in whose table they are. Muscles and mechanism of a
-static inverse are those of the plant unless the table gives others, in the form of [plant].
+Laws inside laws, sensors and models of the plant are tables at any depth. Numbers are SI or texts with a unit that fits
+the signals of the law in whose table they are. Muscles and mechanism of a static inverse are those of the plant unless
+the table gives others, in the form of [plant].
 """
 
 import dataclasses

@@ -1,34 +1,4 @@
-"""Dynamic fit as a TOML file: plant, records as experiments, and unknown parameters.
-
-[plant]                                     as in a scenario, with the initial values of the search
-[input]                                     as in a scenario; for each record without an input of its own
-fill = [["0.1 s", 1], ["1 s", 0]]
-[observed]                                  measured outputs, each with the standard deviation of its sensor
-pressure = "500 Pa"
-position = { deviation = "50 um", column = "height" }      if the column of the file has another name
-                                            (in SI, or with its unit, height [mm])
-[fit]
-free = ["muscle.damper.damping", ["circuit.fill.conductance", "circuit.discharge.conductance"]]
-                                            unknowns shared by all records; a nested list has one common value
-own = ["circuit.supply.pressure"]           optional: unknowns that are estimated for each record
-start_time = "50 ms"                        optional: the start time of each run is unknown within ±50 ms
-initial_state = { pressure = "3 kPa" }      optional: initial values are unknown within these limits
-starts = 8                                  optional, with seed: number of starting points of the search
-integrator = { model = "Rodas4", rtol = 1e-8 }  optional
-[fit.bounds]                                optional, by the first path; otherwise the declared bounds
-"gas.exponent" = [1.01, 1.4]
-[[record]]
-file = "fill1.csv"                          relative to this file
-initial_state = { pressure = "0 bar" }      optional: equilibrium at this pressure, of each muscle "left.pressure", or
-                                            a state with position = "10 mm"; by default equilibrium at the pressures of
-                                            the first rows, or where there is none, at their coordinates
-start_time = "0.2 s"                        optional: time of the record at which the input begins
-first = "0 s"                               optional, and last: the time interval of the record that is used
-mapping = "rig.toml"                        optional, and resting_length, ambient: information that the file lacks
-[record.input]                              optional: input of this record
-[record.plant.mechanism]                    optional: parts of the plant that differ in this record; its ambient air is
-                                            that which the file of the record states, unless [plant.ambient] does
-"""
+"""Dynamic fit as a TOML file: plant, records as experiments, and unknown parameters; docs/dynamic-identification.md."""
 
 import dataclasses
 import math

@@ -1,15 +1,6 @@
 """Table [uncertainty] of a scenario: residuals of the fit of its plant, with the covariance of the parameters.
 
-[uncertainty]                               written by airmuscle fit-dynamic, fit-joint and campaign, read by predict
-deviations = { pressure = 620.0 }           standard deviation of the residuals of each observed quantity
-records = 3                                 number of records of the fit
-factors = { pressure = 2.4 }                half width of the 95 % band in deviations, from records predicted by others
-ranges = { pressure = [0.0, 5e5] }          ends of the measured quantities in the records
-rates = { pressure = 1e6 }                  their maximum rates of change
-parameters = ["gas.exponent", "circuit.fill.conductance, circuit.discharge.conductance"]
-                                            fitted parameters; several paths have one common value
-standard_errors = [0.01, 2.1e-11]           SI
-correlations = [[1.0, 0.2], [0.2, 1.0]]
+It is written by airmuscle fit-dynamic, fit-joint and campaign, and read by predict; docs/prediction.md has its keys.
 """
 
 import dataclasses

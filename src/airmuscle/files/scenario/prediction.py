@@ -1,16 +1,4 @@
-"""Prediction of records by an identified plant or the muscle of an entry; a file of records has inputs of its own.
-
-[input]                                     as in a scenario; by default that of the scenario of the plant
-fill = [["0.1 s", 1], ["0.8 s", 0]]
-[observed]                                  optional: measured outputs, as in a dynamic fit; by default those of the fit
-pressure = "500 Pa"
-[fit]                                       optional: unknowns that are estimated from each record itself
-own = ["circuit.supply.pressure"]
-start_time = "50 ms"
-initial_state = { pressure = "3 kPa" }
-[[record]]                                  as in a dynamic fit
-file = "fill3.csv"
-"""
+"""Prediction of records by an identified plant or the muscle of an entry; docs/prediction.md has their file."""
 
 import dataclasses
 from collections.abc import Mapping, Sequence

@@ -1,25 +1,7 @@
-"""Scenario: a simulation as a TOML file with the tables [plant], [input], [run] and [output].
+"""Scenario: a simulation as a TOML file with the tables [plant], [input], [run] and [output]; docs/scenario.md.
 
-    [plant]
-    muscle = "dmsp-20-300"                      a library name or a muscle file; or a table [plant.muscle] with
-                                                library = "dmsp-20-300" and the parts to replace, or with all parts
-    gas = "Isothermal"                          optional; WallHeatTransfer by default
-    [plant.circuit]                             model = "FillDischarge" with supply, fill and discharge
-    [plant.mechanism]                           model = "HangingMass", mass = "5 kg"
-    [input]                                     see values.py; with a controller, controller.py
-    fill = [["5 s", 1], ["15 s", 0]]            each input of the plant: instants, and the value from each instant on
-    [run]
-    duration = "25 s"
-    output_times = "10 ms"                      optional
-    initial_state = { pressure = "0 bar" }      optional: equilibrium at this pressure, of each muscle "left.pressure";
-                                                or a state, position = "10 mm"; or all states of the plant by name
-    integrator = { model = "Rodas4", rtol = 1e-8 }  optional
-    [output]
-    columns = ["pressure", "force"]             optional: columns of the recording besides time; all by default
-    [observed]                                  written by fit-dynamic, read by predict: as in a study of fit-dynamic
-    [uncertainty]                               the same: see plant_uncertainty.py
-
-Components are tables with `model` and their parameters; new components need no new grammar.
+Components are tables with `model` and their parameters; new components need no new grammar. Beside these tables are
+[observed] and [uncertainty], which fit-dynamic writes and predict reads, see plant_uncertainty.py.
 """
 
 import dataclasses

@@ -1,15 +1,7 @@
 """Values in the tables of scenarios, fits and predictions: numbers, also by the names of signals, and input signals.
 
 Tables of these files are dataclasses, whose fields are declared with `custom_field` and a reader of this module. What
-the reader knows is the plant. The table [input]:
-
-fill = [["5 s", 1], ["15 s", 0]]            an input: instants, and the value from each instant on
-model = "SampledSignal"                     optional: linear interpolation between the points; Schedule by default
-period = "2 s"                              optional: the first 2 s are repeated
-file = "bench.csv"                          optional: columns of a data file; then SampledSignal is the default
-columns = { fill = "valve [%]" }            optional: the column of an input, by default the one of the same name
-[input.drivers]
-fill = { model = "SolenoidDriver", opening_delay = "5 ms" }     optional: one driver, or a list in signal order
+the reader knows is the plant.
 """
 
 import dataclasses
