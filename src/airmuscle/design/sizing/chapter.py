@@ -227,9 +227,8 @@ def sizing_plot(choice: MuscleChoice) -> Plot:
 def _figure(choice: MuscleChoice) -> Any:
     entry = choice.entry
     valid = validity_range_of(entry.characteristic, entry.validity_range)
-    title = f"{choice.total_count} x {entry.name}, {1e3 * choice.length:.4g} mm"
-    if choice.design.radius is not None:
-        title += f", radius {1e3 * choice.design.radius:.4g} mm"
+    radius = "" if choice.design.radius is None else f", radius {1e3 * choice.design.radius:.4g} mm"
+    title = f"{choice.size}{radius}"
     figure = isobar_figure(entry.characteristic, title, compute_isobars(entry.characteristic, valid), valid)
     axes = figure.axes[0]
     _draw_limits(axes, choice)

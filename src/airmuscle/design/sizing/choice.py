@@ -7,7 +7,7 @@ from types import MappingProxyType
 
 from ...core import ParameterError, ShortRepr
 from ...files.library.entry import Entry
-from ...physics.pneumatics.gas import GAS_CONSTANT, REFERENCE_DENSITY, Ambient, Isothermal, absolute_pressure
+from ...physics.pneumatics.gas import GAS_CONSTANT, REFERENCE_DENSITY, Isothermal, absolute_pressure
 from .requirement import JointRequirement, LiftRequirement, SizingConditions
 from .static_muscle import EndPoint, StaticMuscle
 
@@ -60,6 +60,11 @@ class MuscleChoice(ShortRepr):
         return self.count * (2 if isinstance(self.requirement, JointRequirement) else 1)
 
     @property
+    def size(self) -> str:
+        """Number, muscle and length as text."""
+        return f"{self.total_count} x {self.entry.name}, {1e3 * self.length:.4g} mm"
+
+    @property
     def air(self) -> float | None:
         """Mass of the air [kg] that all muscles take in a cycle; None without a geometry.
 
@@ -80,8 +85,13 @@ class MuscleChoice(ShortRepr):
 
     @property
     def air_energy(self) -> float | None:
-        """Available energy [J] of the air of a cycle at the supply pressure; None without a geometry."""
-        return None if self.air is None else available_energy(self.air, self.conditions.supply, self.conditions.ambient)
+        """Available energy [J] of the air of a cycle at the supply pressure p_s, m R T ln(p_s/p_amb) for isothermal
+        expansion; None without a geometry."""
+        if self.air is None:
+            return None
+        ambient = self.conditions.ambient
+        ratio = absolute_pressure(self.conditions.supply, ambient) / ambient.pressure
+        return self.air * GAS_CONSTANT * ambient.temperature * math.log(ratio)
 
     @property
     def efficiency(self) -> float | None:
@@ -101,12 +111,6 @@ class UnsuitableMuscle:
     name: str
     count: int
     reason: str
-
-
-def available_energy(air: float, supply: float, ambient: Ambient) -> float:
-    """Available energy [J] of a mass of air [kg] at a supply gauge pressure [Pa]: m R T ln(p_s/p_amb), isothermal."""
-    ratio = absolute_pressure(supply, ambient) / ambient.pressure
-    return air * GAS_CONSTANT * ambient.temperature * math.log(ratio)
 
 
 SortKey = Callable[[MuscleChoice], float | None]

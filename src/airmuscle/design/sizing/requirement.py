@@ -4,6 +4,8 @@ import math
 from dataclasses import replace
 from typing import Any, ClassVar
 
+import numpy as np
+
 from ...core import STANDARD_GRAVITY, Array, ParameterError, model, parameter
 from ...physics.pneumatics.gas import Ambient
 
@@ -43,15 +45,11 @@ class LiftRequirement:
     @property
     def path(self) -> tuple[Array, Array]:
         """Displacements [m] and loads at rest [N] along the stroke, (PATH_POINTS,) each."""
-        import numpy as np
-
         displacement = np.linspace(0.0, self.stroke, PATH_POINTS)
         return displacement, np.broadcast_to(self.load(displacement), displacement.shape)
 
     def loads(self, displacement: Array, cycle_time: float) -> tuple[Array, Array]:
         """Least and greatest force of the load [N] at displacements [m], at rest or moving with a cycle time [s]."""
-        import numpy as np
-
         held = self.load(displacement)
         moving = held + self.mass * (0.5 * self.stroke - displacement) * (2 * math.pi / cycle_time) ** 2
         return np.minimum(held, moving), np.maximum(held, moving)

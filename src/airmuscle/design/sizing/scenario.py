@@ -118,7 +118,10 @@ def scenario_text(choice: MuscleChoice) -> str:
 
     Raises SolveError for a choice without a geometry, or a joint with several muscles on each side.
     """
-    return _lift_text(choice) if isinstance(choice.requirement, LiftRequirement) else _joint_text(choice)
+    described = _lift if isinstance(choice.requirement, LiftRequirement) else _joint
+    plant, inputs, run, is_inertia_chosen = described(choice)
+    title = f"{choice.size}: {choice.requirement.describe()}"
+    return scenario_toml(title, plant, inputs, run, _note(choice, is_inertia_chosen))
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -139,8 +142,7 @@ def sizing_scenario(choices: Sequence[MuscleChoice], file: str) -> SizingScenari
         except AirmuscleError as error:
             reasons.append(str(error))
             continue
-        size = f"{choice.total_count} x {choice.entry.name}, {1e3 * choice.length:.4g} mm"
-        note = f"The scenario of choice {rank + 1}, {size}, is {file}; run airmuscle simulate with it."
+        note = f"The scenario of choice {rank + 1}, {choice.size}, is {file}; run airmuscle simulate with it."
         return SizingScenario(choice, text, note)
     return SizingScenario(None, "", f"No scenario is written: {reasons[0]}" if reasons else "")
 
@@ -179,7 +181,8 @@ def _load(choice: MuscleChoice, requirement: LiftRequirement) -> tuple[Mechanism
     return Isotonic(weight, mass) if requirement.force else HangingMass(mass), mass
 
 
-def _lift_text(choice: MuscleChoice) -> str:
+def _lift(choice: MuscleChoice) -> tuple[Plant, dict[str, Any], dict[str, Any], bool]:
+    """Plant, input signals and run of a lift, and whether its moving mass is chosen."""
     assert isinstance(choice.requirement, LiftRequirement)
     cycle = choice.conditions.cycle_time
     mechanism, mass = _load(choice, choice.requirement)
@@ -198,10 +201,11 @@ def _lift_text(choice: MuscleChoice) -> str:
         "output_times": cycle / 400.0,
         "initial_state": {"pressure": start.pressure, "position": start.contraction * choice.length},
     }
-    return scenario_toml(_title(choice), plant, inputs, run, _note(choice, mass != choice.requirement.mass))
+    return plant, inputs, run, mass != choice.requirement.mass
 
 
-def _joint_text(choice: MuscleChoice) -> str:
+def _joint(choice: MuscleChoice) -> tuple[Plant, dict[str, Any], dict[str, Any], bool]:
+    """Plant, input signals and run of a joint, and whether its inertia is chosen."""
     requirement, cycle = choice.requirement, choice.conditions.cycle_time
     assert isinstance(requirement, JointRequirement)
     if choice.count > 1:
@@ -234,7 +238,7 @@ def _joint_text(choice: MuscleChoice) -> str:
         "output_times": cycle / 400.0,
         "initial_state": {"pressure": middle, "angle": 0.0},
     }
-    return scenario_toml(_title(choice), plant, inputs, run, _note(choice, inertia != requirement.inertia))
+    return plant, inputs, run, inertia != requirement.inertia
 
 
 def _plant(choice: MuscleChoice, muscles: tuple[Muscle, ...], circuit: Any, mechanism: Mechanism) -> Plant:
@@ -243,10 +247,6 @@ def _plant(choice: MuscleChoice, muscles: tuple[Muscle, ...], circuit: Any, mech
         muscles[0] if single else muscles, circuit if single else (circuit,) * len(muscles), mechanism, Isothermal(),
         choice.conditions.ambient,
     )  # fmt: skip
-
-
-def _title(choice: MuscleChoice) -> str:
-    return f"{choice.total_count} x {choice.entry.name}, {1e3 * choice.length:.4g} mm: {choice.requirement.describe()}"
 
 
 def _note(choice: MuscleChoice, chosen_inertia: bool) -> str:

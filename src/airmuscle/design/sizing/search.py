@@ -9,10 +9,9 @@ from collections.abc import Callable, Iterable
 import numpy as np
 
 from ...core import AirmuscleError, AirmuscleWarning, ParameterError, ShortRepr, SolveError, check_whole
-from ...files.library import LAWS, Entry, list_laws, list_products, load_law, own_length, read_toml
+from ...files.library import Entry, list_products, load_law, own_length, products_of_laws
 from .choice import MuscleChoice, Requirement, SortKey, UnsuitableMuscle, by_air, rank
-from .joint import JointSearch
-from .lift import LiftSearch
+from .lengths import JointSearch, LiftSearch
 from .requirement import LiftRequirement, SizingConditions
 from .static_muscle import LengthRange, at_length, least_sufficient, length_range, static_muscle
 
@@ -79,13 +78,13 @@ class SizingResult(ShortRepr):
 
 def catalogue() -> tuple[Entry, ...]:
     """Entries of the library whose maker states permitted values and that have no restriction of use."""
-    entries = (load_quietly(name) for name in list_laws() if "product" in read_toml(LAWS / f"{name}.toml"))
+    entries = (load_quietly(name) for name, product in products_of_laws().items() if product)
     return tuple(entry for entry in entries if not entry.warning)
 
 
 def products_without_law() -> tuple[UnsuitableMuscle, ...]:
     """Products of the library of which no law is published, as unsuitable muscles."""
-    with_law = {read_toml(LAWS / f"{name}.toml").get("product") for name in list_laws()}
+    with_law = set(products_of_laws().values())
     names = (name for name in list_products() if name not in with_law)
     return tuple(UnsuitableMuscle(name, 0, "no law of this product is published") for name in names)
 
