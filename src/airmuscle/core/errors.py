@@ -1,23 +1,4 @@
-"""Exceptions and warnings. A message states the location, the cause, the allowed values and the remedy.
-
-AirmuscleError
-├── InputError               invalid input
-│   ├── FileError            a file or folder cannot be read or written
-│   ├── ColumnError          a recording lacks a column, or a column contains no numbers
-│   ├── UnitError            a unit is unknown or of the wrong dimension
-│   ├── ParameterError       a parameter is missing, misspelt, of the wrong type or physically impossible
-│   └── UnknownNameError     no muscle, characteristic, component or paper has that name
-├── PhysicsError             the model has no solution
-│   ├── SolveError           no pressure, contraction or force satisfies the request
-│   ├── GeometryLimitError   a contraction outside the range of the geometry
-│   ├── RatingError          an operating point that the maker of the muscle does not permit
-│   └── EquilibriumError     a plant has no equilibrium; the message names the muscle and the forces
-├── TraceError               a model cannot be traced into a compiled program
-├── IdentificationError      the data cannot determine the requested quantities
-└── SimulationError          a simulation ended early; `.solution` contains the partial results
-
-AirmuscleWarning             a result that may differ from what the user expects
-"""
+"""Exceptions and warnings. A message states the location, the cause, the allowed values and the remedy."""
 
 import dataclasses
 import difflib

@@ -13,42 +13,6 @@
     AirmuscleWarning                  a result that may differ from what the user expects
 """
 
-from ..core.errors import (
-    AirmuscleError,
-    AirmuscleWarning,
-    ColumnError,
-    EquilibriumError,
-    FileError,
-    FolderInUseError,
-    GeometryLimitError,
-    IdentificationError,
-    InputError,
-    ParameterError,
-    PhysicsError,
-    RatingError,
-    SimulationError,
-    SolveError,
-    TraceError,
-    UnitError,
-    UnknownNameError,
-)
+from ..core.stubs import attach_stub
 
-__all__ = [
-    "AirmuscleError",
-    "AirmuscleWarning",
-    "ColumnError",
-    "EquilibriumError",
-    "FileError",
-    "FolderInUseError",
-    "GeometryLimitError",
-    "IdentificationError",
-    "InputError",
-    "ParameterError",
-    "PhysicsError",
-    "RatingError",
-    "SimulationError",
-    "SolveError",
-    "TraceError",
-    "UnitError",
-    "UnknownNameError",
-]
+__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

@@ -5,39 +5,6 @@
 All internal values are SI. A pressure is gauge unless its unit states absolute, such as "bara" or "kPa(a)".
 """
 
-from ..core.display import display
-from ..core.units import (
-    AMBIENT_PRESSURE,
-    J,
-    K,
-    MPa,
-    N,
-    Pa,
-    UnitConversion,
-    W,
-    bar,
-    cm,
-    conversion,
-    degree,
-    g,
-    kg,
-    km,
-    kN,
-    kPa,
-    m,
-    mbar,
-    minute,
-    mm,
-    ms,
-    percent,
-    psi,
-    quantity,
-    rad,
-    s,
-)  # fmt: skip
+from ..core.stubs import attach_stub
 
-__all__ = [
-    "AMBIENT_PRESSURE", "J", "K", "MPa", "N", "Pa", "UnitConversion", "W", "bar", "cm", "conversion", "degree",
-    "display", "g", "kN", "kPa", "kg", "km", "m", "mbar", "minute", "mm", "ms", "percent", "psi", "quantity", "rad",
-    "s",
-]  # fmt: skip
+__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

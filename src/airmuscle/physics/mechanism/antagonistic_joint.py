@@ -4,7 +4,7 @@ import abc
 from collections.abc import Sequence
 
 from ...core import ParameterError, Value, Values, check_structure, model, ops, parameter
-from .base import Coordinate, Mechanism, angle_limit, gravity_parameter
+from .base import Coordinate, DampedCoordinate, angle_limit, gravity_parameter
 
 SAMPLES = 101
 """Number of angles at which a profile is checked (chosen)."""
@@ -99,7 +99,7 @@ def check_profile(owner: str, profile: PulleyProfile, low: float, high: float) -
 
 
 @model
-class AntagonisticJoint(Mechanism):
+class AntagonisticJoint(DampedCoordinate):
     """Antagonistic joint: J theta'' = r_1 F_1 - r_2 F_2 - M sin(theta + theta_g) - b theta'.
 
         r_1 = r f(theta),                   r_2 = r f(-theta)
@@ -133,9 +133,11 @@ class AntagonisticJoint(Mechanism):
         reach = max(abs(self.min_angle), abs(self.max_angle))  # the profile of the second muscle is mirrored
         check_profile("AntagonisticJoint", self.profile, -reach, reach)
 
+    muscle_count = 2
+
     @property
-    def muscle_count(self) -> int | None:
-        return 2
+    def total_inertia(self) -> Value:
+        return self.inertia
 
     @property
     def coordinates(self) -> tuple[Coordinate, ...]:
@@ -156,18 +158,12 @@ class AntagonisticJoint(Mechanism):
         weight = self.weight_torque * ops.sin(q["angle"] + self.weight_angle)
         return {"angle": (forces["angle"] - (weight + self.damping * v["angular_speed"])) / self.inertia}
 
-    def dissipated_power(self, q: Values, v: Values, forces: Values, inputs: Values) -> Value:
-        return self.damping * v["angular_speed"] ** 2
-
     def potential_energy(self, q: Values) -> Value:
         return self.weight_torque * (1.0 - ops.cos(q["angle"] + self.weight_angle))
 
-    def kinetic_energy(self, q: Values, v: Values) -> Value:
-        return 0.5 * self.inertia * v["angular_speed"] ** 2
-
 
 @model
-class Lever(Mechanism):
+class Lever(DampedCoordinate):
     """Lever: (J + m b^2) phi'' = sum F_i d(L0_i eps_i)/dphi - m g b cos phi - d phi'.
 
         eps_i = 1 - sqrt((a_i cos phi - a_i)^2 + (h_i - a_i sin phi)^2)/L0_i,   h_i = L0_i (1 - eps_0i)
@@ -195,16 +191,14 @@ class Lever(Mechanism):
                 f"Lever: {len(self.arms)} arms and {len(self.offsets)} offsets are given; give one arm for each "
                 "muscle, and one offset for each or no offsets."
             )
-        if not self._total_inertia() > 0.0:
+        if not self.total_inertia > 0.0:
             raise ParameterError("Lever: the total inertia is zero; give an inertia, or a mass with a load_arm.")
 
     @property
     def muscle_count(self) -> int | None:
         return len(self.arms)
 
-    @property
-    def coordinates(self) -> tuple[Coordinate, ...]:
-        return (Coordinate("angle", "angular_speed", "rad", 0.05, 1.0, -0.5 * ops.pi, 0.5 * ops.pi),)
+    coordinates = (Coordinate("angle", "angular_speed", "rad", 0.05, 1.0, -0.5 * ops.pi, 0.5 * ops.pi),)
 
     def contractions(self, q: Values, resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
         horizontal, vertical = ops.cos(q["angle"]) - 1.0, ops.sin(q["angle"])
@@ -215,18 +209,13 @@ class Lever(Mechanism):
             contractions.append(1.0 - ops.sqrt((arm * horizontal) ** 2 + (height - arm * vertical) ** 2) / length)
         return tuple(contractions)
 
-    def _total_inertia(self) -> Value:
+    @property
+    def total_inertia(self) -> Value:
         return self.inertia + self.mass * self.load_arm**2
 
     def acceleration(self, q: Values, v: Values, forces: Values, inputs: Values) -> Values:
         weight = self.mass * self.gravity * self.load_arm * ops.cos(q["angle"])
-        return {"angle": (forces["angle"] - weight - self.damping * v["angular_speed"]) / self._total_inertia()}
-
-    def dissipated_power(self, q: Values, v: Values, forces: Values, inputs: Values) -> Value:
-        return self.damping * v["angular_speed"] ** 2
+        return {"angle": (forces["angle"] - weight - self.damping * v["angular_speed"]) / self.total_inertia}
 
     def potential_energy(self, q: Values) -> Value:
         return self.mass * self.gravity * self.load_arm * ops.sin(q["angle"])
-
-    def kinetic_energy(self, q: Values, v: Values) -> Value:
-        return 0.5 * self._total_inertia() * v["angular_speed"] ** 2

@@ -138,20 +138,36 @@ class Mechanism(abc.ABC):
         return 0.0
 
 
-class Translation(Mechanism, abc.ABC):
+class DampedCoordinate(Mechanism, abc.ABC):
+    """Mechanism of one coordinate with an inertia and viscous friction (base class)."""
+
+    damping: float = 0.0
+
+    @property
+    @abc.abstractmethod
+    def total_inertia(self) -> Value:
+        """Mass [kg] of a position, or moment of inertia [kg m^2] of an angle."""
+
+    def dissipated_power(self, q: Values, v: Values, forces: Values, inputs: Values) -> Value:
+        return self.damping * v[self.coordinates[0].speed] ** 2
+
+    def kinetic_energy(self, q: Values, v: Values) -> Value:
+        return 0.5 * self.total_inertia * v[self.coordinates[0].speed] ** 2
+
+
+class Translation(DampedCoordinate):
     """One coordinate: the position y [m], which is the shortening of the muscles from their resting length."""
 
     mass: float
 
     @property
-    def coordinates(self) -> tuple[Coordinate, ...]:
-        return (Coordinate("position", "speed", "m", 0.01, 0.1),)
+    def total_inertia(self) -> Value:
+        return self.mass
+
+    coordinates = (Coordinate("position", "speed", "m", 0.01, 0.1),)
 
     def contractions(self, q: Values, resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
         return tuple(q["position"] / length for length in resting_lengths)
 
     def generalised_forces(self, q: Values, tensions: Sequence[Value], resting_lengths: Sequence[Value]) -> Values:
         return {"position": sum(tensions, 0.0)}
-
-    def kinetic_energy(self, q: Values, v: Values) -> Value:
-        return 0.5 * self.mass * v["speed"] ** 2

@@ -3,11 +3,9 @@
 import abc
 from typing import ClassVar
 
-from ...core import ParameterError, Reference, Value, Values, check_structure, model, ops, parameter, published
-from .base import Coordinate, Mechanism
-from .wrapper import MechanismWrapper, check_choice
-
-HUNT_CROSSLEY1975 = published("hunt-crossley-1975")
+from ...core import ParameterError, Reference, Value, Values, model, ops, parameter, published
+from .base import Mechanism
+from .wrapper import CoordinateWrapper
 
 
 @model
@@ -20,7 +18,7 @@ class HuntCrossley:
     Reference: Hunt and Crossley (1975), with the exponent of Hertz.
     """
 
-    references: ClassVar[tuple[Reference, ...]] = (HUNT_CROSSLEY1975,)
+    references: ClassVar[tuple[Reference, ...]] = (published("hunt-crossley-1975"),)
 
     stiffness: float = parameter("N/m^1.5", "K", "stiffness of the contact", bounds=(1.0, 1e12))
     damping: float = parameter("s/m", "c", "damping of the contact", bounds=(0.0, 100.0), default=0.5)
@@ -43,7 +41,7 @@ def _regularised_sqrt(depth: Value) -> Value:
     return ops.sqrt(ops.maximum(depth, 1e-30))
 
 
-class EndStops(MechanismWrapper):
+class EndStops(CoordinateWrapper):
     """Two Hunt-Crossley contacts that add a generalised force Q to one coordinate q (base class).
 
         Q = R (F(delta_low) - F(delta_high)),   delta_low = max(R (q_low - q), 0),   delta_high = max(R (q - q_high), 0)
@@ -53,15 +51,9 @@ class EndStops(MechanismWrapper):
 
     inner: Mechanism
     contact: HuntCrossley
-    coordinate: str
     lower_stop: float
     upper_stop: float
-    unit: ClassVar[str]
-
-    @property
-    def stop_positions(self) -> tuple[Value, Value]:
-        """Values of the coordinate at which the lower and the upper contact begin."""
-        return self.lower_stop, self.upper_stop
+    what: ClassVar[str] = "end stops"
 
     @property
     @abc.abstractmethod
@@ -69,25 +61,18 @@ class EndStops(MechanismWrapper):
         """Displacement of the contact point per unit of the coordinate."""
 
     def check(self) -> None:
-        check_structure(self)
-        check_choice(self, self.unit, self.coordinate, "end stops")
-        low, high = self.stop_positions
+        super().check()
+        low, high = self.lower_stop, self.upper_stop
         if not low < high:
             owner = type(self).__name__
             raise ParameterError(f"{owner}: lower_stop is {low:g}; it must be less than upper_stop, {high:g}.")
 
-    @property
-    def stopped_coordinate(self) -> Coordinate:
-        """Coordinate on which the end stops act."""
-        return next(c for c in self.inner.coordinates if c.unit == self.unit and self.coordinate in ("", c.name))
-
     def _contacts(self, q: Values, v: Values) -> tuple[tuple[Value, Value], ...]:
         """Depth of each contact and its time derivative."""
-        (low, high), coordinate = self.stop_positions, self.stopped_coordinate
-        position, speed = q[coordinate.name], v[coordinate.speed]
+        position, speed = q[self.acted_on.name], v[self.acted_on.speed]
         return (
-            (self.lever_arm * ops.maximum(low - position, 0.0), -self.lever_arm * speed),
-            (self.lever_arm * ops.maximum(position - high, 0.0), self.lever_arm * speed),
+            (self.lever_arm * ops.maximum(self.lower_stop - position, 0.0), -self.lever_arm * speed),
+            (self.lever_arm * ops.maximum(position - self.upper_stop, 0.0), self.lever_arm * speed),
         )
 
     def stop_force(self, q: Values, v: Values) -> Value:
@@ -95,23 +80,18 @@ class EndStops(MechanismWrapper):
         lower, upper = (self.contact.force(depth, speed) for depth, speed in self._contacts(q, v))
         return self.lever_arm * (lower - upper)
 
-    def acceleration(self, q: Values, v: Values, forces: Values, inputs: Values) -> Values:
-        return self.inner.acceleration(q, v, self._add_stop_force(q, v, forces), inputs)
+    def with_own_forces(self, q: Values, v: Values, forces: Values, inputs: Values) -> Values:
+        return {**forces, self.acted_on.name: forces[self.acted_on.name] + self.stop_force(q, v)}
 
-    def _add_stop_force(self, q: Values, v: Values, forces: Values) -> Values:
-        return {**forces, self.stopped_coordinate.name: forces[self.stopped_coordinate.name] + self.stop_force(q, v)}
-
-    def dissipated_power(self, q: Values, v: Values, forces: Values, inputs: Values) -> Value:
-        damped = sum(
+    def own_loss(self, q: Values, v: Values, forces: Values, inputs: Values) -> Value:
+        return sum(
             (self.contact.force(depth, speed) - self.contact.force(depth, 0.0)) * speed
             for depth, speed in self._contacts(q, v)
         )
-        return damped + self.inner.dissipated_power(q, v, self._add_stop_force(q, v, forces), inputs)
 
     def potential_energy(self, q: Values) -> Value:
-        at_rest = {self.stopped_coordinate.speed: 0.0}
-        elastic = sum(self.contact.elastic_energy(depth) for depth, _ in self._contacts(q, at_rest))
-        return elastic + self.inner.potential_energy(q)
+        contacts = self._contacts(q, {self.acted_on.speed: 0.0})
+        return sum(self.contact.elastic_energy(depth) for depth, _ in contacts) + self.inner.potential_energy(q)
 
 
 @model

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from ...core import Input, ParameterError, Value, Values, model, parameter
-from .base import Coordinate, Mechanism, Translation, gravity_parameter
+from .base import Mechanism, Translation, gravity_parameter
 
 SHORTENING, SHORTENING_SPEED = "shortening", "shortening_speed"
 """Names of the inputs of one muscle."""
@@ -15,9 +15,7 @@ class Isometric(Mechanism):
 
     contraction: float = parameter("1", "eps", "contraction at which the muscle is fixed", bounds=(-0.2, 0.9))
 
-    @property
-    def coordinates(self) -> tuple[Coordinate, ...]:
-        return ()
+    coordinates = ()
 
     def contractions(self, q: Values, resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
         return tuple(self.contraction for _ in resting_lengths)
@@ -40,9 +38,6 @@ class Isotonic(Translation):
 
     def acceleration(self, q: Values, v: Values, forces: Values, inputs: Values) -> Values:
         return {"position": (forces["position"] - self.force - self.damping * v["speed"]) / self.mass}
-
-    def dissipated_power(self, q: Values, v: Values, forces: Values, inputs: Values) -> Value:
-        return self.damping * v["speed"] ** 2
 
     def potential_energy(self, q: Values) -> Value:
         return self.force * q["position"]
@@ -79,9 +74,6 @@ class SpringLoad(Translation):
         resistance = self.preload + self.stiffness * q["position"] + self.damping * v["speed"]
         return {"position": (forces["position"] - resistance) / self.mass}
 
-    def dissipated_power(self, q: Values, v: Values, forces: Values, inputs: Values) -> Value:
-        return self.damping * v["speed"] ** 2
-
     def potential_energy(self, q: Values) -> Value:
         return (self.preload + 0.5 * self.stiffness * q["position"]) * q["position"]
 
@@ -102,21 +94,16 @@ class Pulley(Translation):
     damping: float = parameter("N s/m", "d", "viscous friction of the bearing", bounds=(0.0, 1e6), default=0.0)
     gravity: float = gravity_parameter()
 
-    def _inertial_mass(self) -> Value:
+    @property
+    def total_inertia(self) -> Value:
         return self.inertia / self.radius**2 + self.ratio**2 * self.mass
 
     def acceleration(self, q: Values, v: Values, forces: Values, inputs: Values) -> Values:
         resistance = self.ratio * self.mass * self.gravity + self.damping * v["speed"]
-        return {"position": (forces["position"] - resistance) / self._inertial_mass()}
-
-    def dissipated_power(self, q: Values, v: Values, forces: Values, inputs: Values) -> Value:
-        return self.damping * v["speed"] ** 2
+        return {"position": (forces["position"] - resistance) / self.total_inertia}
 
     def potential_energy(self, q: Values) -> Value:
         return self.mass * self.gravity * self.ratio * q["position"]
-
-    def kinetic_energy(self, q: Values, v: Values) -> Value:
-        return 0.5 * self._inertial_mass() * v["speed"] ** 2
 
 
 @model
@@ -128,9 +115,7 @@ class PrescribedMotion(Translation):
     signal and the initial state.
     """
 
-    @property
-    def inputs(self) -> tuple[Input, ...]:
-        return (Input("prescribed_acceleration", "m/s^2", -1e5, 1e5, "acceleration prescribed by the drive"),)
+    inputs = (Input("prescribed_acceleration", "m/s^2", -1e5, 1e5, "acceleration prescribed by the drive"),)
 
     def acceleration(self, q: Values, v: Values, forces: Values, inputs: Values) -> Values:
         return {"position": inputs["prescribed_acceleration"]}
@@ -166,9 +151,7 @@ class ExternalLoad(Mechanism):
                 "one for each muscle, or none for their resting lengths."
             )
 
-    @property
-    def coordinates(self) -> tuple[Coordinate, ...]:
-        return ()
+    coordinates = ()
 
     @property
     def muscle_count(self) -> int:

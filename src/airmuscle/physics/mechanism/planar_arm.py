@@ -1,6 +1,7 @@
 """Arms: links in series with the routes of muscles over their joints, and the planar arm in a vertical plane."""
 
 import abc
+import itertools
 from collections.abc import Sequence
 from typing import Any
 
@@ -89,11 +90,20 @@ class Arm(Mechanism):
     def mass_matrix(self, q: Values) -> Matrix:
         """Mass matrix M [kg m^2] in the joint angles, n rows of n values; symmetric and positive definite."""
 
+    def kinetic_energy(self, q: Values, v: Values) -> Value:
+        return _energy(self.mass_matrix(q), [v[c.speed] for c in self.coordinates])
+
     def dissipated_power(self, q: Values, v: Values, forces: Values, inputs: Values) -> Value:
         return sum(link.damping * v[c.speed] ** 2 for c, link in zip(self.coordinates, self.links, strict=True))
 
     def _angles(self, q: Values) -> list[Value]:
         return [q[c.name] for c in self.coordinates]
+
+
+def _energy(matrix: Matrix, speeds: Sequence[Value]) -> Value:
+    """Kinetic energy [J] of a mass matrix at speeds."""
+    count = range(len(speeds))
+    return 0.5 * sum(matrix[i][j] * speeds[i] * speeds[j] for i in count for j in count)
 
 
 def solve_positive_definite(matrix: Sequence[Sequence[Value]], right: Sequence[Value]) -> list[Value]:
@@ -157,7 +167,6 @@ class PlanarArm(Arm):
     gravity: float = gravity_parameter()
 
     def mass_matrix(self, q: Values) -> Matrix:
-        """Mass matrix M [kg m^2] in the joint angles, n rows of n values; symmetric and positive definite."""
         inner, count = self._link_matrix(self._link_angles(q)), len(self.links)
         return [
             [sum(inner[a][b] for a in range(i, count) for b in range(j, count)) for j in range(count)]
@@ -194,15 +203,13 @@ class PlanarArm(Arm):
         return sum(self.gravity * moment * (1.0 - ops.cos(angle)) for moment, angle in pairs)
 
     def kinetic_energy(self, q: Values, v: Values) -> Value:
-        matrix, speeds = self._link_matrix(self._link_angles(q)), self._link_speeds(v)
-        count = range(len(speeds))
-        return 0.5 * sum(matrix[i][j] * speeds[i] * speeds[j] for i in count for j in count)
+        return _energy(self._link_matrix(self._link_angles(q)), self._link_speeds(v))
 
     def _link_angles(self, q: Values) -> list[Value]:
-        return _running_sums(self._angles(q))
+        return list(itertools.accumulate(self._angles(q)))
 
     def _link_speeds(self, v: Values) -> list[Value]:
-        return _running_sums([v[c.speed] for c in self.coordinates])
+        return list(itertools.accumulate(v[c.speed] for c in self.coordinates))
 
     def _masses_beyond(self) -> list[Value]:
         """Mass [kg] beyond each link, with the payload."""
@@ -231,11 +238,3 @@ class PlanarArm(Arm):
             [coupling[i][j] * ops.cos(angles[i] - angles[j]) if i != j else coupling[i][i] for j in count]
             for i in count
         ]
-
-
-def _running_sums(values: Sequence[Value]) -> list[Value]:
-    total, sums = 0.0, []
-    for value in values:
-        total = total + value
-        sums.append(total)
-    return sums

@@ -124,11 +124,6 @@ class SerialArm(Arm):
             link.mass * self.gravity * c[2] for link, c in zip(self.links, self._posture(q).centres, strict=True)
         )
 
-    def kinetic_energy(self, q: Values, v: Values) -> Value:
-        matrix, speeds = self.mass_matrix(q), [v[c.speed] for c in self.coordinates]
-        count = range(len(speeds))
-        return 0.5 * sum(matrix[i][j] * speeds[i] * speeds[j] for i in count for j in count)
-
     def _posture(self, q: Values) -> _Posture:
         columns: list[Vector] = [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)]
         origin: Vector = (0.0, 0.0, 0.0)

@@ -6,7 +6,7 @@ from typing import cast
 from ...core import ParameterError, StateVariable, Value, Values, check_structure, model, ops, parameter
 from .base import Coordinate, Mechanism
 from .serial_arm import SerialArm
-from .wrapper import MechanismWrapper
+from .wrapper import ForceWrapper
 
 
 @model
@@ -122,7 +122,7 @@ class GaussianResidual:
 
 
 @model
-class WithStickSlip(MechanismWrapper):
+class WithStickSlip(ForceWrapper):
     """Mechanism whose joints have the friction of `elements`, one for each of its angles; the bristles are states.
 
     Equilibria are those with relaxed bristles. A caller of `acceleration` who gives torques alone has the friction
@@ -188,9 +188,8 @@ class WithStickSlip(MechanismWrapper):
                 )
         return forces
 
-    def acceleration(self, q: Values, v: Values, forces: Values, inputs: Values) -> Values:
-        forces = self._with_bearings(q, v, forces, inputs)
-        return self.inner.acceleration(q, v, {**forces, **self._with_friction(q, v, forces)}, inputs)
+    def with_own_forces(self, q: Values, v: Values, forces: Values, inputs: Values) -> Values:
+        return self._with_friction(q, v, self._with_bearings(q, v, forces, inputs))
 
     def bearing_load(self, joint: int, q: Values, v: Values, accelerations: Values) -> Value:
         """Friction torque [N m] of a joint, from 0, by its bearing, at the accelerations of the other joints."""
@@ -203,12 +202,12 @@ class WithStickSlip(MechanismWrapper):
         loaded = {j: friction_load(c) for j, c in enumerate(self._angles) if self.elements[j].bearing_arms}
         if not loaded:
             return forces
-        free = self.inner.acceleration(q, v, {**forces, **self._with_friction(q, v, forces)}, inputs)
+        free = self.inner.acceleration(q, v, self._with_friction(q, v, forces), inputs)
         loads = {name: forces.get(name, 0.0) + self.bearing_load(j, q, v, free) for j, name in loaded.items()}
         return {**forces, **loads}
 
     def _with_friction(self, q: Values, v: Values, forces: Values) -> dict[str, Value]:
-        return {c.name: forces[c.name] + torque for c, torque in self._friction(q, v, forces)}
+        return {**forces, **{c.name: forces[c.name] + torque for c, torque in self._friction(q, v, forces)}}
 
     def _friction(self, q: Values, v: Values, forces: Values) -> list[tuple[Coordinate, Value]]:
         return [
@@ -216,10 +215,9 @@ class WithStickSlip(MechanismWrapper):
             for c, element in zip(self._angles, self.elements, strict=True)
         ]
 
-    def dissipated_power(self, q: Values, v: Values, forces: Values, inputs: Values) -> Value:
+    def own_loss(self, q: Values, v: Values, forces: Values, inputs: Values) -> Value:
         forces = self._with_bearings(q, v, forces, inputs)
-        inner = self.inner.dissipated_power(q, v, {**forces, **self._with_friction(q, v, forces)}, inputs)
-        return inner - sum(torque * v[c.speed] for c, torque in self._friction(q, v, forces))
+        return -sum(torque * v[c.speed] for c, torque in self._friction(q, v, forces))
 
 
 def _bristle(coordinate: Coordinate) -> str:

@@ -1,7 +1,9 @@
 """Wrappers of a mechanism: latch, contraction offsets, friction of a joint, torque from outside."""
 
+import abc
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from typing import ClassVar
 
 from ...core import Input, ParameterError, Value, Values, check_structure, model, ops, parameter
 from ...core.declaration import forwarded
@@ -17,30 +19,14 @@ class MechanismWrapper(Mechanism):
     inputs = forwarded("inner.inputs")
     muscle_count = forwarded("inner.muscle_count")
     inner_states = forwarded("inner.inner_states")
-
-    def inner_rates(self, q: Values, v: Values, forces: Values) -> Mapping[str, Value]:
-        return self.inner.inner_rates(q, v, forces)
-
-    def contractions(self, q: Values, resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
-        return self.inner.contractions(q, resting_lengths)
-
-    def contraction_speeds(self, q: Values, v: Values, resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
-        return self.inner.contraction_speeds(q, v, resting_lengths)
-
-    def generalised_forces(self, q: Values, tensions: Sequence[Value], resting_lengths: Sequence[Value]) -> Values:
-        return self.inner.generalised_forces(q, tensions, resting_lengths)
-
-    def acceleration(self, q: Values, v: Values, forces: Values, inputs: Values) -> Values:
-        return self.inner.acceleration(q, v, forces, inputs)
-
-    def dissipated_power(self, q: Values, v: Values, forces: Values, inputs: Values) -> Value:
-        return self.inner.dissipated_power(q, v, forces, inputs)
-
-    def potential_energy(self, q: Values) -> Value:
-        return self.inner.potential_energy(q)
-
-    def kinetic_energy(self, q: Values, v: Values) -> Value:
-        return self.inner.kinetic_energy(q, v)
+    inner_rates = forwarded("inner.inner_rates")
+    contractions = forwarded("inner.contractions")
+    contraction_speeds = forwarded("inner.contraction_speeds")
+    generalised_forces = forwarded("inner.generalised_forces")
+    acceleration = forwarded("inner.acceleration")
+    dissipated_power = forwarded("inner.dissipated_power")
+    potential_energy = forwarded("inner.potential_energy")
+    kinetic_energy = forwarded("inner.kinetic_energy")
 
 
 @model
@@ -84,26 +70,57 @@ class WithOffsets(MechanismWrapper):
         return tuple(offset + contraction for offset, contraction in zip(self.offsets, inner, strict=True))
 
 
-def check_choice(wrapper: MechanismWrapper, unit: str, coordinate: str, what: str) -> None:
-    """Raise ParameterError where a mechanism has not one coordinate of this unit on which something acts, or several of
-    which none is chosen."""
-    name, inner = type(wrapper).__name__, type(wrapper.inner).__name__
-    candidates = [c.name for c in wrapper.inner.coordinates if c.unit == unit]
-    if coordinate and coordinate not in candidates:
-        raise ParameterError(
-            f"{name}: no coordinate '{coordinate}' in {unit}; {inner} has {', '.join(candidates) or 'none'}."
-        )
-    if not candidates:
-        raise ParameterError(f"{name}: {inner} has no coordinate in {unit}; use another mechanism.")
-    if not coordinate and len(candidates) > 1:
-        raise ParameterError(
-            f"{name}: {inner} has {len(candidates)} coordinates in {unit}; set coordinate to the one with {what}: "
-            f"{' or '.join(candidates)}."
-        )
+class ForceWrapper(MechanismWrapper):
+    """Wrapper that adds generalised forces to those of the muscles on its inner mechanism (base class)."""
+
+    @abc.abstractmethod
+    def with_own_forces(self, q: Values, v: Values, forces: Values, inputs: Values) -> Values:
+        """The forces on the inner mechanism: those of the muscles with those of this wrapper."""
+
+    @abc.abstractmethod
+    def own_loss(self, q: Values, v: Values, forces: Values, inputs: Values) -> Value:
+        """Power [W] that leaves the mechanism through this wrapper, at these forces of the muscles."""
+
+    def acceleration(self, q: Values, v: Values, forces: Values, inputs: Values) -> Values:
+        return self.inner.acceleration(q, v, self.with_own_forces(q, v, forces, inputs), inputs)
+
+    def dissipated_power(self, q: Values, v: Values, forces: Values, inputs: Values) -> Value:
+        inner = self.inner.dissipated_power(q, v, self.with_own_forces(q, v, forces, inputs), inputs)
+        return inner + self.own_loss(q, v, forces, inputs)
+
+
+class CoordinateWrapper(ForceWrapper):
+    """Wrapper that acts on one coordinate, which is named if several have its unit (base class)."""
+
+    coordinate: str
+    unit: ClassVar[str]
+    what: ClassVar[str]
+    """What acts on the coordinate, in messages."""
+
+    def check(self) -> None:
+        check_structure(self)
+        name, inner, unit = type(self).__name__, type(self.inner).__name__, self.unit
+        candidates = [c.name for c in self.inner.coordinates if c.unit == unit]
+        if self.coordinate and self.coordinate not in candidates:
+            raise ParameterError(
+                f"{name}: no coordinate '{self.coordinate}' in {unit}; {inner} has {', '.join(candidates) or 'none'}."
+            )
+        if not candidates:
+            raise ParameterError(f"{name}: {inner} has no coordinate in {unit}; use another mechanism.")
+        if not self.coordinate and len(candidates) > 1:
+            raise ParameterError(
+                f"{name}: {inner} has {len(candidates)} coordinates in {unit}; set coordinate to the one with "
+                f"{self.what}: {' or '.join(candidates)}."
+            )
+
+    @property
+    def acted_on(self) -> Coordinate:
+        """The coordinate on which the wrapper acts."""
+        return next(c for c in self.inner.coordinates if c.unit == self.unit and self.coordinate in ("", c.name))
 
 
 @model
-class JointWithFriction(MechanismWrapper):
+class JointWithFriction(CoordinateWrapper):
     """Regularised Coulomb friction of a joint: Q_f = -T_c w/sqrt(w^2 + w_0^2).
 
     w angular speed, T_c friction torque, w_0 regularising speed: above about 3 w_0 the torque is within 5 % of T_c. The
@@ -119,34 +136,24 @@ class JointWithFriction(MechanismWrapper):
     coordinate: str = ""
     """Name of the angle with friction; required if several coordinates are angles."""
 
-    def check(self) -> None:
-        check_structure(self)
-        check_choice(self, "rad", self.coordinate, "friction")
-
-    @property
-    def angle(self) -> Coordinate:
-        """Angle on which the friction acts."""
-        return next(c for c in self.inner.coordinates if c.unit == "rad" and self.coordinate in ("", c.name))
+    unit: ClassVar[str] = "rad"
+    what: ClassVar[str] = "friction"
 
     def friction(self, angular_speed: Value) -> Value:
         """Generalised friction force [N m] at an angular speed [rad/s]."""
         return -self.friction_torque * angular_speed / ops.sqrt(angular_speed**2 + self.regularising_speed**2)
 
-    def acceleration(self, q: Values, v: Values, forces: Values, inputs: Values) -> Values:
-        return self.inner.acceleration(q, v, self._with_friction(v, forces), inputs)
+    def with_own_forces(self, q: Values, v: Values, forces: Values, inputs: Values) -> Values:
+        name = self.acted_on.name
+        return {**forces, name: forces[name] + self.friction(v[self.acted_on.speed])}
 
-    def _with_friction(self, v: Values, forces: Values) -> Values:
-        name = self.angle.name
-        return {**forces, name: forces[name] + self.friction(v[self.angle.speed])}
-
-    def dissipated_power(self, q: Values, v: Values, forces: Values, inputs: Values) -> Value:
-        speed = v[self.angle.speed]
-        inner = self.inner.dissipated_power(q, v, self._with_friction(v, forces), inputs)
-        return inner - self.friction(speed) * speed
+    def own_loss(self, q: Values, v: Values, forces: Values, inputs: Values) -> Value:
+        speed = v[self.acted_on.speed]
+        return -self.friction(speed) * speed
 
 
 @model
-class JointWithExternalTorque(MechanismWrapper):
+class JointWithExternalTorque(ForceWrapper):
     """M theta'' = Q + tau_e: the input `external_torque` tau_e adds to the torque Q of the muscles on a joint.
 
     It is a load that is picked up, a push, or the torque of a test bench; positive in the direction of the angle. Its
@@ -170,16 +177,12 @@ class JointWithExternalTorque(MechanismWrapper):
         torque = Input("external_torque", "N m", -1e4, 1e4, "torque on the joint from outside")
         return (torque, *self.inner.inputs)
 
-    def _with_torque(self, forces: Values, inputs: Values) -> dict[str, Value]:
+    def with_own_forces(self, q: Values, v: Values, forces: Values, inputs: Values) -> Values:
         name = self.inner.coordinates[0].name
         return {**forces, name: forces[name] + inputs["external_torque"]}
 
-    def acceleration(self, q: Values, v: Values, forces: Values, inputs: Values) -> Values:
-        return self.inner.acceleration(q, v, self._with_torque(forces, inputs), inputs)
-
-    def dissipated_power(self, q: Values, v: Values, forces: Values, inputs: Values) -> Value:
-        inner = self.inner.dissipated_power(q, v, self._with_torque(forces, inputs), inputs)
-        return inner - inputs["external_torque"] * v[self.inner.coordinates[0].speed]
+    def own_loss(self, q: Values, v: Values, forces: Values, inputs: Values) -> Value:
+        return -inputs["external_torque"] * v[self.inner.coordinates[0].speed]
 
 
 @model

@@ -221,9 +221,7 @@ class _FirstOrderWall(Wall):
     def steady_volume(self, pressure: Value) -> Value:
         """Added volume [m3] in the steady state at a gauge pressure [Pa]."""
 
-    @property
-    def states(self) -> tuple[StateVariable, ...]:
-        return (StateVariable("wall_volume", "m3", 1e-6, "volume added by the wall"),)
+    states = (StateVariable("wall_volume", "m3", 1e-6, "volume added by the wall"),)
 
     def steady_state(self, pressure: Value) -> dict[str, Value]:
         return {"wall_volume": self.steady_volume(pressure)}

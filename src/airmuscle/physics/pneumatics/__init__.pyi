@@ -9,7 +9,6 @@ from .circuit import WithLeak as WithLeak
 from .circuit import ambient_air as ambient_air
 from .conversion import in_parallel as in_parallel
 from .conversion import in_series as in_series
-from .distributed_tube import DistributedTube as DistributedTube
 from .gas import GAS_CONSTANT as GAS_CONSTANT
 from .gas import HEAT_CAPACITY_RATIO as HEAT_CAPACITY_RATIO
 from .gas import NO_FLOW as NO_FLOW
@@ -36,6 +35,7 @@ from .supply import RegulatedSupply as RegulatedSupply
 from .supply import SharedSupply as SharedSupply
 from .supply import Supply as Supply
 from .supply import Tank as Tank
+from .tube import DistributedTube as DistributedTube
 from .tube import Tube as Tube
 from .tube import TubeModel as TubeModel
 from .tube import TubeOrifice as TubeOrifice

@@ -8,7 +8,7 @@ from typing import Any, ClassVar, TypeVar
 from ...core import ParameterError, Reference, Value, Values, check_structure, model, ops
 from ...core.declaration import forwarded
 from ...core.system import Input, StateVariable, add_prefix, select_prefix, with_prefix
-from .gas import NO_FLOW, Air, Ambient, Flow
+from .gas import NO_FLOW, Air, Airs, Ambient, Flow
 from .supply import AirSource, SharedSupply, Supply
 from .valve import Orifice, orifice_flow
 
@@ -31,6 +31,13 @@ class CircuitFlows:
     rates: Values = dataclasses.field(default_factory=dict)
     outputs: Values = dataclasses.field(default_factory=dict)
 
+    def __add__(self, other: "CircuitFlows") -> "CircuitFlows":
+        """The flows of two circuits on one supply."""
+        return CircuitFlows(
+            self.flows + other.flows, self.drawn + other.drawn, self.exhausted + other.exhausted,
+            {**self.rates, **other.rates}, {**self.outputs, **other.outputs},
+        )  # fmt: skip
+
 
 class Circuit(abc.ABC):
     """Pneumatic circuit of one or more muscles: inputs, states and the flows into the muscles (interface)."""
@@ -52,14 +59,12 @@ class Circuit(abc.ABC):
         """State variables without those of the supply."""
         return ()
 
-    def own_steady_state(self, air_states: tuple[Air, ...], ambient: Ambient) -> dict[str, Value]:
+    def own_steady_state(self, airs: Airs, ambient: Ambient) -> dict[str, Value]:
         """Steady state without the supply, for zero inputs and the air states of the muscles."""
         return {}
 
     @abc.abstractmethod
-    def supplied_flow(
-        self, inlet: Air, air_states: tuple[Air, ...], state: Values, inputs: Values, ambient: Ambient
-    ) -> CircuitFlows:
+    def supplied_flow(self, inlet: Air, airs: Airs, state: Values, inputs: Values, ambient: Ambient) -> CircuitFlows:
         """Flows for the air state at the supply and the air states of the muscles; `rates` without the supply."""
 
     def validity_warnings(self, columns: Mapping[str, Any], ambient: Ambient) -> dict[str, str]:
@@ -75,16 +80,14 @@ class Circuit(abc.ABC):
         """State variables of circuit and supply."""
         return (*self.own_states(ambient), *add_prefix(SUPPLY, self.supply.states(ambient)))
 
-    def steady_state(self, air_states: tuple[Air, ...], ambient: Ambient) -> dict[str, Value]:
+    def steady_state(self, airs: Airs, ambient: Ambient) -> dict[str, Value]:
         """Steady state of circuit and supply for zero inputs and the air states of the muscles."""
-        return {**self.own_steady_state(air_states, ambient), **with_prefix(SUPPLY, self.supply.steady_state(ambient))}
+        return {**self.own_steady_state(airs, ambient), **with_prefix(SUPPLY, self.supply.steady_state(ambient))}
 
-    def compute_flows(
-        self, air_states: tuple[Air, ...], state: Values, inputs: Values, ambient: Ambient
-    ) -> CircuitFlows:
+    def compute_flows(self, airs: Airs, state: Values, inputs: Values, ambient: Ambient) -> CircuitFlows:
         """Flows and rates of circuit and supply; `drawn` is the flow from outside the plant."""
         supply = select_prefix(SUPPLY, state)
-        flows = self.supplied_flow(self.supply.air(supply, ambient), air_states, state, inputs, ambient)
+        flows = self.supplied_flow(self.supply.air(supply, ambient), airs, state, inputs, ambient)
         rates, inflow = self.supply.balance(supply, flows.drawn, ambient)
         return dataclasses.replace(flows, rates={**flows.rates, **with_prefix(SUPPLY, rates)}, drawn=inflow)
 
@@ -97,9 +100,9 @@ class CircuitWrapper(Circuit, abc.ABC):
     supply = forwarded("circuit.supply")
     port_count = forwarded("circuit.port_count")
     inputs = forwarded("circuit.inputs")
-
-    def validity_warnings(self, columns: Mapping[str, Any], ambient: Ambient) -> dict[str, str]:
-        return self.circuit.validity_warnings(columns, ambient)
+    own_states = forwarded("circuit.own_states")
+    own_steady_state = forwarded("circuit.own_steady_state")
+    validity_warnings = forwarded("circuit.validity_warnings")
 
 
 def port_prefix(number: int) -> str:
@@ -133,44 +136,39 @@ def ambient_air(ambient: Ambient) -> Air:
 
 
 @model
-class FillDischarge(Circuit):
-    """Two on/off valves: a fill valve from the supply and a discharge valve to the surroundings."""
+class ValvePair(Circuit):
+    """Circuit with a fill valve from the supply and a discharge valve to the surroundings (base class)."""
 
     supply: AirSource
     fill: Orifice
     discharge: Orifice
 
-    @property
-    def inputs(self) -> tuple[Input, ...]:
-        return (Input("fill"), Input("discharge"))
-
-    def supplied_flow(
-        self, inlet: Air, air_states: tuple[Air, ...], state: Values, inputs: Values, ambient: Ambient
-    ) -> CircuitFlows:
-        inflow = orifice_flow(self.fill, inlet, air_states[0], inputs["fill"])
-        outflow = orifice_flow(self.discharge, air_states[0], ambient_air(ambient), inputs["discharge"])
+    def valve_flows(self, inlet: Air, air: Air, opened: Value, vented: Value, ambient: Ambient) -> CircuitFlows:
+        """Flows at these openings of the two valves."""
+        inflow = orifice_flow(self.fill, inlet, air, opened)
+        outflow = orifice_flow(self.discharge, air, ambient_air(ambient), vented)
         return CircuitFlows((inflow - outflow,), inflow, outflow)
 
 
 @model
-class ThreePositionValve(Circuit):
+class FillDischarge(ValvePair):
+    """Two on/off valves: a fill valve from the supply and a discharge valve to the surroundings."""
+
+    inputs = (Input("fill"), Input("discharge"))
+
+    def supplied_flow(self, inlet: Air, airs: Airs, state: Values, inputs: Values, ambient: Ambient) -> CircuitFlows:
+        return self.valve_flows(inlet, airs[0], inputs["fill"], inputs["discharge"], ambient)
+
+
+@model
+class ThreePositionValve(ValvePair):
     """3/3 valve with closed centre and one input `valve`: 1 fill, 0 closed, -1 discharge; proportional between."""
 
-    supply: AirSource
-    fill: Orifice
-    discharge: Orifice
+    inputs = (Input("valve", "1", -1.0, 1.0, "1 fill, 0 closed, -1 discharge"),)
 
-    @property
-    def inputs(self) -> tuple[Input, ...]:
-        return (Input("valve", "1", -1.0, 1.0, "1 fill, 0 closed, -1 discharge"),)
-
-    def supplied_flow(
-        self, inlet: Air, air_states: tuple[Air, ...], state: Values, inputs: Values, ambient: Ambient
-    ) -> CircuitFlows:
+    def supplied_flow(self, inlet: Air, airs: Airs, state: Values, inputs: Values, ambient: Ambient) -> CircuitFlows:
         position = inputs["valve"]
-        inflow = orifice_flow(self.fill, inlet, air_states[0], ops.maximum(position, 0.0))
-        outflow = orifice_flow(self.discharge, air_states[0], ambient_air(ambient), ops.maximum(-position, 0.0))
-        return CircuitFlows((inflow - outflow,), inflow, outflow)
+        return self.valve_flows(inlet, airs[0], ops.maximum(position, 0.0), ops.maximum(-position, 0.0), ambient)
 
 
 @model
@@ -179,13 +177,9 @@ class ClosedChamber(Circuit):
 
     supply: AirSource = Supply(0.0)
 
-    @property
-    def inputs(self) -> tuple[Input, ...]:
-        return ()
+    inputs = ()
 
-    def supplied_flow(
-        self, inlet: Air, air_states: tuple[Air, ...], state: Values, inputs: Values, ambient: Ambient
-    ) -> CircuitFlows:
+    def supplied_flow(self, inlet: Air, airs: Airs, state: Values, inputs: Values, ambient: Ambient) -> CircuitFlows:
         return CircuitFlows((NO_FLOW,))
 
 
@@ -196,17 +190,9 @@ class WithLeak(CircuitWrapper):
     circuit: Circuit
     leak: Orifice
 
-    def own_states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
-        return self.circuit.own_states(ambient)
-
-    def own_steady_state(self, air_states: tuple[Air, ...], ambient: Ambient) -> dict[str, Value]:
-        return self.circuit.own_steady_state(air_states, ambient)
-
-    def supplied_flow(
-        self, inlet: Air, air_states: tuple[Air, ...], state: Values, inputs: Values, ambient: Ambient
-    ) -> CircuitFlows:
-        inner = self.circuit.supplied_flow(inlet, air_states, state, inputs, ambient)
-        leakage = [orifice_flow(self.leak, air, ambient_air(ambient)) for air in air_states]
+    def supplied_flow(self, inlet: Air, airs: Airs, state: Values, inputs: Values, ambient: Ambient) -> CircuitFlows:
+        inner = self.circuit.supplied_flow(inlet, airs, state, inputs, ambient)
+        leakage = [orifice_flow(self.leak, air, ambient_air(ambient)) for air in airs]
         flows = tuple(flow - leak for flow, leak in zip(inner.flows, leakage, strict=True))
         return dataclasses.replace(inner, flows=flows, exhausted=sum(leakage, inner.exhausted))
 
@@ -245,11 +231,11 @@ class Manifold(Circuit):
     def _named_branches(self) -> Iterator[tuple[str, Circuit]]:
         return zip((f"{name}." for name in self.names), self.branches, strict=True)
 
-    def _branch_air(self, air_states: tuple[Air, ...]) -> Iterator[tuple[str, Circuit, tuple[Air, ...]]]:
+    def _branch_air(self, airs: Airs) -> Iterator[tuple[str, Circuit, tuple[Air, ...]]]:
         """Prefix and circuit of each branch, with the air states of its muscles."""
         first = 0
         for name, branch in self._named_branches():
-            yield name, branch, air_states[first : first + branch.port_count]
+            yield name, branch, airs[first : first + branch.port_count]
             first += branch.port_count
 
     @property
@@ -263,9 +249,9 @@ class Manifold(Circuit):
     def own_states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
         return tuple(s for name, branch in self._named_branches() for s in add_prefix(name, branch.own_states(ambient)))
 
-    def own_steady_state(self, air_states: tuple[Air, ...], ambient: Ambient) -> dict[str, Value]:
+    def own_steady_state(self, airs: Airs, ambient: Ambient) -> dict[str, Value]:
         state: dict[str, Value] = {}
-        for name, branch, branch_air in self._branch_air(air_states):
+        for name, branch, branch_air in self._branch_air(airs):
             state |= with_prefix(name, branch.own_steady_state(branch_air, ambient))
         return state
 
@@ -275,16 +261,12 @@ class Manifold(Circuit):
             warnings |= with_prefix(name, branch.validity_warnings(select_prefix(name, columns), ambient))
         return warnings
 
-    def supplied_flow(
-        self, inlet: Air, air_states: tuple[Air, ...], state: Values, inputs: Values, ambient: Ambient
-    ) -> CircuitFlows:
+    def supplied_flow(self, inlet: Air, airs: Airs, state: Values, inputs: Values, ambient: Ambient) -> CircuitFlows:
         total = CircuitFlows(())
-        for name, branch, branch_air in self._branch_air(air_states):
+        for name, branch, branch_air in self._branch_air(airs):
             part = branch.supplied_flow(
                 inlet, branch_air, select_prefix(name, state), select_prefix(name, inputs), ambient
             )
-            total = CircuitFlows(
-                total.flows + part.flows, total.drawn + part.drawn, total.exhausted + part.exhausted,
-                {**total.rates, **with_prefix(name, part.rates)}, {**total.outputs, **with_prefix(name, part.outputs)},
-            )  # fmt: skip
+            named = {"rates": with_prefix(name, part.rates), "outputs": with_prefix(name, part.outputs)}
+            total += dataclasses.replace(part, **named)
         return total

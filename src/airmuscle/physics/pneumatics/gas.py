@@ -35,14 +35,12 @@ REFERENCE_DENSITY = 1.185
 REFERENCE_TEMPERATURE = 293.15
 """Temperature of the reference atmosphere of ISO 8778 [K]."""
 
-ISO8778 = published("iso-8778")
-
 
 @model
 class Ambient:
     """Ambient air: absolute pressure and temperature of the surroundings."""
 
-    references: ClassVar[tuple[Reference, ...]] = (ISO8778,)
+    references: ClassVar[tuple[Reference, ...]] = (published("iso-8778"),)
 
     pressure: float = parameter(
         ABSOLUTE,
@@ -72,6 +70,10 @@ class Air(NamedTuple):
 
     pressure: Value
     temperature: Value
+
+
+Airs = tuple[Air, ...]
+"""Air states of muscles, or of the segments of a tube."""
 
 
 @dataclasses.dataclass(frozen=True)

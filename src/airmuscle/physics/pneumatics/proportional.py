@@ -1,12 +1,12 @@
 """Proportional valves: 5/3 proportional directional valve and proportional pressure regulator."""
 
+import dataclasses
 from typing import ClassVar
 
 from ...core import Input, ParameterError, Reference, StateVariable, Value, Values, model, ops, parameter, published
-from .circuit import Circuit, CircuitFlows, ambient_air
-from .gas import NO_FLOW, Air, Ambient, absolute_pressure, gauge_pressure
-from .supply import AirSource
-from .valve import ISO6358, Orifice, orifice_flow, proportional_opening
+from .circuit import CircuitFlows, ValvePair
+from .gas import Air, Airs, Ambient, absolute_pressure, gauge_pressure
+from .valve import ISO6358, proportional_opening
 
 
 @model
@@ -23,7 +23,7 @@ class SecondOrderLag:
 
 
 @model
-class ProportionalValve(Circuit):
+class ProportionalValve(ValvePair):
     """5/3 proportional directional valve for one muscle (second port plugged) or two muscles.
 
         opening of fill = clip((s - o)/(1 - o), 0, 1),   opening of discharge = clip((-s - o)/(1 - o), 0, 1)
@@ -32,9 +32,6 @@ class ProportionalValve(Circuit):
     for underlap, with leakage at the centre). Fill and discharge have separate orifices, whose areas may differ.
     """
 
-    supply: AirSource
-    fill: Orifice
-    discharge: Orifice
     spool: SecondOrderLag
     overlap: float = parameter("1", "o", "overlap as a fraction of the stroke", bounds=(-0.5, 0.9), default=0.0)
     muscle_count: int = 1
@@ -48,37 +45,30 @@ class ProportionalValve(Circuit):
     def port_count(self) -> int:
         return self.muscle_count
 
-    @property
-    def inputs(self) -> tuple[Input, ...]:
-        return (Input("command", "1", -1.0, 1.0, "spool position: 1 fills the first muscle, -1 discharges it"),)
+    inputs = (Input("command", "1", -1.0, 1.0, "spool position: 1 fills the first muscle, -1 discharges it"),)
 
     def own_states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
         speed = 2.0 * ops.pi * self.spool.frequency
         return (StateVariable("spool", "1", 1.0, "spool position"),
                 StateVariable("spool_speed", "1/s", speed, "spool speed"))  # fmt: skip
 
-    def own_steady_state(self, air_states: tuple[Air, ...], ambient: Ambient) -> dict[str, Value]:
+    def own_steady_state(self, airs: Airs, ambient: Ambient) -> dict[str, Value]:
         return {"spool": 0.0, "spool_speed": 0.0}
 
     def opening(self, position: Value) -> Value:
         """Opening of a control edge for a spool position towards this edge."""
         return proportional_opening(position - self.overlap, 1.0 - self.overlap)
 
-    def supplied_flow(
-        self, inlet: Air, air_states: tuple[Air, ...], state: Values, inputs: Values, ambient: Ambient
-    ) -> CircuitFlows:
-        spool, flows, drawn, exhausted = state["spool"], [], NO_FLOW, NO_FLOW
-        for air, position in zip(air_states, (spool, -spool), strict=False):
-            inflow = orifice_flow(self.fill, inlet, air, self.opening(position))
-            outflow = orifice_flow(self.discharge, air, ambient_air(ambient), self.opening(-position))
-            flows.append(inflow - outflow)
-            drawn, exhausted = drawn + inflow, exhausted + outflow
+    def supplied_flow(self, inlet: Air, airs: Airs, state: Values, inputs: Values, ambient: Ambient) -> CircuitFlows:
+        spool, total = state["spool"], CircuitFlows(())
+        for air, position in zip(airs, (spool, -spool), strict=False):
+            total += self.valve_flows(inlet, air, self.opening(position), self.opening(-position), ambient)
         speed, acceleration = self.spool.rates(spool, state["spool_speed"], inputs["command"])
-        return CircuitFlows(tuple(flows), drawn, exhausted, {"spool": speed, "spool_speed": acceleration})
+        return dataclasses.replace(total, rates={"spool": speed, "spool_speed": acceleration})
 
 
 @model
-class ProportionalRegulator(Circuit):
+class ProportionalRegulator(ValvePair):
     """Proportional pressure regulator: second-order lag of the set point and a fill and a discharge orifice.
 
         opening of fill = clip((r - p)/B, 0, 1),   opening of discharge = clip((p - r)/B, 0, 1)
@@ -87,9 +77,6 @@ class ProportionalRegulator(Circuit):
     u set point, r lagged set point, p outlet pressure, B proportional band, the control error at full opening.
     """
 
-    supply: AirSource
-    fill: Orifice
-    discharge: Orifice
     lag: SecondOrderLag
     band: float = parameter(
         "Pa", "B", "proportional band: control error at full opening", bounds=(100.0, 1e6), default=2e4
@@ -105,30 +92,25 @@ class ProportionalRegulator(Circuit):
         return (StateVariable("lagged_setpoint", "Pa", 1e5, "lagged set point, gauge pressure"),
                 StateVariable("lagged_setpoint_rate", "Pa/s", rate, "rate of the lagged set point"))  # fmt: skip
 
-    def own_steady_state(self, air_states: tuple[Air, ...], ambient: Ambient) -> dict[str, Value]:
-        return {"lagged_setpoint": gauge_pressure(air_states[0].pressure, ambient), "lagged_setpoint_rate": 0.0}
+    def own_steady_state(self, airs: Airs, ambient: Ambient) -> dict[str, Value]:
+        return {"lagged_setpoint": gauge_pressure(airs[0].pressure, ambient), "lagged_setpoint_rate": 0.0}
 
-    def supplied_flow(
-        self, inlet: Air, air_states: tuple[Air, ...], state: Values, inputs: Values, ambient: Ambient
-    ) -> CircuitFlows:
-        (air,) = air_states
+    def supplied_flow(self, inlet: Air, airs: Airs, state: Values, inputs: Values, ambient: Ambient) -> CircuitFlows:
+        (air,) = airs
         setpoint, setpoint_rate = state["lagged_setpoint"], state["lagged_setpoint_rate"]
         error = absolute_pressure(setpoint, ambient) - air.pressure
-        inflow = orifice_flow(self.fill, inlet, air, proportional_opening(error, self.band))
-        outflow = orifice_flow(self.discharge, air, ambient_air(ambient), proportional_opening(-error, self.band))
+        opened, vented = (proportional_opening(each, self.band) for each in (error, -error))
         first, second = self.lag.rates(setpoint, setpoint_rate, inputs["setpoint"])
         rates = {"lagged_setpoint": first, "lagged_setpoint_rate": second}
-        return CircuitFlows((inflow - outflow,), inflow, outflow, rates)
+        return dataclasses.replace(self.valve_flows(inlet, air, opened, vented, ambient), rates=rates)
 
 
 DELAY_STAGES = 4
 """Number of equal lags that make up the dead time (chosen): 10 to 90 % of a step take 1.2 times the dead time."""
 
-ITV_LOGS = published("actuated-design-lab2026")
-
 
 @model
-class PressureRegulator(Circuit):
+class PressureRegulator(ValvePair):
     """Electro-pneumatic pressure regulator (SMC ITV, Festo VPPM): command p_c to outlet pressure p, both gauge.
 
         delay      d_1' = 4 (p_c - d_1)/L,   d_i' = 4 (d_(i-1) - d_i)/L,  i = 2, 3, 4
@@ -147,11 +129,8 @@ class PressureRegulator(Circuit):
     dead zone, leak) describe only one of the two. References: Actuated Design Lab (2026), ISO 6358.
     """
 
-    references: ClassVar[tuple[Reference, ...]] = (ITV_LOGS, ISO6358)
+    references: ClassVar[tuple[Reference, ...]] = (published("actuated-design-lab2026"), ISO6358)
 
-    supply: AirSource
-    fill: Orifice
-    discharge: Orifice
     band: float = parameter("Pa", "B", "proportional band: control error at full opening", bounds=(100.0, 1e7))
     pilot_time: float = parameter("s", "T_p", "time constant of the pilot stage", bounds=(1e-3, 2.0))
     overlap: float = parameter("1", "o", "overlap on either side, relative to the stroke", bounds=(1e-3, 10.0))
@@ -180,8 +159,8 @@ class PressureRegulator(Circuit):
             StateVariable("valve_position", "1", 1.0, "position of the main valve"),
         )
 
-    def own_steady_state(self, air_states: tuple[Air, ...], ambient: Ambient) -> dict[str, Value]:
-        pressure = gauge_pressure(air_states[0].pressure, ambient)
+    def own_steady_state(self, airs: Airs, ambient: Ambient) -> dict[str, Value]:
+        pressure = gauge_pressure(airs[0].pressure, ambient)
         delayed = {f"delayed_setpoint{i}": pressure for i in range(1, DELAY_STAGES + 1)}
         rest = {"integral_error": 0.0, "pilot_position": -self.overlap, "valve_position": -self.overlap}
         return {**delayed, "sensed_pressure": pressure, **rest}
@@ -194,15 +173,11 @@ class PressureRegulator(Circuit):
         leakage = self.leak * ops.clip((position + self.overlap) / (2.0 * self.overlap), 0.0, 1.0)
         return ops.clip(position - self.overlap, 0.0, 1.0) + leakage
 
-    def supplied_flow(
-        self, inlet: Air, air_states: tuple[Air, ...], state: Values, inputs: Values, ambient: Ambient
-    ) -> CircuitFlows:
-        (air,) = air_states
-        opened, vented = self.openings(state["valve_position"])
-        inflow = orifice_flow(self.fill, inlet, air, opened)
-        outflow = orifice_flow(self.discharge, air, ambient_air(ambient), vented)
+    def supplied_flow(self, inlet: Air, airs: Airs, state: Values, inputs: Values, ambient: Ambient) -> CircuitFlows:
+        (air,) = airs
+        flows = self.valve_flows(inlet, air, *self.openings(state["valve_position"]), ambient)
         rates = self._rates(state, inputs["setpoint"], gauge_pressure(air.pressure, ambient))
-        return CircuitFlows((inflow - outflow,), inflow, outflow, rates)
+        return dataclasses.replace(flows, rates=rates)
 
     def _rates(self, state: Values, setpoint: Value, pressure: Value) -> dict[str, Value]:
         chain = [setpoint, *(state[f"delayed_setpoint{i}"] for i in range(1, DELAY_STAGES + 1))]

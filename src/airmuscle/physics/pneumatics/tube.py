@@ -1,4 +1,4 @@
-"""Tubes between valve and muscle: interface, lumped tube in one or more segments, circuit with tubes."""
+"""Tubes between valve and muscle: interface, lumped tube, tube with the inertia of the air, circuit with tubes."""
 
 import abc
 from collections.abc import Mapping
@@ -6,8 +6,18 @@ from typing import Any, ClassVar
 
 from ...core import Reference, Value, Values, model, ops, parameter, published, unflatten, within
 from ...core.system import StateVariable, add_prefix, select_prefix, with_prefix
-from .circuit import Circuit, CircuitFlows, CircuitWrapper, port_prefix
-from .gas import Air, Ambient, Flow, Gas, Isothermal, gauge_pressure
+from .circuit import Circuit, CircuitFlows, CircuitWrapper, ambient_air, port_prefix
+from .gas import (
+    GAS_CONSTANT,
+    SPECIFIC_HEAT_CONSTANT_PRESSURE,
+    Air,
+    Airs,
+    Ambient,
+    Flow,
+    Gas,
+    Isothermal,
+    gauge_pressure,
+)
 from .valve import Orifice, Valve, orifice_flow
 
 MAX_SEGMENTS = 200
@@ -19,6 +29,12 @@ class TubeModel(abc.ABC):
 
     references: ClassVar[tuple[Reference, ...]] = ()
     segment_count: int
+    gas: Gas
+
+    @property
+    @abc.abstractmethod
+    def segment_volume(self) -> Value:
+        """Volume of one segment [m3]."""
 
     @property
     def prefixes(self) -> tuple[str, ...]:
@@ -27,21 +43,32 @@ class TubeModel(abc.ABC):
             return ("tube.",)
         return tuple(f"tube{i}." for i in range(1, self.segment_count + 1))
 
-    @abc.abstractmethod
+    def segment_states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
+        """State variables of one segment: those of its gas."""
+        return self.gas.states(self.segment_volume, ambient)
+
+    def resting_segment(self, air: Air, ambient: Ambient) -> dict[str, Value]:
+        """Steady state of one segment without flow at the pressure of the air in the muscle."""
+        return self.gas.state_at(air.pressure, self.segment_volume, ambient)
+
     def states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
         """State variables of all segments."""
+        segment = self.segment_states(ambient)
+        return tuple(state for prefix in self.prefixes for state in add_prefix(prefix, segment))
 
-    @abc.abstractmethod
     def steady_state(self, air: Air, ambient: Ambient) -> dict[str, Value]:
         """Steady state without flow at the pressure of the air in the muscle."""
+        segment = self.resting_segment(air, ambient)
+        return {f"{prefix}{name}": value for prefix in self.prefixes for name, value in segment.items()}
 
-    @abc.abstractmethod
-    def air_states(self, state: Values, ambient: Ambient) -> tuple[Air, ...]:
+    def air_states(self, state: Values, ambient: Ambient) -> Airs:
         """Air state of each segment, from valve to muscle."""
+        segments = (select_prefix(prefix, state) for prefix in self.prefixes)
+        return tuple(self.gas.air(segment, self.segment_volume, ambient) for segment in segments)
 
     @abc.abstractmethod
     def rates(
-        self, state: Values, air_states: tuple[Air, ...], flow: Flow, muscle: Air, ambient: Ambient
+        self, state: Values, airs: Airs, flow: Flow, muscle: Air, ambient: Ambient
     ) -> tuple[dict[str, Value], Flow]:
         """Time derivatives of the states for a flow from the valve, and the flow into the muscle."""
 
@@ -50,7 +77,6 @@ class TubeModel(abc.ABC):
         return {}
 
 
-ECKERSTEN = published("eckersten-1975")
 _TEMPLATE_VALVE = Valve(1e-8, 0.3)
 
 
@@ -64,7 +90,7 @@ class TubeOrifice(Orifice):
     empirical; its constants hold for these units. Reference: Eckersten (1975), after Beater (2007).
     """
 
-    references: ClassVar[tuple[Reference, ...]] = (ECKERSTEN,)
+    references: ClassVar[tuple[Reference, ...]] = (published("eckersten-1975"),)
 
     length: float = parameter("m", "L", "length of the tube", bounds=(1e-3, 200.0))
     diameter: float = parameter("m", "D", "inner diameter of the tube", bounds=(5e-4, 0.1))
@@ -105,28 +131,125 @@ class Tube(TubeModel):
         """Tube of a length and an inner diameter [m], with the flow of a `TubeOrifice`."""
         return cls(TubeOrifice(length, diameter), ops.pi / 4.0 * diameter**2 * length, segment_count, gas)
 
-    def states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
-        segment = self.gas.states(self.volume / self.segment_count, ambient)
-        return tuple(state for prefix in self.prefixes for state in add_prefix(prefix, segment))
-
-    def steady_state(self, air: Air, ambient: Ambient) -> dict[str, Value]:
-        segment = self.gas.state_at(air.pressure, self.volume / self.segment_count, ambient)
-        return {name: value for prefix in self.prefixes for name, value in with_prefix(prefix, segment).items()}
-
-    def air_states(self, state: Values, ambient: Ambient) -> tuple[Air, ...]:
-        segments = (select_prefix(prefix, state) for prefix in self.prefixes)
-        return tuple(self.gas.air(segment, self.volume / self.segment_count, ambient) for segment in segments)
+    @property
+    def segment_volume(self) -> Value:
+        return self.volume / self.segment_count
 
     def rates(
-        self, state: Values, air_states: tuple[Air, ...], flow: Flow, muscle: Air, ambient: Ambient
+        self, state: Values, airs: Airs, flow: Flow, muscle: Air, ambient: Ambient
     ) -> tuple[dict[str, Value], Flow]:
         rates: dict[str, Value] = {}
-        for prefix, air, downstream in zip(self.prefixes, air_states, (*air_states[1:], muscle), strict=True):
+        for prefix, air, downstream in zip(self.prefixes, airs, (*airs[1:], muscle), strict=True):
             outflow = orifice_flow(self.orifice, air, downstream, self.segment_count**0.5)
             segment = self.gas.rates(select_prefix(prefix, state), air, flow - outflow, 0.0, ambient)
             rates |= with_prefix(prefix, segment)
             flow = outflow
         return rates, flow
+
+
+TRANSITION_REYNOLDS_NUMBER = (64.0 / 0.3164) ** (4.0 / 3.0)
+"""Reynolds number at which the friction of Hagen-Poiseuille and that of Blasius are equal, 1187."""
+MAX_MACH_NUMBER = 1.0 / 3.0
+"""Mach number up to which the convected momentum may be neglected (chosen)."""
+
+
+@model
+class DistributedTube(TubeModel):
+    """Distributed tube: mass and momentum balance of n segments, with air mass and mass flow as states.
+
+        m_i' = q_(i-1) - q_i,   q_i' = (A/dx) (p_i - p_(i+1)) - f q_i,   f = 32 mu/(rho D^2) max(1, Re/1187)^(3/4)
+
+    q_0 flow from the valve, q_n flow into the muscle, p_(n+1) pressure in the muscle; dx = L/n, A = pi D^2/4,
+    Re = |q| D/(A mu), rho mean density of both sides. The friction f is that of Hagen-Poiseuille and, for Re > 1187,
+    that of Blasius for smooth tubes (valid up to about Re = 1e5). The last segment also has the loss of both ends,
+    zeta dynamic heads, a force zeta |q| q/(2 rho A): 0.5 for a sharp-edged inlet and 1 for the outlet. A pressure step
+    arrives after L/c, with c the speed of sound of the gas (`Gas.sound_speed`), and is attenuated by exp(-f L/(2 c)).
+    A steady isothermal flow satisfies p_1^2 - p_2^2 = R T (2 f rho L q/A + zeta q^2/A^2) exactly for any number of
+    segments; a wave front is spread over about n^(1/3) segments. Neglected: the convected momentum (valid up to a Mach
+    number of about 1/3; the tube has no choking, only the valve has), frequency-dependent friction, and the kinetic
+    energy in the energy balance of the gas.
+    """
+
+    references: ClassVar[tuple[Reference, ...]] = (published("blasius-1913"),)
+
+    length: float = parameter("m", "L", "length of the tube", bounds=(1e-3, 200.0))
+    diameter: float = parameter("m", "D", "inner diameter of the tube", bounds=(5e-4, 0.1))
+    segment_count: int = within(1, MAX_SEGMENTS, default=20)
+    gas: Gas = Isothermal()
+    viscosity: float = parameter(
+        "Pa s", "mu", "dynamic viscosity of the air", bounds=(1e-6, 1e-4), fitted=False, default=1.82e-5
+    )
+    end_loss: float = parameter(
+        "1", "zeta", "loss coefficient of both ends, in dynamic heads", bounds=(0.0, 10.0), default=1.5
+    )
+
+    @property
+    def area(self) -> Value:
+        """Cross-sectional area A [m2]."""
+        return ops.pi / 4.0 * self.diameter**2
+
+    @property
+    def segment_volume(self) -> Value:
+        return self.area * self.length / self.segment_count
+
+    def segment_states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
+        nominal_flow = 0.1 * self.area * ambient.pressure / self.gas.sound_speed(ambient_air(ambient))
+        flow = StateVariable("flow", "kg/s", nominal_flow, "mass flow to the next segment")
+        return (*super().segment_states(ambient), flow)
+
+    def resting_segment(self, air: Air, ambient: Ambient) -> dict[str, Value]:
+        return {**super().resting_segment(air, ambient), "flow": 0.0}
+
+    def rates(
+        self, state: Values, airs: Airs, flow: Flow, muscle: Air, ambient: Ambient
+    ) -> tuple[dict[str, Value], Flow]:
+        rates: dict[str, Value] = {}
+        for prefix, air, downstream in zip(self.prefixes, airs, (*airs[1:], muscle), strict=True):
+            mass_flow = state[f"{prefix}flow"]
+            outflow = _convected_flow(mass_flow, air, downstream)
+            segment = self.gas.rates(select_prefix(prefix, state), air, flow - outflow, 0.0, ambient)
+            rates |= with_prefix(prefix, segment)
+            density = (_density(air) + _density(downstream)) / 2.0
+            force = self.area * (air.pressure - downstream.pressure)
+            if downstream is muscle:
+                force = force - self.end_loss * ops.absolute_value(mass_flow) * mass_flow / (2.0 * density * self.area)
+            friction = self.friction_coefficient(mass_flow, density) * mass_flow
+            rates[f"{prefix}flow"] = force * self.segment_count / self.length - friction
+            flow = outflow
+        return rates, flow
+
+    def validity_warnings(self, columns: Mapping[str, Any], ambient: Ambient) -> dict[str, str]:
+        """Warnings by segment prefix where the Mach number, at ambient temperature, exceeded 1/3."""
+        sound_speed, warnings = self.gas.sound_speed(ambient_air(ambient)), {}
+        for prefix in self.prefixes:
+            if not {f"{prefix}flow", f"{prefix}pressure"} <= columns.keys():
+                continue
+            density = (columns[f"{prefix}pressure"] + ambient.pressure) / (GAS_CONSTANT * ambient.temperature)
+            mach_number = (abs(columns[f"{prefix}flow"]) / (density * self.area * sound_speed)).max()
+            if mach_number > MAX_MACH_NUMBER:
+                warnings[prefix] = (
+                    f"the Mach number reached {mach_number:.2g}; DistributedTube does not describe choking and "
+                    "overestimates the flow at Mach numbers above 1/3"
+                )
+        return warnings
+
+    def friction_coefficient(self, mass_flow: Value, density: Value) -> Value:
+        """Friction coefficient f [1/s] for a mass flow [kg/s] of air of a density [kg/m3]."""
+        reynolds = ops.absolute_value(mass_flow) * self.diameter / (self.area * self.viscosity)
+        laminar = 32.0 * self.viscosity / (density * self.diameter**2)
+        return laminar * ops.maximum(reynolds / TRANSITION_REYNOLDS_NUMBER, 1.0) ** 0.75
+
+
+def _density(air: Air) -> Value:
+    return air.pressure / (GAS_CONSTANT * air.temperature)
+
+
+def _convected_flow(mass_flow: Value, air: Air, downstream: Air) -> Flow:
+    """A mass flow and its enthalpy flow, with the temperature of the upstream side."""
+    temperature = air.temperature
+    if downstream.temperature is not air.temperature:
+        temperature = ops.where(mass_flow >= 0, air.temperature, downstream.temperature)
+    return Flow(mass_flow, SPECIFIC_HEAT_CONSTANT_PRESSURE * temperature * mass_flow)
 
 
 @model
@@ -150,9 +273,9 @@ class WithTubes(CircuitWrapper):
         tube = self.tube.states(ambient)
         return (*self.circuit.own_states(ambient), *(s for prefix in self.prefixes for s in add_prefix(prefix, tube)))
 
-    def own_steady_state(self, air_states: tuple[Air, ...], ambient: Ambient) -> dict[str, Value]:
-        state = self.circuit.own_steady_state(air_states, ambient)
-        for prefix, air in zip(self.prefixes, air_states, strict=True):
+    def own_steady_state(self, airs: Airs, ambient: Ambient) -> dict[str, Value]:
+        state = self.circuit.own_steady_state(airs, ambient)
+        for prefix, air in zip(self.prefixes, airs, strict=True):
             state |= with_prefix(prefix, self.tube.steady_state(air, ambient))
         return state
 
@@ -162,16 +285,12 @@ class WithTubes(CircuitWrapper):
             warnings |= with_prefix(prefix, self.tube.validity_warnings(select_prefix(prefix, columns), ambient))
         return warnings
 
-    def supplied_flow(
-        self, inlet: Air, air_states: tuple[Air, ...], state: Values, inputs: Values, ambient: Ambient
-    ) -> CircuitFlows:
+    def supplied_flow(self, inlet: Air, airs: Airs, state: Values, inputs: Values, ambient: Ambient) -> CircuitFlows:
         tubes = [select_prefix(prefix, state) for prefix in self.prefixes]
         in_tubes = [self.tube.air_states(tube, ambient) for tube in tubes]
         inner = self.circuit.supplied_flow(inlet, tuple(segments[0] for segments in in_tubes), state, inputs, ambient)
         rates, outputs, flows = dict(inner.rates), dict(inner.outputs), []
-        for prefix, tube, segments, inflow, air in zip(
-            self.prefixes, tubes, in_tubes, inner.flows, air_states, strict=True
-        ):
+        for prefix, tube, segments, inflow, air in zip(self.prefixes, tubes, in_tubes, inner.flows, airs, strict=True):
             tube_rates, outflow = self.tube.rates(tube, segments, inflow, air, ambient)
             rates |= with_prefix(prefix, tube_rates)
             for segment, in_segment in zip(self.tube.prefixes, segments, strict=True):

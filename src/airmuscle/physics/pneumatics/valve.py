@@ -62,8 +62,6 @@ class Valve(Orifice):
         return ops.sqrt(1.0 - subsonic**2) / (1.0 - self.laminar_ratio)
 
 
-ISO6358_2013 = published("iso-6358-1-2013")
-
 _MIN_BASE = 1e-9
 """Lower bound of the base of the power, which keeps its derivative finite where the chord applies."""
 
@@ -86,7 +84,7 @@ class SubsonicIndexValve(Orifice):
     source.
     """
 
-    references: ClassVar[tuple[Reference, ...]] = (ISO6358_2013,)
+    references: ClassVar[tuple[Reference, ...]] = (published("iso-6358-1-2013"),)
 
     conductance: float = parameter("m3/(s Pa)", "C", "sonic conductance, fully open", bounds=(0.0, 1e-5))
     critical_ratio: float = parameter("1", "b", "critical pressure ratio", bounds=(0.0, 0.95))

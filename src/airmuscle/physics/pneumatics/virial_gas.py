@@ -5,7 +5,6 @@ from typing import ClassVar
 from ...core import Reference, Value, Values, model, ops, parameter, published
 from .gas import GAS_CONSTANT, HEAT_CAPACITY_RATIO, Air, Ambient, BarotropicGas, FirstLawGas
 
-CIPM_2007 = published("cipm-2007")
 _COMPRESSIBILITY = (1.58123e-6, -2.9331e-8, 1.1043e-10)
 """a_0 [K/Pa], a_1 [1/Pa] and a_2 [1/(K Pa)] of Z = 1 - p/T (a_0 + a_1 t + a_2 t^2) + ..., t in degrees Celsius."""
 
@@ -29,7 +28,7 @@ class VirialGas(BarotropicGas):
     another ambient temperature. Reference: CIPM-2007 (Picard et al. 2008).
     """
 
-    references: ClassVar[tuple[Reference, ...]] = (CIPM_2007,)
+    references: ClassVar[tuple[Reference, ...]] = (published("cipm-2007"),)
 
     virial_coefficient: float = parameter(
         "m3/kg", "B", "second virial coefficient of air", bounds=(-5e-3, 5e-3), fitted=False,

@@ -6,8 +6,6 @@ from ....core import ParameterError, Reference, Value, model, ops, parameter, pu
 from .base import PressureLaw
 from .validity_range import DataScales, MeasuredPoints
 
-HUNT_2017 = published("hunt-2017")
-
 _MAX_TANGENT_ARGUMENT = 1.5
 """Upper limit of the argument of the tangent; it corresponds to 2.9 MPa, above the strength of any muscle."""
 _MIN_SPAN = 1e-6
@@ -24,7 +22,7 @@ class Hunt2017(PressureLaw):
     Reference: Hunt, Graber-Tilton and Quinn (2017).
     """
 
-    references: ClassVar[tuple[Reference, ...]] = (HUNT_2017,)
+    references: ClassVar[tuple[Reference, ...]] = (published("hunt-2017"),)
     linear_in: ClassVar[tuple[str, ...]] = ("offset", "scale", "by_force")
 
     max_contraction: float = parameter(

@@ -7,8 +7,6 @@ from ..geometry.braid import Braid
 from .base import ForceLaw
 from .validity_range import DataScales, MeasuredPoints
 
-MARTENS_BOBLAN_2017 = published("martens-boblan-2017")
-
 _MAX_CONTRACTION = 0.4
 """Upper limit of the contractions for which the modulus E(L) was identified."""
 
@@ -28,7 +26,7 @@ class MartensBoblan2017(ForceLaw):
     would give a force that increases with contraction. Reference: Martens and Boblan (2017).
     """
 
-    references: ClassVar[tuple[Reference, ...]] = (MARTENS_BOBLAN_2017,)
+    references: ClassVar[tuple[Reference, ...]] = (published("martens-boblan-2017"),)
     redundant: ClassVar[tuple[str, ...]] = ("wall_thickness",)  # it only multiplies the modulus
 
     geometry: Braid

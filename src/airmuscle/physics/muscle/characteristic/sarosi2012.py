@@ -6,8 +6,6 @@ from ....core import Reference, Value, model, ops, parameter, published
 from .base import ForceLaw
 from .validity_range import DataScales, MeasuredPoints
 
-SAROSI_2012 = published("sarosi-2012")
-
 
 @model
 class Sarosi2012(ForceLaw):
@@ -18,7 +16,7 @@ class Sarosi2012(ForceLaw):
     positive forces; at low pressure it becomes negative, so that it is used inside `Clamped`.
     """
 
-    references: ClassVar[tuple[Reference, ...]] = (SAROSI_2012,)
+    references: ClassVar[tuple[Reference, ...]] = (published("sarosi-2012"),)
     linear_in: ClassVar[tuple[str, ...]] = ("a1", "a2", "a4", "a5", "a6")
 
     a1: float = parameter("N/Pa", "a_1", "exponential term: increase with pressure")

@@ -79,9 +79,7 @@ class Friction(abc.ABC):
 class NoFriction(Friction):
     """No friction: F = 0."""
 
-    @property
-    def states(self) -> tuple[StateVariable, ...]:
-        return ()
+    states = ()
 
     def rates(self, bristles: Values, speed: Value) -> dict[str, Value]:
         return {}
@@ -92,9 +90,7 @@ class NoFriction(Friction):
     def force_along(self, displacement: Any, time: Any = None) -> Any:
         return 0.0 * displacement
 
-    @property
-    def presliding_distance(self) -> float:
-        return 0.0
+    presliding_distance = 0.0
 
 
 class FrictionWrapper(Friction):
@@ -149,7 +145,6 @@ TONDU_LOPEZ2000 = published(
     "tondu-lopez-2000",
     "dry friction between the threads, proportional to the contact pressure; the affine form is chosen here",
 )
-DAVIS_CALDWELL2006 = published("davis-caldwell-2006")
 
 
 @model
@@ -163,7 +158,7 @@ class PressureScaledFriction(FrictionWrapper):
     distance does not depend on the pressure (chosen).
     """
 
-    references: ClassVar[tuple[Reference, ...]] = (TONDU_LOPEZ2000, DAVIS_CALDWELL2006)
+    references: ClassVar[tuple[Reference, ...]] = (TONDU_LOPEZ2000, published("davis-caldwell-2006"))
 
     inner: Friction
     ambient_ratio: float = parameter(

@@ -6,9 +6,6 @@ from ....core import Reference, StateVariable, Value, Values, model, ops, parame
 from .base import Friction
 from .path import LoopScales, relative_deflection
 
-BOUC1967 = published("bouc-1967")
-WEN1976 = published("wen-1976")
-ISMAIL2009 = published("ismail-2009")
 MIN_RELATIVE_DEFLECTION = 1e-12
 """Lower bound of |w|, so that its powers are differentiable at zero (chosen)."""
 
@@ -24,7 +21,7 @@ class BoucWen(Friction):
     as in the Dahl model. Reference: Bouc (1967), Wen (1976); normalised form: Ismail, Ikhouane and Rodellar (2009).
     """
 
-    references: ClassVar[tuple[Reference, ...]] = (BOUC1967, WEN1976, ISMAIL2009)
+    references: ClassVar[tuple[Reference, ...]] = tuple(map(published, ("bouc-1967", "wen-1976", "ismail-2009")))
 
     stiffness: float = parameter("N/m", "k", "initial stiffness", bounds=(1e-3, 1e9))
     coulomb_force: float = parameter("N", "F_C", "friction force in steady sliding", bounds=(1e-6, 1e5))

@@ -6,8 +6,6 @@ from ....core import Reference, StateVariable, Value, Values, model, ops, parame
 from .base import Friction
 from .path import LoopScales, deflection
 
-DAHL1968 = published("dahl-1968")
-
 
 @model
 class Dahl(Friction):
@@ -18,7 +16,7 @@ class Dahl(Friction):
     Reference: Dahl (1968), with exponent 1.
     """
 
-    references: ClassVar[tuple[Reference, ...]] = (DAHL1968,)
+    references: ClassVar[tuple[Reference, ...]] = (published("dahl-1968"),)
 
     stiffness: float = parameter("N/m", "sigma_0", "stiffness of the bristle", bounds=(1e-3, 1e9))
     coulomb_force: float = parameter("N", "F_C", "friction force in steady sliding", bounds=(1e-6, 1e5))

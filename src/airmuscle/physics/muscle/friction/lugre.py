@@ -6,8 +6,6 @@ from ....core import Reference, StateVariable, Value, Values, model, ops, parame
 from .base import Friction
 from .path import LoopScales, compute_speed, deflection
 
-CANUDAS_DE_WIT1995 = published("canudas-de-wit-1995")
-
 
 @model
 class LuGre(Friction):
@@ -22,7 +20,7 @@ class LuGre(Friction):
     Reference: Canudas de Wit et al. (1995).
     """
 
-    references: ClassVar[tuple[Reference, ...]] = (CANUDAS_DE_WIT1995,)
+    references: ClassVar[tuple[Reference, ...]] = (published("canudas-de-wit-1995"),)
     rate_independent: ClassVar[bool] = False
 
     stiffness: float = parameter("N/m", "sigma_0", "stiffness of the bristles", bounds=(1e-3, 1e9))

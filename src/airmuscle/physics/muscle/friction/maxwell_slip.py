@@ -6,10 +6,6 @@ from ....core import ParameterError, Reference, StateVariable, Value, Values, mo
 from .base import Friction
 from .path import LoopScales, stop_operators
 
-IWAN1966 = published("iwan-1966")
-GOLDFARB_CELANOVIC1997 = published("goldfarb-celanovic-1997")
-VO_MINH2011 = published("vo-minh-2011")
-
 
 def element_rate(deflection: Value, limit: Value, transition: Value, speed: Value) -> Value:
     """Deflection rate [m/s] of an element that slides at its limit [m], with a continuous onset of sliding.
@@ -72,7 +68,9 @@ class MaxwellSlip(SlipElements):
     rules). Reference: Iwan (1966); Goldfarb and Celanovic (1997); for muscles Vo-Minh et al. (2011).
     """
 
-    references: ClassVar[tuple[Reference, ...]] = (IWAN1966, GOLDFARB_CELANOVIC1997, VO_MINH2011)
+    references: ClassVar[tuple[Reference, ...]] = tuple(
+        map(published, ("iwan-1966", "goldfarb-celanovic-1997", "vo-minh-2011"))
+    )
     linear_in: ClassVar[str | None] = "stiffnesses"
 
     stiffnesses: tuple[float, ...] = parameter("N/m", "k_i", "stiffness of each element", bounds=(0.0, 1e9))

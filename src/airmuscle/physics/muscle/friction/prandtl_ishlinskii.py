@@ -7,7 +7,6 @@ from .maxwell_slip import SlipElements
 from .path import LoopScales, stop_operators
 
 KUHNEN2003 = published("kuhnen-2003")
-AL_JANAIDEH2011 = published("al-janaideh-2011")
 
 
 @model
@@ -23,7 +22,7 @@ class PrandtlIshlinskii(SlipElements):
     x - E_r[x] belongs to the parallel spring of the muscle. Reference: Kuhnen (2003); Al Janaideh et al. (2011).
     """
 
-    references: ClassVar[tuple[Reference, ...]] = (KUHNEN2003, AL_JANAIDEH2011)
+    references: ClassVar[tuple[Reference, ...]] = (KUHNEN2003, published("al-janaideh-2011"))
     element: ClassVar[tuple[str, str]] = ("stop", "stop")
 
     stiffnesses: tuple[float, ...] = parameter("N/m", "k_i", "stiffness of each stop", bounds=(0.0, 1e9))

@@ -69,9 +69,7 @@ class Vessel(Geometry):
         "m", "L_0", "length between the fittings", bounds=(1e-3, 10.0), fitted=False, default=0.2
     )
 
-    @property
-    def contraction_range(self) -> tuple[float, float]:
-        return (-0.5, 0.9)
+    contraction_range = (-0.5, 0.9)
 
     def volume(self, contraction: Value) -> Value:
         return self.enclosed_volume + 0.0 * contraction

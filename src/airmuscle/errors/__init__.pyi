@@ -1,0 +1,17 @@
+from ..core.errors import AirmuscleError as AirmuscleError
+from ..core.errors import AirmuscleWarning as AirmuscleWarning
+from ..core.errors import ColumnError as ColumnError
+from ..core.errors import EquilibriumError as EquilibriumError
+from ..core.errors import FileError as FileError
+from ..core.errors import FolderInUseError as FolderInUseError
+from ..core.errors import GeometryLimitError as GeometryLimitError
+from ..core.errors import IdentificationError as IdentificationError
+from ..core.errors import InputError as InputError
+from ..core.errors import ParameterError as ParameterError
+from ..core.errors import PhysicsError as PhysicsError
+from ..core.errors import RatingError as RatingError
+from ..core.errors import SimulationError as SimulationError
+from ..core.errors import SolveError as SolveError
+from ..core.errors import TraceError as TraceError
+from ..core.errors import UnitError as UnitError
+from ..core.errors import UnknownNameError as UnknownNameError
