@@ -25,8 +25,7 @@ from airmuscle.physics import (
     PulleyProfile,
     ValidityRange,
 )
-from airmuscle.physics.muscle.isobar_plot import isobar_figure
-from airmuscle.physics.muscle.isobars import compute_isobars
+from airmuscle.physics.muscle.isobars import compute_isobars, isobar_figure
 
 from .model_pages import components, entries_of, rooms
 

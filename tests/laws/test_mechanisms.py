@@ -339,4 +339,5 @@ def test_wrapping_hands_on_everything():
     assert stopped.potential_energy(q) == 10.0
     assert stopped.kinetic_energy(q, v) == pytest.approx(0.06)
     assert stopped.dissipated_power(q, v, {"position": 0.0}, {"latched": 0.0}) == pytest.approx(0.8)
-    assert dataclasses.replace(stopped, lower_stop=-2.0).stop_positions == (-2.0, 1.0)
+    moved = dataclasses.replace(stopped, lower_stop=-2.0)
+    assert [each.stop_force({"position": -1.5}, {"speed": 0.0}) > 0.0 for each in (stopped, moved)] == [True, False]

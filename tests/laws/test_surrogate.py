@@ -11,7 +11,7 @@ from widths import widened
 from airmuscle.errors import AirmuscleWarning, SolveError
 from airmuscle.files import library
 from airmuscle.physics import Braid, ChouHannaford1996, Tabulated, ValidityRange, as_force_law
-from airmuscle.physics.muscle.characteristic.polynomial_surrogate import estimate_maximum, forces_or_nan
+from airmuscle.physics.muscle.characteristic.polynomial_surrogate import estimate_maximum, values_or_nan
 
 SMALL = Tabulated((1e5, 1e5, 1e5, 2e5, 2e5), (0.0, 0.05, 0.1, 0.0, 0.2), (100.0, 40.0, 0.0, 200.0, 0.0))
 PARTLY_SOLVED = [(5e4, 4e5, 0.01, 0.12), (1e5, 3.5e5, 0.02, 0.3)]
@@ -31,7 +31,7 @@ def test_no_point_errs_by_more_than_the_estimated_maximum_error(name, limits):
         warnings.simplefilter("ignore", AirmuscleWarning)
         surrogate = as_force_law(entry.characteristic, validity_range)
     p, c = _points(validity_range)
-    error = np.abs(surrogate.force(p, c) - forces_or_nan(entry.characteristic, p, c))
+    error = np.abs(surrogate.force(p, c) - values_or_nan(entry.characteristic.force, p, c))
     assert 0.5 * surrogate.max_error <= np.nanmax(error) <= surrogate.max_error
     assert 1.05 * np.nanmax(error) <= surrogate.max_error * (1 + 2e-3)  # the margin remains for what is not searched
     assert 1.0 - np.isnan(error).mean() == pytest.approx(surrogate.coverage, abs=0.03)
@@ -58,10 +58,10 @@ def test_a_law_has_a_solution_at_the_same_points_one_by_one_and_all_at_once():
     law = library.load("borzikova-monotone").characteristic
     p, c = np.meshgrid(np.linspace(5e4, 4e5, 5), np.linspace(0.01, 0.3, 5))
     single = [
-        forces_or_nan(law, *(np.array([float(v)]) for v in point))[0]
+        values_or_nan(law.force, *(np.array([float(v)]) for v in point))[0]
         for point in zip(p.ravel(), c.ravel(), strict=True)
     ]
-    np.testing.assert_allclose(forces_or_nan(law, p.ravel(), c.ravel()), single, rtol=1e-12)
+    np.testing.assert_allclose(values_or_nan(law.force, p.ravel(), c.ravel()), single, rtol=1e-12)
     with pytest.raises(SolveError, match="no force in the range"):
         law.force(p, c)
 

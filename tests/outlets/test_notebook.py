@@ -22,7 +22,7 @@ from airmuscle.core.short_repr import MAX_LINES, ShortRepr
 from airmuscle.errors import ParameterError
 from airmuscle.physics import ContractileSurface
 from airmuscle.physics.muscle import compute_isobars
-from airmuscle.physics.muscle.isobar_plot import isobar_figure
+from airmuscle.physics.muscle.isobars import isobar_figure
 from airmuscle.recording.notebook import MAX_NOTES, MAX_ROWS, Card, NotebookDisplay, render_card
 from airmuscle.recording.plot import panels_of
 

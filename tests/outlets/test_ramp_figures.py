@@ -23,7 +23,7 @@ from airmuscle.files import Entry
 from airmuscle.files.library import list_files
 from airmuscle.physics import ContractileSurface
 from airmuscle.physics.muscle import compute_isobars
-from airmuscle.physics.muscle.isobar_plot import isobar_figure
+from airmuscle.physics.muscle.isobars import isobar_figure
 from airmuscle.recording import Recording
 
 pytestmark = pytest.mark.drawn

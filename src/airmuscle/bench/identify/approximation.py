@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ...core import IdentificationError, SolveError, contraction_text, quantity_text
-from ...physics.muscle.characteristic import Characteristic, ValidityRange, forces_or_nan
+from ...physics.muscle.characteristic import Characteristic, ValidityRange, values_or_nan
 from ...recording import Recording
 from ...report.chapter import Chapter, NamedValue, Table, TableColumn
 from ...report.shown import parameter_table
@@ -100,7 +100,8 @@ def approximate(law: Characteristic, other: Characteristic, validity_range: Vali
         target = dataclasses.replace(target, max_force=2.0 * float(data["force"].max()))
     model = fit(target, data, censoring=UNCENSORED).model
     check_points = sample_on_grid(law, validity_range, GRID_POINTS + 1)
-    difference = forces_or_nan(model, check_points["pressure"], check_points["contraction"]) - check_points["force"]
+    predicted = values_or_nan(model.force, check_points["pressure"], check_points["contraction"])
+    difference = predicted - check_points["force"]
     missing = np.flatnonzero(~np.isfinite(difference))
     if missing.size:
         p, c = check_points["pressure"][missing[0]], check_points["contraction"][missing[0]]
@@ -126,7 +127,7 @@ def sample_on_grid(law: Characteristic, validity_range: ValidityRange, count: in
     (p_low, p_high), (c_low, c_high) = validity_range.pressure, validity_range.contraction
     pressure, contraction = np.meshgrid(p_low + (p_high - p_low) * nodes, c_low + (c_high - c_low) * nodes)
     p, c = pressure.ravel(), contraction.ravel()
-    force = forces_or_nan(law, p, c)
+    force = values_or_nan(law.force, p, c)
     pulls = force > 0
     if not pulls.any():
         raise SolveError(

@@ -11,8 +11,7 @@ from ...core import AirmuscleError, Reference, cite, plotting
 from ...physics.muscle.characteristic import Characteristic, PooledLengthLaw, ValidityRange
 from ...physics.muscle.characteristic.energy_defect import EnergyDefect, maxwell_defect
 from ...physics.muscle.geometry import Geometry
-from ...physics.muscle.isobar_plot import isobar_figure
-from ...physics.muscle.isobars import compute_isobars
+from ...physics.muscle.isobars import compute_isobars, isobar_figure
 from ...report.chapter import BY_ROW, Chapter, DisplayedEquation, NamedValue, Plot, Table, TableColumn
 from ...report.equation import LawEquation, law_equation
 from ...report.equation.source_code import REMARKS, displayed_lines, source_codes

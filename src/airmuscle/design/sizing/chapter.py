@@ -9,8 +9,7 @@ import numpy as np
 from ...core import AirmuscleWarning, cite, plotting
 from ...files.library import list_valves, load, products_of_laws
 from ...physics.muscle.characteristic.validity_range import validity_range_of
-from ...physics.muscle.isobar_plot import isobar_figure
-from ...physics.muscle.isobars import compute_isobars
+from ...physics.muscle.isobars import compute_isobars, isobar_figure
 from ...report.chapter import Chapter, Plot, Table, TableColumn
 from . import JointRequirement, LiftRequirement, MuscleChoice, SizingConditions, SizingResult
 from .scenario import MOVING, SizingScenario, air_path, discharge_time, fill_time, scenario_valves

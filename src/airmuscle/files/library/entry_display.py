@@ -11,7 +11,7 @@ from ...bench.reported import Reported
 from ...core import ParameterError, check_field_types, cite, leaves, one_line, suggestion
 from ...core.plotting import LINES, new_figure, relabel_in_display_units
 from ...physics.muscle import Ratings
-from ...physics.muscle.isobar_plot import plot_isobars
+from ...physics.muscle.isobars import plot_isobars
 from ...report.chapter import BY_ROW, Chapter, NamedValue, Plot, Table, TableColumn
 from ...report.shown import leaf_table
 from .fields import under

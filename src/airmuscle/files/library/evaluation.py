@@ -10,8 +10,7 @@ from ...bench.reported import Reported
 from ...core import check_above_vacuum, contraction_text, quantity, quantity_text
 from ...core.errors import AirmuscleWarning, GeometryLimitError, ParameterError, PhysicsError, RatingError, SolveError
 from ...physics.muscle.characteristic import Characteristic, ForceLaw, ValidityRange, validity_range_of
-from ...physics.muscle.isobar_plot import describe_point, isobar_figure
-from ...physics.muscle.isobars import Isobars, WorkingPoint, compute_isobars
+from ...physics.muscle.isobars import Isobars, WorkingPoint, compute_isobars, describe_point, isobar_figure
 from ...report.chapter import Chapter, NamedValue, Plot, Table, TableColumn
 from .entry import Entry
 from .scaling import own_length

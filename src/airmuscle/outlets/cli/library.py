@@ -24,7 +24,7 @@ from ...files.library.files import (  # fmt: skip
     list_valves,
 )
 from ...physics.muscle.characteristic import ForceLaw
-from ...physics.muscle.isobar_plot import describe_point
+from ...physics.muscle.isobars import describe_point
 from ...report.write import rendered_figure, save_table
 from ..requests import EntryRequest, RequestError, Where, option, request
 from .delivery import print_result, write_result

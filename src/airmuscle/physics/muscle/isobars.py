@@ -1,14 +1,23 @@
-"""Isobars of a characteristic: tension over contraction at constant gauge pressures, and their chart."""
+"""Isobars of a characteristic, tension over contraction at constant gauge pressures: chart and figure."""
 
 import dataclasses
-from collections.abc import Callable
+import textwrap
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core import Array, PhysicsError, chosen_scale, plotting, quantity_text
+from ...core import (
+    Array,
+    chosen_scale,
+    contraction_text,
+    given_axes,
+    legend_outside,
+    new_figure,
+    plotting,
+    quantity_text,
+)
 from ...recording import Recording
-from .characteristic import Characteristic, ContractionLaw, ValidityRange
+from .characteristic import Characteristic, ContractionLaw, ValidityRange, validity_range_of, values_or_nan
 
 MAX_FORCE_RATIO = 8.0
 """Maximum of the force axis as a multiple of the median force, for laws that diverge (chosen)."""
@@ -18,6 +27,12 @@ MANY_POINTS = 500
 """Number of measured rows above which they are a cloud under the lines of the model (chosen)."""
 POINTS, COARSE_POINTS = 241, 61
 """Points of an isobar; points for a law that is slow to evaluate, and for the search of the contraction range."""
+CHART_PRESSURES = 6
+"""Number of isobars in the chart of a law without a validity range."""
+CHART_MAX_PRESSURE = 6e5
+"""Maximum gauge pressure [Pa] in the chart of a law without a validity range (chosen)."""
+MAX_TITLE_LINES = 3
+"""Maximum number of lines of a title; the rest is left out."""
 
 
 class WorkingPoint(NamedTuple):
@@ -168,14 +183,14 @@ def forces_along(characteristic: Characteristic, pressure: float, contractions: 
     """
     if isinstance(characteristic, ContractionLaw):
         return _invert_contraction_law(characteristic, pressure, contractions)
-    forces = _evaluate_where_defined(lambda c: np.asarray(characteristic.force(pressure, c)) + 0.0 * c, contractions)
+    forces = values_or_nan(lambda c: characteristic.force(pressure, c), contractions)
     return np.where(np.isfinite(forces) & (forces >= 0), forces, np.nan)
 
 
 def _invert_contraction_law(characteristic: ContractionLaw, pressure: float, contractions: Array) -> Array:
     """Return the tension of a contraction law along an isobar, by interpolation of its inverse without a search."""
     forces = np.linspace(*characteristic.force_range, 4 * POINTS)
-    values = _evaluate_where_defined(lambda force: np.asarray(characteristic.contraction(pressure, force)), forces)
+    values = values_or_nan(lambda force: characteristic.contraction(pressure, force), forces)
     finite = np.isfinite(values)
     values, forces = values[finite], forces[finite]
     falling = np.append(True, np.diff(np.minimum.accumulate(values)) < 0)[: values.size]
@@ -185,13 +200,93 @@ def _invert_contraction_law(characteristic: ContractionLaw, pressure: float, con
     return inverse
 
 
-def _evaluate_where_defined(law: Callable[[Array], Array], arguments: Array) -> Array:
-    """Return the values of a law, NaN where it raises PhysicsError; bisection isolates these arguments."""
-    try:
-        with np.errstate(all="ignore"):  # a law may be singular at the end of its range
-            return np.asarray(law(arguments), dtype=float)
-    except PhysicsError:
-        if arguments.size == 1:
-            return np.array([np.nan])
-    halves = np.array_split(arguments, [arguments.size // 2])
-    return np.concatenate([_evaluate_where_defined(law, half) for half in halves])
+def isobar_figure(
+    characteristic: Characteristic,
+    title: str,
+    curves: Isobars,
+    validity_range: ValidityRange | None = None,
+    point: WorkingPoint | None = None,
+    measured: Recording | None = None,
+) -> Any:
+    """Return the figure of the isobars: shaded outside the validity range, with the working point if one is given.
+
+    `measured` points are drawn with the curve of the same pressure.
+    """
+    figure, axes = new_figure()
+    draw_isobars(axes, curves, textwrap.fill(title, 60, max_lines=MAX_TITLE_LINES, placeholder=" …"), point, measured)
+    if validity_range is not None:
+        _shade_extrapolation(axes, validity_range, curves)
+    if point is not None:
+        _draw_working_point(axes, characteristic, curves, point)
+    legend_outside(axes, title="gauge pressure")
+    return figure
+
+
+def describe_point(point: WorkingPoint) -> str:
+    """Return a working point as text in display units."""
+    texts = (quantity_text(point.pressure, "Pa", "kPa"), contraction_text(point.contraction))
+    return f"{', '.join(texts)}, {quantity_text(point.force, 'N', 'N')}"
+
+
+def _shade_extrapolation(axes: Any, validity_range: ValidityRange, curves: Isobars) -> None:
+    (across, _), _ = axis_scales()
+    low, high = validity_range.contraction
+    spans = [(curves.contractions[0], low), (high, curves.contractions[-1])]
+    label = "outside the validity range"
+    for start, end in spans:
+        if end - start > 1e-9:
+            axes.axvspan(across * start, across * end, facecolor="0.5", alpha=0.16, linewidth=0, label=label)
+            label = "_nolegend_"
+
+
+def _draw_working_point(axes: Any, characteristic: Characteristic, curves: Isobars, point: WorkingPoint) -> None:
+    forces = forces_along(characteristic, point.pressure, curves.contractions)
+    (across, _), (up, _) = axis_scales()
+    axes.plot(
+        across * curves.contractions,
+        up * mask_slack(forces),
+        color=plotting.RED,
+        linewidth=2.0,
+        label=f"{quantity_text(point.pressure, 'Pa', 'kPa', 6)} (working point)",
+        zorder=3,
+    )
+    axes.plot(
+        [across * point.contraction],
+        [up * point.force],
+        marker="o",
+        markersize=7,
+        markerfacecolor="white",
+        markeredgecolor=plotting.RED,
+        markeredgewidth=1.8,
+        linestyle="none",
+        label=f"working point\n{contraction_text(point.contraction)}, {quantity_text(point.force, 'N', 'N')}",
+        zorder=4,
+        clip_on=point.force < 0,
+    )
+
+
+def plot_isobars(
+    law: Characteristic,
+    title: str,
+    validity_range: ValidityRange | None = None,
+    *,
+    pressures: Any = None,
+    ax: Any = None,
+) -> Any:
+    """Plot the tension of a law over the contraction at constant gauge pressures [Pa], by default round ones.
+
+    `ax` is a Matplotlib Axes and is returned; without it a new figure is returned. Raises ParameterError.
+    """
+    known = validity_range_of(law, validity_range)
+    if pressures is None and known is None:
+        pressures = np.linspace(0.0, CHART_MAX_PRESSURE, CHART_PRESSURES + 1)[1:]
+    given: Array | None = None if pressures is None else np.atleast_1d(np.asarray(pressures, dtype=float))
+    curves = compute_isobars(law, known, pressures=given)
+    if ax is None:
+        shown, axes = new_figure(height=3.0)
+        title = textwrap.shorten(title, 90, placeholder=" …")
+    else:
+        shown, axes = ax, given_axes(ax, 1, "plot of a muscle")[0]
+    draw_isobars(axes, curves, title)
+    legend_outside(axes, title="gauge pressure")
+    return shown

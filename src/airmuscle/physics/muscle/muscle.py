@@ -1,16 +1,37 @@
 """Hill-type muscle: contractile element, parallel spring and damper, series element, and enclosed volume."""
 
+import textwrap
 import warnings
 from types import MappingProxyType
 from typing import Any, ClassVar, NamedTuple
 
-from ...core import Reference, StateVariable, Value, Values, abridged, autodiff, model, ops
-from ...core.errors import AirmuscleWarning, ParameterError
+from ...core import (
+    AirmuscleWarning,
+    ParameterError,
+    Reference,
+    StateVariable,
+    Value,
+    Values,
+    abridged,
+    autodiff,
+    contraction_text,
+    model,
+    ops,
+    quantity_text,
+)
 from ...recording.notebook import Card, NotebookDisplay
-from .characteristic import HOSOVSKY_HILL, Characteristic, Clamped, ForceLaw, ValidityRange, VirtualWork
+from .characteristic import (
+    HOSOVSKY_HILL,
+    Characteristic,
+    Clamped,
+    ForceLaw,
+    ValidityRange,
+    VirtualWork,
+    validity_range_of,
+)
 from .friction.base import Friction, NoFriction
 from .geometry.base import Geometry
-from .isobar_plot import component_rows, plot_isobars
+from .isobars import plot_isobars
 from .passive_elements import CreepElements, Damper, LinearDamper, LinearSpring, NoStop, RigidWall, Spring, Stop, Wall
 from .quantity_arguments import accept_quantities_in
 from .ratings import Ratings
@@ -79,11 +100,19 @@ class Muscle(NotebookDisplay):
         return plot_isobars(self.contractile, title, self.validity_range, pressures=pressures, ax=ax)
 
     def _card(self) -> Card:
-        return Card(
-            "Muscle" if self.name == "muscle" else f"Muscle {self.name}",
-            [("component", "value"), *component_rows(self)],
-            self.plot,
-        )
+        rows = [
+            ("component", "value"),
+            ("contractile element", type(self.contractile).__name__),
+            ("geometry", type(self.geometry).__name__),
+            ("resting length", quantity_text(self.geometry.resting_length, "m", "mm")),
+        ]
+        if (known := validity_range_of(self.contractile, self.validity_range)) is not None:
+            rows.append(("valid gauge pressure", " to ".join(quantity_text(p, "Pa", "kPa") for p in known.pressure)))
+            rows.append(("valid contraction", " to ".join(map(contraction_text, known.contraction))))
+        for name in ("spring", "damper", "friction", "wall", "series", "stop", "creep"):
+            if (part := getattr(self, name)) != getattr(Muscle, name):
+                rows.append((name, textwrap.shorten(str(part), 100, placeholder=" …")))
+        return Card("Muscle" if self.name == "muscle" else f"Muscle {self.name}", rows, self.plot)
 
     def check(self) -> None:
         kinds = {"contractile": Characteristic, "geometry": Geometry, "spring": Spring, "damper": Damper, "wall": Wall,

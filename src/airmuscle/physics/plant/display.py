@@ -11,7 +11,7 @@ import numpy as np
 from ...core import BLACK, LINES, ColumnError, FileError, ParameterError, as_finite_float, new_figure, quantity_text
 from ...recording import Recording
 from ...recording.notebook import Card, NotebookDisplay
-from ..muscle.isobar_plot import plot_isobars
+from ..muscle.isobars import plot_isobars
 from .drawing import Row, Scene, scene_of
 
 FRAMES = 25.0

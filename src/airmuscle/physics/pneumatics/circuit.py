@@ -267,6 +267,6 @@ class Manifold(Circuit):
             part = branch.supplied_flow(
                 inlet, branch_air, select_prefix(name, state), select_prefix(name, inputs), ambient
             )
-            named = {"rates": with_prefix(name, part.rates), "outputs": with_prefix(name, part.outputs)}
-            total += dataclasses.replace(part, **named)
+            rates, outputs = with_prefix(name, part.rates), with_prefix(name, part.outputs)
+            total += dataclasses.replace(part, rates=rates, outputs=outputs)
         return total

@@ -6,12 +6,12 @@ several solutions, the one reached from rest is returned: the smallest contracti
 """
 
 import abc
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from typing import Any, ClassVar, NamedTuple, Self
 
 from ....core import IdentificationError, Reference, Value, autodiff, model, ops, parameter
 from ..quantity_arguments import accept_quantities_in
-from .solve import describe_range, solve_direction, warn_above_whole_length
+from .solve import check_solution, describe_range, solve_direction, warn_above_whole_length
 from .validity_range import MeasuredPoints
 
 _UNITS = {
@@ -158,18 +158,33 @@ class ForceLaw(Characteristic):
             autodiff.derivative(self, "force", pressure, contraction, wrt=1),
         )
 
+
+class AreaLaw(ForceLaw):
+    """Force proportional to the pressure: F = p A(eps) (base class)."""
+
+    @abc.abstractmethod
+    def effective_area(self, contraction: Value) -> Value:
+        """Effective area F/p [m2] at a contraction [1], the area of an equivalent piston."""
+
+    def force(self, pressure: Value, contraction: Value) -> Value:
+        return pressure * self.effective_area(contraction)
+
+    def pressure(self, contraction: Value, force: Value) -> Value:
+        solution = force / self.effective_area(contraction)
+        return check_solution(solution, self.pressure_range, (contraction, force), self._pressure_limits_message)
+
     def _contraction_limits_message(self, pressure: float, force: float) -> str:
-        """Message for a closed-form model whose tension decreases monotonically over the contraction range."""
-        ends = (float(self.force(pressure, end)) for end in self.contraction_range)
-        return self._no_contraction_message(pressure, force) + _describe_force_limits(*sorted(ends))
+        """Message for a tension that decreases monotonically over the contraction range."""
+        ends = (self.force(pressure, end) for end in self.contraction_range)
+        return self._no_contraction_message(pressure, force) + _describe_force_limits(ends)
 
     def _pressure_limits_message(self, contraction: float, force: float) -> str:
-        """Message for a closed-form model whose tension is monotone over the pressure range."""
-        ends = (float(self.force(end, contraction)) for end in self.pressure_range)
-        return self._no_pressure_message(contraction, force) + _describe_force_limits(*sorted(ends))
+        ends = (self.force(end, contraction) for end in self.pressure_range)
+        return self._no_pressure_message(contraction, force) + _describe_force_limits(ends)
 
 
-def _describe_force_limits(low: float, high: float) -> str:
+def _describe_force_limits(ends: Iterable[Value]) -> str:
+    low, high = sorted(map(float, ends))
     return f"Available force: {describe_range(low, high, 'N')}."
 
 

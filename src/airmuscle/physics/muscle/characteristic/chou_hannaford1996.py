@@ -4,13 +4,13 @@ from typing import ClassVar, Self
 
 from ....core import Reference, Value, model, ops
 from ..geometry.braid import CHOU_HANNAFORD_1996, Braid
-from .base import MIN_PRESSURE, ForceLaw
+from .base import MIN_PRESSURE, AreaLaw
 from .solve import check_solution
 from .validity_range import DataScales, MeasuredPoints
 
 
 @model
-class ChouHannaford1996(ForceLaw):
+class ChouHannaford1996(AreaLaw):
     """Ideal McKibben muscle: F = p b^2/(4 pi n^2) (3 L^2/b^2 - 1).
 
         b = L_0/cos(theta_0),   n = b sin(theta_0)/(2 pi r_0),   L = L_0 (1 - eps)
@@ -44,19 +44,11 @@ class ChouHannaford1996(ForceLaw):
         start, _ = self.geometry.contraction_range
         return (start, 1.0 - self.thread / (ops.sqrt(3.0) * self.geometry.resting_length))
 
-    def force(self, pressure: Value, contraction: Value) -> Value:
-        return pressure * self._effective_area(contraction)
-
-    def pressure(self, contraction: Value, force: Value) -> Value:
-        solution = force / self._effective_area(contraction)
-        return check_solution(solution, self.pressure_range, (contraction, force), self._pressure_limits_message)
-
     def contraction(self, pressure: Value, force: Value) -> Value:
         ratio = force / ops.where(pressure == 0.0, MIN_PRESSURE, pressure) * 4 * ops.pi * self.turns**2 / self.thread**2
         solution = 1.0 - self.thread * ops.sqrt((ratio + 1) / 3) / self.geometry.resting_length
         return check_solution(solution, self.contraction_range, (pressure, force), self._contraction_limits_message)
 
-    def _effective_area(self, contraction: Value) -> Value:
-        """Effective area F/p [m2]."""
+    def effective_area(self, contraction: Value) -> Value:
         length = self.geometry.resting_length * (1.0 - contraction)
         return self.thread**2 / (4 * ops.pi * self.turns**2) * (3 * length**2 / self.thread**2 - 1)

@@ -5,13 +5,13 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from ....core import Reference, Value, model, parameter
-from ..geometry.base import check_contraction_range
-from ..geometry.meridian import SAGA_2007, Profile, graded_quadrature
+from ..geometry.base import Profile, check_contraction_range
+from ..geometry.meridian import SAGA_2007, graded_quadrature
 from ..geometry.meridian_shapes import CircularArc
 from ..geometry.pleated import DAERDEN_LEFEBER_2001, PleatedTube, unwrap_scalar
 from .base import PressureLaw, Slopes
-from .rubber import RubberLine
-from .solve import as_arrays, check_solution, find_first_root
+from .rubber import RubberLaw, RubberLine
+from .solve import as_arrays, check_numbers, check_solution, find_first_root
 
 NODES = 120  # Gauss points over half the meridian
 
@@ -50,7 +50,7 @@ class _Curve(NamedTuple):
 
 
 @model
-class ExactMeridian(PressureLaw):
+class ExactMeridian(RubberLaw, PressureLaw):
     """Exact meridian: N cos(phi) = F + pi p r^2,   dN/dr = 2 pi t sigma(r).
 
     N: fibre tension; phi: slope angle; r: radius. With r = R - (R - r_0) v^2, C = F/(pi p) + r^2,
@@ -74,11 +74,6 @@ class ExactMeridian(PressureLaw):
         """From 0.01 %, where the fibres are nearly straight, to the maximum volume."""
         return (1e-4, self.geometry.free_contraction * (1.0 - 1e-6))
 
-    @property
-    def threshold_pressure(self) -> float:
-        """Gauge pressure [Pa] at which contraction starts, independent of the load: t beta/r_0."""
-        return float(self.wall_thickness * self.rubber.intercept / self.geometry.end_radius)
-
     def pressure(self, contraction: Value, force: Value) -> Value:
         solution = self._shape_or_raise(contraction, force).pressure
         return check_solution(solution, self.pressure_range, (contraction, force), self._no_pressure_message)
@@ -94,8 +89,8 @@ class ExactMeridian(PressureLaw):
         def residual(radius: Value, p: Value, load: Value) -> Value:
             return self._evaluate_shape(radius, p, load).lengths[0] / tube.fibre_length - 1.0
 
-        above_threshold = (self.threshold_pressure, np.inf)
-        check_solution(as_arrays(pressure, force)[0], above_threshold, (pressure, force), self._below_threshold_message)
+        check_numbers(pressure, force)
+        self.check_threshold(pressure, force)
         radii = (tube.end_radius * (1 + 1e-9), float(tube.segment(tube.free_contraction).max_radius))
         radius = find_first_root(
             residual, radii, (pressure, force), lambda p, f, *_: self._no_contraction_message(p, f)
@@ -270,10 +265,6 @@ class ExactMeridian(PressureLaw):
             "rubber would contract the tube below the radius of its rings, where the rubber line is not defined; "
             "increase the contraction or the force."
         )
-
-    def _below_threshold_message(self, pressure: float, force: float) -> str:
-        threshold = f"the threshold pressure of {self.threshold_pressure / 1e3:.4g} kPa, at which contraction starts"
-        return f"ExactMeridian: {pressure / 1e3:.4g} kPa is below {threshold}."
 
     def _no_shape_message(self, pressure: float, contraction: float) -> str:
         return (

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any, ClassVar, Self
 
 from ....core import ParameterError, Value, model, ops, parameter, suggestion
+from ..geometry.base import LENGTHS, RESTING_LENGTH
 from .base import Characteristic, ForceLaw
 from .validity_range import DataScales, MeasuredPoints
 
@@ -64,9 +65,7 @@ class EffectiveLength(LengthLaw):
     """
 
     inner: ForceLaw
-    resting_length: float = parameter(
-        "m", "L_0", "length between the fittings, unpressurised and unloaded", bounds=(1e-3, 20.0), fitted=False
-    )
+    resting_length: float = parameter(*RESTING_LENGTH, bounds=LENGTHS, fitted=False)
     dead_length: float = parameter("m", "l_d", "length of the ends, which do not contract", bounds=(-1.0, 1.0))
     end_shift: float = parameter(
         "m", "d", "elongation of the ends, or zero error of the length", bounds=(-0.1, 0.1), default=0.0
@@ -124,9 +123,7 @@ class LengthFamily(LengthLaw):
 
     inner: ForceLaw
     change: ForceLaw
-    resting_length: float = parameter(
-        "m", "L_0", "length between the fittings, unpressurised and unloaded", bounds=(1e-3, 20.0), fitted=False
-    )
+    resting_length: float = parameter(*RESTING_LENGTH, bounds=LENGTHS, fitted=False)
     reference_length: float = parameter(
         "m", "L_ref", "reference length, at which the correction is zero", bounds=(1e-3, 20.0), fitted=False
     )

@@ -2,15 +2,14 @@
 
 import warnings
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
-from ....core import AirmuscleWarning, Array, PhysicsError, SolveError, Value, model, parameter
+from ....core import AirmuscleWarning, Array, SolveError, Value, model, parameter
 from ..geometry.base import check_degree
 from .base import Characteristic, ForceLaw
 from .contractile_surface import ContractileSurface, exponents
-from .solve import unsolved_as_nan
+from .solve import values_or_nan
 from .validity_range import ValidityRange
 
 _STARTS = 40
@@ -70,7 +69,7 @@ def as_force_law(law: Characteristic, validity_range: ValidityRange, *, degree: 
     check_degree("as_force_law", degree)
     count = 4 * (degree + 1)
     pressure, contraction = _grid(validity_range, np.cos(np.pi * (np.arange(count) + 0.5) / count))
-    force = forces_or_nan(law, pressure, contraction)
+    force = values_or_nan(law.force, pressure, contraction)
     known = np.isfinite(force)
     if known.sum() < 2 * len(exponents(degree)):
         raise SolveError(
@@ -97,7 +96,7 @@ def _with_errors(
     """Return the surrogate of a fitted surface with its errors."""
     nodes = np.linspace(-1.0, 1.0, 4 * surface.degree + 3)
     pressure, contraction = _grid(validity_range, nodes)
-    force = forces_or_nan(law, pressure, contraction)
+    force = values_or_nan(law.force, pressure, contraction)
     if (unbounded := np.abs(force) > _NO_CLAMP).any():
         at = int(np.argmax(unbounded))
         raise SolveError(
@@ -117,7 +116,7 @@ def _with_errors(
 
     def magnitude(x: Array, q: Array) -> Array:
         at = _physical(validity_range, x, q)
-        return np.asarray(np.abs(surface.force(*at) - forces_or_nan(law, *at)))
+        return np.asarray(np.abs(surface.force(*at) - values_or_nan(law.force, *at)))
 
     largest = _MARGIN * estimate_maximum(magnitude, np.abs(error).reshape(nodes.size, nodes.size), nodes)
     rms = float(np.sqrt(np.mean(error[known] ** 2)))
@@ -141,20 +140,6 @@ def _scale(validity_range: ValidityRange, pressure: Array, contraction: Array) -
     """Contraction and pressure scaled to -1..1 on the validity range."""
     (p_low, p_high), (c_low, c_high) = validity_range.pressure, validity_range.contraction
     return 2 * (contraction - c_low) / (c_high - c_low) - 1, 2 * (pressure - p_low) / (p_high - p_low) - 1
-
-
-def forces_or_nan(law: Characteristic, pressure: Array, contraction: Array) -> Array:
-    """Forces [N] at N points, NaN without a solution; bisects the points to locate those."""
-    try:
-        with unsolved_as_nan():
-            force: Any = np.asarray(law.force(pressure, contraction), dtype=float)
-    except PhysicsError:
-        if pressure.size == 1:
-            return np.array([np.nan])
-        half = pressure.size // 2
-        halves = (forces_or_nan(law, pressure[s], contraction[s]) for s in (slice(None, half), slice(half, None)))
-        return np.concatenate(list(halves))
-    return np.broadcast_to(force, pressure.shape)
 
 
 def estimate_maximum(error: _Error, values: Array, nodes: Array) -> float:

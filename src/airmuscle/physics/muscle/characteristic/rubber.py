@@ -1,9 +1,12 @@
-"""Rubber wall of a straight-fibre muscle: linear relation between hoop stress and strain."""
+"""Rubber wall of a straight-fibre muscle: linear relation of hoop stress and strain, threshold of contraction."""
 
 import abc
 
 from ....core import Value, model, parameter, pi
 from ..geometry.meridian import Segment
+from ..geometry.straight_fibre import FibreTube
+from .base import Characteristic
+from .solve import check_solution
 
 
 @model
@@ -53,3 +56,27 @@ class ArcIntegral(RubberIntegral):
 
     def hoop_stress(self, rubber: RubberLine, segment: Segment) -> Value:
         return rubber.integrate_stress(segment.arc_excess, segment.arc, segment.end_radius)
+
+
+class RubberLaw(Characteristic):
+    """Law of straight fibres on a rubber tube, which contracts above a threshold pressure (base class)."""
+
+    geometry: FibreTube
+    rubber: RubberLine
+    wall_thickness: float
+
+    @property
+    def threshold_pressure(self) -> float:
+        """Gauge pressure [Pa] at which contraction starts, independent of the load: t beta/r_0."""
+        return float(self.wall_thickness * self.rubber.intercept / self.geometry.end_radius)
+
+    def check_threshold(self, pressure: Value, force: Value) -> None:
+        """Raise SolveError for a gauge pressure [Pa] below the threshold; `force` is quoted."""
+        above = (self.threshold_pressure, float("inf"))
+        check_solution(pressure + 0.0 * force, above, (pressure, force), self._below_threshold_message)
+
+    def _below_threshold_message(self, pressure: float, force: float) -> str:
+        return (
+            f"{type(self).__name__}: {pressure / 1e3:.4g} kPa is below the threshold pressure of "
+            f"{self.threshold_pressure / 1e3:.4g} kPa, at which contraction starts."
+        )

@@ -11,7 +11,7 @@ from ..geometry.meridian import SAGA_2007
 from ..geometry.meridian_shapes import Parabola
 from ..geometry.straight_fibre import FibreSum, HalfShellFibreSum, StraightFibre
 from .base import PressureLaw
-from .rubber import AxialIntegral, RubberIntegral, RubberLine
+from .rubber import AxialIntegral, RubberIntegral, RubberLaw, RubberLine
 from .solve import check_solution, solve_direction
 
 LINE_A = RubberLine(slope=0.1263e6, intercept=0.3e6)
@@ -35,7 +35,7 @@ class EquilibriumPoint(NamedTuple):
 
 
 @model
-class Saga2007(PressureLaw):
+class Saga2007(RubberLaw, PressureLaw):
     """Equation (19): P = [t H + (M/m) tau F]/[w A_1 - (M/m) tau pi r_0^2],   tau = l/(q a).
 
     Force balance of the half shell (9) with the fibre tension from the end section (5). Per segment of fibre length
@@ -86,8 +86,7 @@ class Saga2007(PressureLaw):
     @property
     def threshold_pressure(self) -> float:
         """Gauge pressure [Pa] at which contraction starts at any load, t beta/(w r_0); w = 1 is a thin-walled ring."""
-        thin_ring = self.wall_thickness * self.rubber.intercept / self.geometry.end_radius
-        return float(thin_ring / self.projection_factor)
+        return super().threshold_pressure / self.projection_factor
 
     @property
     def snap_through_load(self) -> float:
@@ -109,8 +108,7 @@ class Saga2007(PressureLaw):
         return (pressure * shell - rubber) / ops.maximum(lever, _MIN_SLOPE)
 
     def contraction(self, pressure: Value, force: Value) -> Value:
-        above_threshold = (self.threshold_pressure, float("inf"))
-        check_solution(pressure + 0.0 * force, above_threshold, (pressure, force), self._below_threshold_message)
+        self.check_threshold(pressure, force)
         return solve_direction(
             lambda contraction, _, load: self.equilibrium_pressure(contraction, load), self.contraction_range,
             (pressure, force), 0, self._no_contraction_message, "Required pressure at this load", "kPa",
@@ -204,11 +202,8 @@ class Saga2007(PressureLaw):
             check_contraction_range(contraction, self.contraction_range, "Saga2007", remark)
 
     def _below_threshold_message(self, pressure: float, force: float) -> str:
-        return (
-            f"Saga2007: {pressure / 1e3:.4g} kPa is below the threshold pressure of "
-            f"{self.threshold_pressure / 1e3:.4g} kPa, at which contraction starts. Equilibria that are not reached "
-            "from rest are returned by `equilibria(pressure, force)`."
-        )
+        from_rest = "Equilibria that are not reached from rest are returned by `equilibria(pressure, force)`."
+        return f"{super()._below_threshold_message(pressure, force)} {from_rest}"
 
 
 @functools.lru_cache(maxsize=256)

@@ -3,6 +3,7 @@
 from typing import ClassVar, Self
 
 from ....core import Reference, Value, model, ops, parameter, published
+from ..geometry.base import LENGTHS, RESTING_LENGTH
 from ..passive_elements import Damper, Spring
 from .base import ForceLaw
 from .validity_range import DataScales, MeasuredPoints
@@ -21,9 +22,7 @@ class Serres2009(ForceLaw):
 
     references: ClassVar[tuple[Reference, ...]] = (SERRES_2009,)
 
-    resting_length: float = parameter(
-        "m", "L_0", "length between the fittings, unpressurised and unloaded", bounds=(1e-3, 20.0), fitted=False
-    )
+    resting_length: float = parameter(*RESTING_LENGTH, bounds=LENGTHS, fitted=False)
     force_offset: float = parameter("N", "f_0", "contractile force at zero pressure", default=44.6)
     force_by_pressure: float = parameter(
         "N/Pa", "f_1", "increase of the contractile force with pressure", default=2.91e-3

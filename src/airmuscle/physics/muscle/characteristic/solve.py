@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ....core import AirmuscleWarning, SolveError, TraceError
+from ....core import AirmuscleWarning, Array, PhysicsError, SolveError, TraceError
 
 INTERVALS = 256
 """Intervals of the search grid; a pair of roots within 1/256 of the search range is not resolved."""
@@ -26,6 +26,19 @@ def unsolved_as_nan() -> Iterator[None]:
         yield
     finally:
         _UNSOLVED_AS_NAN.reset(token)
+
+
+def values_or_nan(law: Callable[..., Any], *points: Array) -> Array:
+    """Values of a law at points (N,), NaN where it has no solution; halves of the points isolate those."""
+    try:
+        with unsolved_as_nan(), np.errstate(all="ignore"):  # a law may be singular at the end of its range
+            return np.broadcast_to(np.asarray(law(*points), dtype=float), points[0].shape)
+    except PhysicsError:
+        if points[0].size == 1:
+            return np.array([np.nan])
+    half = points[0].size // 2
+    halves = ([each[part] for each in points] for part in (slice(None, half), slice(half, None)))
+    return np.concatenate([values_or_nan(law, *each) for each in halves])
 
 
 def check_numbers(*values: Any) -> None:

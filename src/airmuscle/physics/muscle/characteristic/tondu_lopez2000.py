@@ -4,7 +4,7 @@ from typing import ClassVar, Self
 
 from ....core import Reference, Value, model, ops, parameter, published
 from ..geometry.braid import Braid
-from .base import MIN_PRESSURE, ForceLaw
+from .base import MIN_PRESSURE, AreaLaw
 from .solve import check_solution
 from .validity_range import DataScales, MeasuredPoints
 
@@ -12,7 +12,7 @@ TONDU_LOPEZ_2000 = published("tondu-lopez-2000")
 
 
 @model
-class TonduLopez2000(ForceLaw):
+class TonduLopez2000(AreaLaw):
     """Braided muscle with end correction: F = pi r_0^2 p (a (1 - k eps)^2 - b).
 
     a = 3/tan(alpha_0)^2, b = 1/sin(alpha_0)^2; r_0, alpha_0: radius and angle of the braid at rest; p: gauge pressure;
@@ -39,20 +39,12 @@ class TonduLopez2000(ForceLaw):
         zero_force = 1.0 - ops.sqrt(self._b / self._a)
         return (start / self.end_correction, zero_force / self.end_correction)
 
-    def force(self, pressure: Value, contraction: Value) -> Value:
-        return pressure * self._effective_area(contraction)
-
-    def pressure(self, contraction: Value, force: Value) -> Value:
-        solution = force / self._effective_area(contraction)
-        return check_solution(solution, self.pressure_range, (contraction, force), self._pressure_limits_message)
-
     def contraction(self, pressure: Value, force: Value) -> Value:
         ratio = force / (ops.where(pressure == 0.0, MIN_PRESSURE, pressure) * ops.pi * self.geometry.radius**2)
         solution = (1.0 - ops.sqrt((ratio + self._b) / self._a)) / self.end_correction
         return check_solution(solution, self.contraction_range, (pressure, force), self._contraction_limits_message)
 
-    def _effective_area(self, contraction: Value) -> Value:
-        """Effective area F/p [m2]."""
+    def effective_area(self, contraction: Value) -> Value:
         middle = 1.0 - self.end_correction * contraction
         return ops.pi * self.geometry.radius**2 * (self._a * middle**2 - self._b)
 

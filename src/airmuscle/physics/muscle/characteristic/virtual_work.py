@@ -9,13 +9,13 @@ from ..geometry.braid import CHOU_HANNAFORD_1996
 from ..geometry.meridian import SAGA_2007
 from ..geometry.meridian_shapes import FERRARESI_2001, CircularArc
 from ..geometry.straight_fibre import StraightFibre
-from .base import ForceLaw, Slopes
-from .rubber import RubberLine
+from .base import AreaLaw, ForceLaw, Slopes
+from .rubber import RubberLaw, RubberLine
 from .solve import check_solution, find_first_root
 
 
 @model
-class VirtualWork(ForceLaw):
+class VirtualWork(AreaLaw):
     """Virtual work: F = -p dV/dL = p (dV/deps)/L_0.
 
     p: gauge pressure; V: enclosed volume; L = L_0 (1 - eps): length. The work p dV of the air is transferred to the
@@ -32,15 +32,7 @@ class VirtualWork(ForceLaw):
     def contraction_range(self) -> tuple[float, float]:
         return self.geometry.contraction_range
 
-    def force(self, pressure: Value, contraction: Value) -> Value:
-        return pressure * self.effective_area(contraction)
-
-    def pressure(self, contraction: Value, force: Value) -> Value:
-        solution = force / self.effective_area(contraction)
-        return check_solution(solution, self.pressure_range, (contraction, force), self._no_pressure_message)
-
     def effective_area(self, contraction: Value) -> Value:
-        """Effective area F/p [m2] at a contraction [1], the area of an equivalent piston."""
         return self.geometry.volume_derivative(contraction) / self.geometry.resting_length
 
     def slopes(self, pressure: Value, contraction: Value) -> Slopes:
@@ -68,7 +60,7 @@ class _WorkTerms(NamedTuple):
 
 
 @model
-class CircleVirtualWork(ForceLaw):
+class CircleVirtualWork(RubberLaw, ForceLaw):
     """Straight-fibre muscle with a circular meridian, by virtual work.
 
         F = (p dV/deps - dU/deps)/l_0,   U = 2 pi t [alpha Q/(2 r_0) + beta G],   sin(psi)/psi = 1 - eps
@@ -99,11 +91,6 @@ class CircleVirtualWork(ForceLaw):
         """From zero to the maximum volume, where the pressure required for a load becomes infinite."""
         return (0.0, _contraction_of_max_volume(self.geometry) * (1.0 - 1e-9))
 
-    @property
-    def threshold_pressure(self) -> float:
-        """Gauge pressure [Pa] at which contraction starts, independent of the load: t beta/r_0."""
-        return float(self.wall_thickness * self.rubber.intercept / self.geometry.end_radius)
-
     def force(self, pressure: Value, contraction: Value) -> Value:
         """Tension [N]; negative beyond the maximum volume, unbounded at zero contraction (straight fibres)."""
         self._check_contraction(contraction, self.geometry.contraction_range)
@@ -123,8 +110,7 @@ class CircleVirtualWork(ForceLaw):
             required = f"Required pressure at this load: {(low + p) / 1e3:.4g} kPa or more."
             return self._no_contraction_message(p, load) + required
 
-        above_threshold = (self.threshold_pressure, float("inf"))
-        check_solution(pressure + 0.0 * force, above_threshold, (pressure, force), self._below_threshold_message)
+        self.check_threshold(pressure, force)
         return find_first_root(residual, self.contraction_range, (pressure, force), message)
 
     def _pressure(self, contraction: Value, force: Value) -> Value:
@@ -148,12 +134,6 @@ class CircleVirtualWork(ForceLaw):
         """Raise GeometryLimitError if a contraction is outside `limits`, unless the model is being traced."""
         if not ops.is_symbol(self.wall_thickness):
             check_contraction_range(contraction, limits, "CircleVirtualWork")
-
-    def _below_threshold_message(self, pressure: float, force: float) -> str:
-        return (
-            f"CircleVirtualWork: {pressure / 1e3:.4g} kPa is below the threshold pressure of "
-            f"{self.threshold_pressure / 1e3:.4g} kPa, at which contraction starts."
-        )
 
 
 @functools.lru_cache(maxsize=256)

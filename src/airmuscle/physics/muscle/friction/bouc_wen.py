@@ -21,7 +21,11 @@ class BoucWen(Friction):
     as in the Dahl model. Reference: Bouc (1967), Wen (1976); normalised form: Ismail, Ikhouane and Rodellar (2009).
     """
 
-    references: ClassVar[tuple[Reference, ...]] = tuple(map(published, ("bouc-1967", "wen-1976", "ismail-2009")))
+    references: ClassVar[tuple[Reference, ...]] = (
+        published("bouc-1967"),
+        published("wen-1976"),
+        published("ismail-2009"),
+    )
 
     stiffness: float = parameter("N/m", "k", "initial stiffness", bounds=(1e-3, 1e9))
     coulomb_force: float = parameter("N", "F_C", "friction force in steady sliding", bounds=(1e-6, 1e5))

@@ -68,8 +68,10 @@ class MaxwellSlip(SlipElements):
     rules). Reference: Iwan (1966); Goldfarb and Celanovic (1997); for muscles Vo-Minh et al. (2011).
     """
 
-    references: ClassVar[tuple[Reference, ...]] = tuple(
-        map(published, ("iwan-1966", "goldfarb-celanovic-1997", "vo-minh-2011"))
+    references: ClassVar[tuple[Reference, ...]] = (
+        published("iwan-1966"),
+        published("goldfarb-celanovic-1997"),
+        published("vo-minh-2011"),
     )
     linear_in: ClassVar[str | None] = "stiffnesses"
 

@@ -4,9 +4,8 @@ import abc
 from typing import Any, ClassVar
 
 import numpy as np
-import numpy.typing as npt
 
-from ....core import GeometryLimitError, ParameterError, Reference, Value, abridged, autodiff
+from ....core import Array, GeometryLimitError, ParameterError, Reference, Value, abridged, autodiff
 from ..quantity_arguments import accept_quantities_in
 
 
@@ -26,6 +25,12 @@ def check_contraction_range(contraction: Value, limits: tuple[float, float], own
         )
 
 
+RESTING_LENGTH = ("m", "L_0", "length between the fittings, unpressurised and unloaded")
+"""Unit, symbol and meaning of the parameter of a resting length."""
+LENGTHS = (1e-3, 20.0)
+"""Bounds of a resting length [m]."""
+Profile = tuple[Array, Array]
+"""Axial positions [m] and radii [m]."""
 _UNITS = {"volume": ("1",), "volume_derivative": ("1",)}
 """Units of the arguments of the methods."""
 
@@ -59,12 +64,19 @@ class Geometry(abc.ABC):
     def volume(self, contraction: Value) -> Value:
         """Enclosed volume [m3] at a contraction [1], a scalar or an array; the result has the same shape."""
 
-    @abc.abstractmethod
-    def outline(self, contraction: float, points: int = 201) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
+    def radius_at(self, contraction: Value) -> Value:
+        """Radius [m] of the cylinder of this volume at a contraction [1]."""
+        return np.sqrt(self.volume(contraction) / (np.pi * (self.resting_length * (1.0 - contraction))))
+
+    def outline(self, contraction: float, points: int = 201) -> Profile:
         """Axial positions from the middle [m] and radii [m] at a contraction [1], each of shape (points,).
 
-        Raises GeometryLimitError if the contraction is outside `contraction_range`.
+        They are those of a cylinder unless the geometry has another shape. Raises GeometryLimitError if the contraction
+        is outside `contraction_range`.
         """
+        self.check_contraction(contraction)
+        half = self.resting_length * (1.0 - contraction) / 2
+        return np.linspace(-half, half, points), np.full(points, float(self.radius_at(contraction)))
 
     def volume_derivative(self, contraction: Value) -> Value:
         """Exact derivative dV/deps [m3]; by virtual work, p (dV/deps)/L_0 is the tension of an ideal muscle."""

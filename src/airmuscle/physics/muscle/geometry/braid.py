@@ -2,11 +2,8 @@
 
 from typing import ClassVar
 
-import numpy as np
-import numpy.typing as npt
-
 from ....core import Reference, Value, model, ops, parameter, published
-from .base import Geometry
+from .base import LENGTHS, RESTING_LENGTH, Geometry
 
 CHOU_HANNAFORD_1996 = published("chou-hannaford-1996")
 
@@ -27,9 +24,7 @@ class Braid(Geometry):
     braid_angle: float = parameter(
         "rad", "theta_0", "angle between the threads and the axis at rest", bounds=(0.05, 1.5)
     )
-    resting_length: float = parameter(
-        "m", "L_0", "length between the fittings, unpressurised and unloaded", bounds=(1e-3, 20.0), fitted=False
-    )
+    resting_length: float = parameter(*RESTING_LENGTH, bounds=LENGTHS, fitted=False)
 
     @property
     def contraction_range(self) -> tuple[float, float]:
@@ -42,11 +37,5 @@ class Braid(Geometry):
         return ops.pi * self.radius**2 * self.resting_length * stretch * sine_squared / ops.sin(self.braid_angle) ** 2
 
     def radius_at(self, contraction: Value) -> Value:
-        """Radius [m] of the cylinder at a contraction [1]."""
         sine = ops.sqrt(1.0 - ((1.0 - contraction) * ops.cos(self.braid_angle)) ** 2)
         return self.radius * sine / ops.sin(self.braid_angle)
-
-    def outline(self, contraction: float, points: int = 201) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-        self.check_contraction(contraction)
-        half = self.resting_length * (1.0 - contraction) / 2
-        return np.linspace(-half, half, points), np.full(points, float(self.radius_at(contraction)))

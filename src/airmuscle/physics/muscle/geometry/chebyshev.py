@@ -4,10 +4,9 @@ import functools
 from typing import Any, ClassVar
 
 import numpy as np
-import numpy.typing as npt
 
 from ....core import GeometryLimitError, ParameterError, Value, model, ops, parameter
-from .base import Geometry, check_degree
+from .base import LENGTHS, RESTING_LENGTH, Geometry, check_degree
 
 
 @model
@@ -23,9 +22,7 @@ class TabulatedGeometry(Geometry):
 
     contractions: tuple[float, ...] = parameter("1", "eps_i", "contractions of the rows, increasing", fitted=False)
     volumes: tuple[float, ...] = parameter("m3", "V_i", "volumes of the rows", bounds=(0.0, 1.0), fitted=False)
-    resting_length: float = parameter(
-        "m", "L_0", "length between the fittings, unpressurised and unloaded", bounds=(1e-3, 20.0), fitted=False
-    )
+    resting_length: float = parameter(*RESTING_LENGTH, bounds=LENGTHS, fitted=False)
 
     def check(self) -> None:
         rows = len(self.contractions)
@@ -46,11 +43,6 @@ class TabulatedGeometry(Geometry):
     def volume_derivative(self, contraction: Value) -> Value:
         self.check_contraction(contraction)
         return _curve(self).derivative()(contraction)[()]
-
-    def outline(self, contraction: float, points: int = 201) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-        length = self.resting_length * (1.0 - contraction)
-        radius = float(np.sqrt(self.volume(contraction) / (np.pi * length)))
-        return np.linspace(-length / 2, length / 2, points), np.full(points, radius)
 
 
 @functools.lru_cache(maxsize=64)
@@ -77,11 +69,8 @@ class Vessel(Geometry):
     def volume_derivative(self, contraction: Value) -> Value:
         return 0.0 * contraction
 
-    def outline(self, contraction: float, points: int = 201) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-        self.check_contraction(contraction)
-        length = self.resting_length * (1.0 - contraction)
-        radius = (self.enclosed_volume / (np.pi * length)) ** 0.5
-        return np.linspace(-length / 2, length / 2, points), np.full(points, radius)
+    def radius_at(self, contraction: Value) -> Value:
+        return (self.enclosed_volume / (np.pi * (self.resting_length * (1.0 - contraction)))) ** 0.5
 
 
 _ERROR_POINTS = 1001
@@ -102,9 +91,7 @@ class ChebyshevGeometry(Geometry):
     max_contraction: float = parameter(
         "1", "eps_high", "upper limit of the validity range in contraction", fitted=False
     )
-    resting_length: float = parameter(
-        "m", "L_0", "length between the fittings, unpressurised and unloaded", bounds=(1e-3, 20.0), fitted=False
-    )
+    resting_length: float = parameter(*RESTING_LENGTH, bounds=LENGTHS, fitted=False)
     volume_error: float = parameter(
         "m3", "dV", "maximum error of the volume in the validity range", fitted=False, default=0.0
     )
@@ -141,12 +128,6 @@ class ChebyshevGeometry(Geometry):
             d, d_next = 2 * b + 2 * x * d - d_next, d
             b, b_next = a + 2 * x * b - b_next, b
         return self.coefficients[0] + x * b - b_next, b + x * d - d_next
-
-    def outline(self, contraction: float, points: int = 201) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
-        self.check_contraction(contraction)
-        length = self.resting_length * (1.0 - contraction)
-        radius = float(np.sqrt(self.volume(contraction) / (np.pi * length)))
-        return np.linspace(-length / 2, length / 2, points), np.full(points, radius)
 
 
 def as_polynomial(

@@ -8,11 +8,9 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from ....core import Array, Reference, Value, ops, published
+from .base import Profile
 
 SAGA_2007 = published("saga-2007")
-
-Profile = tuple[Array, Array]
-"""Axial positions [m] and radii [m]."""
 
 
 class Segment(NamedTuple):

@@ -5,7 +5,8 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from ....core import Array, Reference, Value, model, ops, published
-from .meridian import Meridian, Profile, Segment, double_angle_term, segment_volume, stumpff, triple_angle_term
+from .base import Profile
+from .meridian import Meridian, Segment, double_angle_term, segment_volume, stumpff, triple_angle_term
 
 _NODES, _WEIGHTS = (
     (0.5 * (v + shift)).tolist() for v, shift in zip(np.polynomial.legendre.leggauss(24), (1, 0), strict=True)

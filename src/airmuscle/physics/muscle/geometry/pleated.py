@@ -6,7 +6,8 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from ....core import Array, Reference, Value, model, published
-from .meridian import Profile, Segment
+from .base import Profile
+from .meridian import Segment
 from .straight_fibre import FibreTube
 
 DAERDEN_LEFEBER_2001 = published("daerden-lefeber-2001")

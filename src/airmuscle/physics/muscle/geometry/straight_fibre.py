@@ -5,8 +5,8 @@ import abc
 import numpy as np
 
 from ....core import Array, ParameterError, Value, model, ops, parameter
-from .base import Geometry, check_contraction_range
-from .meridian import Meridian, Profile, Segment
+from .base import LENGTHS, RESTING_LENGTH, Geometry, Profile, check_contraction_range
+from .meridian import Meridian, Segment
 from .meridian_shapes import CircularArc
 
 
@@ -60,9 +60,7 @@ class FibreTube(Geometry):
     neglected. Equal division by the rings is inferred; Saga et al. 2007 do not state it.
     """
 
-    resting_length: float = parameter(
-        "m", "L_0", "length between the fittings, unpressurised and unloaded", bounds=(1e-3, 20.0), fitted=False
-    )
+    resting_length: float = parameter(*RESTING_LENGTH, bounds=LENGTHS, fitted=False)
     end_diameter: float = parameter("m", "d_0", "diameter at the ends and rings", bounds=(1e-4, 0.5), fitted=False)
     rings: int = 0
 
