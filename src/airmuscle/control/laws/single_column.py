@@ -153,14 +153,10 @@ class PID(SisoController):
     @functools.cached_property
     def _integration(self) -> tuple[Value, Value, Value]:
         """Whether there is integral action, and its time constant and that of the anti-windup [s]; otherwise 1."""
-        integrates = self.integral_time > 0
-        return integrates, ops.where(integrates, self.integral_time, 1.0), ops.where(integrates, self._tracking(), 1.0)
-
-    def _tracking(self) -> Value:
-        """The time constant [s] of the anti-windup."""
-        product = self.integral_time * self.derivative_time
+        integrates, product = self.integral_time > 0, self.integral_time * self.derivative_time
         by_rule = ops.where(product > 0, ops.sqrt(ops.where(product > 0, product, 1.0)), self.integral_time)
-        return ops.where(self.tracking_time > 0, self.tracking_time, by_rule)
+        tracking = ops.where(self.tracking_time > 0, self.tracking_time, by_rule)
+        return integrates, ops.where(integrates, self.integral_time, 1.0), ops.where(integrates, tracking, 1.0)
 
 
 @model

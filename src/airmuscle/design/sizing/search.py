@@ -45,18 +45,14 @@ class SizingResult(ShortRepr):
             return
         reasons = "; ".join(f"{item.name}: {item.reason}" for item in self.unsuitable[:3])
         more = f"; and {len(self.unsuitable) - 3} more" if len(self.unsuitable) > 3 else ""
-        raise SolveError(
-            f"no muscle meets the requirement of {self.requirement.describe()}: {reasons}{more}. {self._reachable()}"
-        )
-
-    def _reachable(self) -> str:
-        """What is reachable of the load and of the travel, as sentences."""
         usable = {item.name for item in self.unsuitable if item.count}
         entries = [entry for entry in self.entries if entry.name in usable]
         parts = [text for what in ("load", "travel") if (text := self._greatest(what, entries))]
-        if not parts:
-            return "Change the requirement or the conditions, or give other muscles."
-        return f"Reachable: {' or '.join(parts)}."
+        remedy = "Change the requirement or the conditions, or give other muscles."
+        raise SolveError(
+            f"no muscle meets the requirement of {self.requirement.describe()}: {reasons}{more}. "
+            + (f"Reachable: {' or '.join(parts)}." if parts else remedy)
+        )
 
     def _greatest(self, what: str, entries: list[Entry]) -> str:
         """The largest fraction of a load or travel that one of the entries reaches, as text; empty if there is none.
@@ -173,7 +169,15 @@ def choose(entry: Entry, requirement: Requirement, conditions: SizingConditions,
     if design is None:
         raise SolveError(f"{entry.name}: {search.shortfall(muscle, length)}.")
     choice = MuscleChoice(muscle, length, count, design, requirement, conditions)
-    _check_diameter(choice)
+    limit, diameter = conditions.max_diameter, choice.diameter
+    if limit == SizingConditions.max_diameter:  # no limit was given
+        return choice
+    if diameter is None:
+        raise ParameterError("its diameter is not known, because its law has no geometry")
+    if diameter > limit:
+        raise ParameterError(
+            f"its diameter at the contracted end is {1e3 * diameter:.4g} mm; at most {1e3 * limit:.4g} mm is allowed"
+        )
     return choice
 
 
@@ -214,18 +218,6 @@ def _depends_on_length(entry: Entry, search: Search, lengths: LengthRange) -> bo
     grid = np.linspace(*first.contraction_range, 17)
     short, long = (np.asarray(muscle.force(muscle.pressure_range[1], grid)) for muscle in (first, second))
     return not np.allclose(short, long, rtol=1e-9, atol=1e-9 * float(np.abs(short).max()))
-
-
-def _check_diameter(choice: MuscleChoice) -> None:
-    limit, diameter = choice.conditions.max_diameter, choice.diameter
-    if limit == SizingConditions.max_diameter:  # no limit was given
-        return
-    if diameter is None:
-        raise ParameterError("its diameter is not known, because its law has no geometry")
-    if diameter > limit:
-        raise ParameterError(
-            f"its diameter at the contracted end is {1e3 * diameter:.4g} mm; at most {1e3 * limit:.4g} mm is allowed"
-        )
 
 
 def _any_choice(requirement: Requirement, conditions: SizingConditions, entries: list[Entry]) -> MuscleChoice | None:

@@ -18,7 +18,7 @@ from ...core import AirmuscleError, Array, FileError, SimulationError, atomic_fi
 from ...core.tree import fingerprint
 from ...engine.distribution import DistributedCalls
 from ...engine.processes import check_running
-from ...engine.run import Problem, solve
+from ...engine.run import solve
 from ...engine.run.output_times import output_times
 from ...files.scenario.scenario import Scenario
 from ...recording import Recording
@@ -36,8 +36,11 @@ def simulate_all(scenarios: Sequence[Scenario], times: Array) -> Iterator[Record
     """
     for scenario in scenarios:
         try:
-            problem = dataclasses.replace(scenario.problem, output_times=_output_times(scenario.problem, times))
-            yield solve(problem).raise_if_incomplete().recording
+            problem = scenario.problem
+            within = times[(times >= problem.start_time) & (times < problem.end_time)]
+            instants = np.append(within, problem.end_time)
+            rows = output_times(problem.output_times, problem.start_time, problem.duration, instants)
+            yield solve(dataclasses.replace(problem, output_times=rows)).raise_if_incomplete().recording
         except RUN_ERRORS as error:
             if isinstance(error, SimulationError) and error.interrupted:
                 raise KeyboardInterrupt from None
@@ -48,13 +51,6 @@ def failure_reason(error: Exception) -> str:
     """The reason of a failed run, on one line."""
     kind = "" if isinstance(error, AirmuscleError) else f"{type(error).__name__}: "
     return f"{kind}{' '.join(str(error).split())}"
-
-
-def _output_times(problem: Problem, times: Array) -> Array:
-    """The output times of the problem and those of `times` that lie within the run [s]."""
-    within = times[(times >= problem.start_time) & (times < problem.end_time)]
-    instants = np.append(within, problem.end_time)
-    return output_times(problem.output_times, problem.start_time, problem.duration, instants)
 
 
 _loaded: dict[tuple[str, str], Study] = {}
@@ -170,7 +166,8 @@ def run_study(
     to, SimulationError if a worker process dies.
     """
     files = _chunk_files(study, Path(folder) / CHUNK_FOLDER) if folder is not None else []
-    nominal = _nominal_values(study)  # before the workers start, so that kernels are compiled only once
+    # before the workers start, so that kernels are compiled only once
+    (nominal,) = simulate_all([study.template.scenario], metric_times(study))
     chunks = {index: chunk for index, file in enumerate(files) if (chunk := read_chunk(file))}
     missing = [index for index in study.chunks if index not in chunks]
     done = len(study) - sum(len(study.chunk_runs(index)) for index in missing)
@@ -190,7 +187,7 @@ def run_study(
         np.concatenate([part.scalars for part in parts]),
         {name: np.concatenate([part.time_series[name] for part in parts]) for name in study.time_series},
         tuple(str(reason) for part in parts for reason in part.failure_reasons),
-        nominal,
+        dict.fromkeys(study.scalars, np.nan) if isinstance(nominal, str) else study.scalar_values(nominal),
     )
 
 
@@ -212,9 +209,3 @@ def count_finished_runs(study: Study, folder: Path | str) -> int:
     chunk_folder = Path(folder) / CHUNK_FOLDER
     files = enumerate(chunk_file_names(study))
     return sum(len(study.chunk_runs(index)) for index, name in files if read_chunk(chunk_folder / name) is not None)
-
-
-def _nominal_values(study: Study) -> dict[str, float]:
-    """The scalar metrics of the nominal scenario; NaN if its run fails."""
-    (recording,) = simulate_all([study.template.scenario], metric_times(study))
-    return dict.fromkeys(study.scalars, np.nan) if isinstance(recording, str) else study.scalar_values(recording)

@@ -159,8 +159,15 @@ class Evaluator:
             index = self.index.values(batch.time - batch.time[0], batch.columns, group.scales)
         completed = (batch.status == 0) & np.isfinite(index)
         metrics.index[at] = np.where(completed, index, np.inf).reshape(shape)
-        metrics.air[at] = _air_drawn(batch, group).reshape(shape) / self.duration
-        metrics.travel[at] = _travel(batch, group).reshape(shape) / self.duration
+        drawn = [np.maximum(np.diff(batch[name], axis=1), 0.0).sum(axis=1) for name in group.air_states]
+        air = np.sum(drawn, axis=0) if drawn else np.full(len(batch), np.nan)
+        metrics.air[at] = air.reshape(shape) / self.duration
+        strokes = [
+            np.abs(np.diff(batch[f"{COMMAND}{name}"], axis=1)).sum(axis=1) / (high - low)
+            for name, (low, high) in group.loop.command_ranges(group.plant).items()
+        ]
+        travel = np.where(batch.status == 0, np.sum(strokes, axis=0), np.nan)
+        metrics.travel[at] = travel.reshape(shape) / self.duration
         metrics.completed[at] = completed.reshape(shape)
 
     def _simulate(self, group: CaseGroup, gains: Array) -> BatchSolution:
@@ -194,18 +201,3 @@ def joined_metrics(parts: Sequence[CaseMetrics]) -> CaseMetrics:
     """The metrics of several groups of sets of gains as those of one."""
     fields = ("index", "air", "travel", "completed")
     return CaseMetrics(*(np.concatenate([getattr(each, name) for each in parts]) for name in fields))
-
-
-def _air_drawn(batch: BatchSolution, group: CaseGroup) -> Array:
-    """The sum (N,) of the increments of the air masses [kg] from sample to sample; NaN for a run that ended early."""
-    grown = [np.maximum(np.diff(batch[name], axis=1), 0.0).sum(axis=1) for name in group.air_states]
-    return np.sum(grown, axis=0) if grown else np.full(len(batch), np.nan)
-
-
-def _travel(batch: BatchSolution, group: CaseGroup) -> Array:
-    """The sum (N,) of the changes of the commands from sample to sample, in strokes; NaN for a run that ended early."""
-    strokes = [
-        np.abs(np.diff(batch[f"{COMMAND}{name}"], axis=1)).sum(axis=1) / (high - low)
-        for name, (low, high) in group.loop.command_ranges(group.plant).items()
-    ]
-    return np.where(batch.status == 0, np.sum(strokes, axis=0), np.nan)

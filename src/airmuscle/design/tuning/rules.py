@@ -40,12 +40,6 @@ class RuleSettings:
     def __post_init__(self) -> None:
         check_field_types(self)
 
-    @property
-    def as_gains(self) -> dict[str, float]:
-        """Gain, integral and derivative time under the names of the parameters of PID; without a time that is 0."""
-        named = {"gain": self.gain, "integral_time": self.integral_time, "derivative_time": self.derivative_time}
-        return {name: value for name, value in named.items() if name == "gain" or value > 0}
-
 
 def ziegler_nichols(point: UltimatePoint, *, derivative: bool = True) -> RuleSettings:
     """Settings of a PID or PI controller from the ultimate point (Ziegler and Nichols 1942):
@@ -204,8 +198,10 @@ def rule_settings(model: ProcessModel) -> tuple[RuleSettings, ...]:
 def rule_starts(
     settings: Sequence[RuleSettings], bounds: Mapping[str, tuple[float, float]]
 ) -> tuple[dict[str, float], ...]:
-    """The settings of rules as starts of a search: those gains that are tuned, moved into their bounds."""
-    return tuple(
-        {name: float(np.clip(value, *bounds[name])) for name, value in each.as_gains.items() if name in bounds}
-        for each in settings
-    )
+    """The settings of rules as starts of a search: tuned gains and times other than 0, within their bounds."""
+    starts = []
+    for each in settings:
+        times = {"integral_time": each.integral_time, "derivative_time": each.derivative_time}
+        gains = {"gain": each.gain, **{name: time for name, time in times.items() if time > 0}}
+        starts.append({name: float(np.clip(gains[name], *bounds[name])) for name in gains if name in bounds})
+    return tuple(starts)

@@ -92,7 +92,7 @@ class ScenarioLoop(ShortRepr):
         """
         if given:
             return dict(self._read_bounds(text) for text in given)
-        ranges = {leaf.path: _default_range(leaf) for leaf in _tuned(list(leaves(self.loop.controller)))}
+        ranges = _default_ranges(list(leaves(self.loop.controller)))
         if not ranges:
             name = type(self.loop.controller).__name__
             raise ParameterError(
@@ -109,14 +109,9 @@ class ScenarioLoop(ShortRepr):
         known = {leaf.path: leaf for leaf in leaves(self.loop.controller)}
         path = path.strip()
         check_known(f"bounds '{text}': {type(self.loop.controller).__name__} has no parameter", path, known)
-        unit = self.unit(known[path])
-        first, second = (_read_bound(value, unit, self.ambient, f"bounds '{text}'") for value in (low, high))
+        unit, ambient = self.unit(known[path]), self.scenario.plant.ambient.pressure
+        first, second = (_read_bound(value, unit, ambient, f"bounds '{text}'") for value in (low, high))
         return path, (first, second)
-
-    @property
-    def ambient(self) -> float:
-        """Ambient pressure [Pa] of the plant."""
-        return self.scenario.plant.ambient.pressure
 
     def unit(self, leaf: Leaf) -> str:
         """The unit of a parameter of the controller or of a law inside it."""
@@ -139,7 +134,7 @@ class ScenarioLoop(ShortRepr):
             for key in keys:
                 table = table[key]
             present = table[last] if isinstance(last, int) or last in table else None
-            table[last] = _written(value, present, self.unit(known[path]), self.ambient)
+            table[last] = _written(value, present, self.unit(known[path]), self.scenario.plant.ambient.pressure)
         return tomlkit.dumps(document)
 
     def save(self, gains: Mapping[str, float], path: Path) -> Path:
@@ -176,8 +171,8 @@ def load_scenario_loop(path: str | Path) -> ScenarioLoop:
     return ScenarioLoop(Path(path), Path(path).read_bytes().decode("utf-8-sig"), tables, scenario)
 
 
-def _tuned(known: Sequence[Leaf]) -> list[Leaf]:
-    """The parameters that are tuned by default."""
+def _default_ranges(known: Sequence[Leaf]) -> dict[str, tuple[float, float]]:
+    """The ranges of the parameters that are tuned by default, by path."""
     nonzero = [leaf for leaf in known if leaf.value != 0.0]
     gains = [leaf for leaf in nonzero if leaf.declared.unit == "u/y"]
     gains = gains or [leaf for leaf in nonzero if leaf.declared.unit in ("u", "y")]
@@ -186,13 +181,12 @@ def _tuned(known: Sequence[Leaf]) -> list[Leaf]:
         leaf for leaf in nonzero
         if leaf.declared.unit == "s" and "filter" not in leaf.path and leaf.path.rpartition(".")[0] in laws
     ]  # fmt: skip
-    return [*gains, *times]
-
-
-def _default_range(leaf: Leaf) -> tuple[float, float]:
-    low, high = sorted((leaf.value / SPAN, leaf.value * SPAN))
-    smallest, greatest = leaf.declared.bounds
-    return max(low, smallest), min(high, greatest)
+    ranges = {}
+    for leaf in (*gains, *times):
+        low, high = sorted((leaf.value / SPAN, leaf.value * SPAN))
+        smallest, greatest = leaf.declared.bounds
+        ranges[leaf.path] = max(low, smallest), min(high, greatest)
+    return ranges
 
 
 def _read_bound(text: str, unit: str, ambient: float, where: str) -> float:

@@ -3,7 +3,7 @@
 import dataclasses
 import math
 import warnings
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from ...bench.reported import Reported
@@ -120,8 +120,8 @@ def evaluate(entry: Entry, given: Mapping[str, Any]) -> Evaluation:
             "validity range of the characteristic (airmuscle show)."
         )
     found = Evaluation(entry, point, solved)
-    _check_ratings(found)
-    _warn(found)
+    for message in _warnings(found):
+        warnings.warn(message, AirmuscleWarning, stacklevel=2)
     return found
 
 
@@ -136,31 +136,25 @@ def _check_contraction(law: Characteristic, contraction: float) -> None:
         )
 
 
-def _check_ratings(found: Evaluation) -> None:
-    """Warn of a measured point that the maker does not permit. Raises RatingError for one that was not measured."""
+def _warnings(found: Evaluation) -> Iterator[str]:
+    """That a point is measured but not permitted, slack, or extrapolated.
+
+    Raises RatingError for one that is neither permitted nor measured.
+    """
     point, ratings, limits = found.point, found.entry.ratings, found.validity_range
-    excesses = ratings.excesses(**point._asdict()) if ratings is not None else ()
-    if not excesses:
-        return
-    text = "; ".join(excesses)
-    if limits is None or not limits.contains(point.pressure, point.contraction):
-        raise RatingError(
-            f"beyond the values that the maker permits, and not measured: {text}. Choose a permitted point, or a "
-            "larger muscle."
-        )
-    warnings.warn(f"beyond the values that the maker permits: {text}.", AirmuscleWarning, stacklevel=3)
-
-
-def _warn(found: Evaluation) -> None:
-    point, limits = found.point, found.validity_range
+    is_measured = limits is not None and limits.contains(point.pressure, point.contraction)
+    if excesses := "; ".join(ratings.excesses(**point._asdict()) if ratings is not None else ()):
+        if not is_measured:
+            raise RatingError(
+                f"beyond the values that the maker permits, and not measured: {excesses}. Choose a permitted point, or "
+                "a larger muscle."
+            )
+        yield f"beyond the values that the maker permits: {excesses}."
     if point.force < 0:
-        warnings.warn("the force is negative; a muscle cannot push and is slack here.", AirmuscleWarning, stacklevel=3)
-    if limits is not None and not limits.contains(point.pressure, point.contraction):
-        (p_low, p_high), contractions = limits.pressure, map(contraction_text, limits.contraction)
-        warnings.warn(
-            "the operating point is outside the validity range of the characteristic, "
-            f"{p_low / 1e3:.4g} to {p_high / 1e3:.4g} kPa and {' to '.join(contractions)}: the result is an "
-            "extrapolation.",
-            AirmuscleWarning,
-            stacklevel=3,
+        yield "the force is negative; a muscle cannot push and is slack here."
+    if limits is not None and not is_measured:
+        (low, high), contractions = limits.pressure, map(contraction_text, limits.contraction)
+        yield (
+            f"the operating point is outside the validity range of the characteristic, {low / 1e3:.4g} to "
+            f"{high / 1e3:.4g} kPa and {' to '.join(contractions)}: the result is an extrapolation."
         )

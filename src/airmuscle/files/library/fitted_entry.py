@@ -24,7 +24,7 @@ from .entry import MISSING_GEOMETRY, Entry
 from .entry_file import load_law
 from .fields import model_class, model_names
 from .files import is_path
-from .scaling import scale_to_length
+from .scaling import entry_at_length
 from .uncertainty import ParameterUncertainty, StatedBand
 
 MAX_NAMES, MAX_NAME = 3, 60
@@ -47,7 +47,8 @@ def find_initial_law(
     initial values cannot be estimated, and for an entry that cannot be scaled.
     """
     if name not in model_names():
-        return InitialLaw(_at_length_of(_load_law(name), recordings, f"{option} {name}"))
+        entry, lengths = _load_law(name), resting_lengths(recordings)
+        return InitialLaw(entry_at_length(entry, *lengths, f"{option} {name}") if len(lengths) == 1 else entry)
     cls = model_class(name, option)
     if not issubclass(cls, Characteristic):
         laws = ", ".join(model_names(Characteristic))
@@ -83,16 +84,6 @@ def resting_lengths(recordings: Sequence[Recording]) -> tuple[float, ...]:
     return tuple(sorted({float(length) for length in stated if length is not None}))
 
 
-def _at_length_of(entry: Entry, recordings: Sequence[Recording], where: str) -> Entry:
-    """The entry with law and geometry at the resting length of the data, if these state exactly one."""
-    lengths = resting_lengths(recordings)
-    if len(lengths) != 1:
-        return entry
-    law = scale_to_length(entry.characteristic, lengths[0], where)
-    geometry = None if entry.geometry is None else scale_to_length(entry.geometry, lengths[0], where)
-    return dataclasses.replace(entry, characteristic=law, geometry=geometry)
-
-
 def fitted_entry(
     result: Fit, initial: Entry, files: Sequence[Path], error_ratio: float = 1.0, recordings: Sequence[Recording] = (),
     errors: SpecimenErrors | None = None,
@@ -106,7 +97,9 @@ def fitted_entry(
     texts = {quantity.name: value_text(quantity) for quantity in result.goodness()}
     names = list_files([f.name for f in files])
     note = f"Fitted to {names}: rms error {texts['rms error']}, maximum error {texts['maximum error']}."
-    geometry = fitted_geometry(initial, result.model)
+    geometry, inside = initial.geometry, getattr(result.model, "geometry", None)
+    if isinstance(inside, Geometry) and (geometry is None or type(geometry) is type(inside)):
+        geometry = inside  # the law was fitted with it
     title = f"{type(result.model).__name__} fitted to {list_files([f.stem for f in files])}"
     entry = dataclasses.replace(
         initial, name="muscle", title=title, provenance="fitted", note=note, warning="", characteristic=result.model,
@@ -166,15 +159,6 @@ def list_files(names: Sequence[str]) -> str:
     if len(short) <= MAX_NAMES:
         return ", ".join(short)
     return f"{len(short)} files, {short[0]} to {short[-1]}"
-
-
-def fitted_geometry(initial: Entry, law: object) -> Geometry | None:
-    """The geometry of a muscle after the fit of its law: that inside the law, unless the muscle has one of another
-    kind."""
-    inside = getattr(law, "geometry", None)
-    if isinstance(inside, Geometry) and (initial.geometry is None or type(initial.geometry) is type(inside)):
-        return inside
-    return initial.geometry
 
 
 def missing_geometry(entry: Entry) -> list[str]:

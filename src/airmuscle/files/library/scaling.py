@@ -42,7 +42,10 @@ def scale_entry(
         ("diameter", diameter, _with_diameter), ("resting length", resting_length, _with_resting_length),
     ):  # fmt: skip
         if value is not None:
-            size = _positive(value, f"{entry.name}, {what}")
+            where = f"{entry.name}, {what}"
+            size = quantity(value, "m", where=where) if isinstance(value, str) else float(value)
+            if not size > 0.0:
+                raise ParameterError(f"{where} is {value}; it must be greater than zero.")
             entry = scaled(entry, size)
             sizes.append(f"a {what} of {1e3 * size:.4g} mm")
     parts = [part for part in OPTIONAL_PARTS if getattr(entry, part) is not None]
@@ -62,13 +65,6 @@ def _fitted_values(entry: Entry) -> list[float]:
     return [values[name] for name in names if name in values]
 
 
-def _positive(value: float | str, where: str) -> float:
-    size = quantity(value, "m", where=where) if isinstance(value, str) else float(value)
-    if not size > 0.0:
-        raise ParameterError(f"{where} is {value}; it must be greater than zero.")
-    return size
-
-
 def own_length(entry: Entry) -> float | None:
     """Resting length [m] of the law or geometry of an entry; None if it has none."""
     parts = (part for part in (entry.characteristic, entry.geometry) if part is not None)
@@ -85,12 +81,14 @@ def _with_resting_length(entry: Entry, length: float) -> Entry:
     excesses = entry.ratings.excesses(length=length) if entry.ratings is not None else ()
     if excesses:
         raise ParameterError(f"{entry.name}: {excesses[0]}. Choose a nominal length that the maker supplies.")
-    where = f"{entry.name}, resting length"
-    return dataclasses.replace(
-        entry,
-        characteristic=scale_to_length(entry.characteristic, length, where),
-        geometry=None if entry.geometry is None else scale_to_length(entry.geometry, length, where),
-    )
+    return entry_at_length(entry, length, f"{entry.name}, resting length")
+
+
+def entry_at_length(entry: Entry, length: float, where: str) -> Entry:
+    """The entry with law and geometry at a resting length [m]. Raises ParameterError as `scale_to_length`."""
+    law = scale_to_length(entry.characteristic, length, where)
+    geometry = None if entry.geometry is None else scale_to_length(entry.geometry, length, where)
+    return dataclasses.replace(entry, characteristic=law, geometry=geometry)
 
 
 def _with_diameter(entry: Entry, diameter: float) -> Entry:

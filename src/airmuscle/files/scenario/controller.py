@@ -14,7 +14,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from ...core import Input, Parameter, ParameterError, abridged, is_known_unit, parameters
-from ...engine.loop import ControlLoop, InputSignal, check_input_names, check_present
+from ...engine.loop import ControlLoop, check_input_names, check_present
 from ...engine.loop.controller import RELATIVE, Controller, SignalRelated, named_signal_units, parameter_units, unit_of
 from ...physics.mechanism.base import Mechanism
 from ...physics.muscle import Muscle
@@ -168,7 +168,12 @@ def build_control_loop(
     stated = {key: value for key, value in controller_table.items() if key in LOOP_KEYS}
     keys: LoopTable = build(stated, inner, kind=LoopTable)
     controller = build_law(own, plant, units, inner, keys.sample_time)
-    setpoint = _build_setpoint(keys.setpoint, controller, units, inner.inside("setpoint"))
+    place = inner.inside("setpoint")
+    if "drivers" in keys.setpoint:
+        raise ParameterError(f"{place}: a set point has no drivers; write [input.drivers] for those of the inputs.")
+    known = {**named_signal_units(controller), **{name: unit for name, unit in units.items() if unit}}
+    setpoints = [Input(name, known.get(name) or "1", -math.inf, math.inf) for name in controller.setpoints]
+    setpoint = build_input_signal(keys.setpoint, setpoints, place, "the controller has no set point")
     other_inputs = {key: value for key, value in table.items() if key not in ("controller", "drivers")}
     other_signal = build_input_signal(other_inputs, plant.input_variables, location)
     drivers = read_drivers(table.get("drivers", {}), plant, location.at("drivers"))
@@ -178,16 +183,6 @@ def build_control_loop(
         loop = ControlLoop(controller, keys.sample_time, setpoint, other_signal, drivers)
         loop.check_columns([name for name in units if name not in plant.inputs], plant.inputs)
     return loop
-
-
-def _build_setpoint(
-    table: Mapping[str, Any], controller: Controller, units: Mapping[str, str], location: Location
-) -> InputSignal:
-    if "drivers" in table:
-        raise ParameterError(f"{location}: a set point has no drivers; write [input.drivers] for those of the inputs.")
-    known = {**named_signal_units(controller), **{name: unit for name, unit in units.items() if unit}}
-    setpoints = [Input(name, known.get(name) or "1", -math.inf, math.inf) for name in controller.setpoints]
-    return build_input_signal(table, setpoints, location, "the controller has no set point")
 
 
 def controller_number_paths(

@@ -72,7 +72,11 @@ class Record:
         if "file" in table:  # absolute, because the table is also written to other folders
             table["file"] = str((self.location.folder / str(table["file"])).resolve())
         in_input = self.location.inside("input")
-        recording = self._cut(self._read_recording(row, observed) if self.given is None else self.given, row)
+        recording = self._read_recording(row, observed) if self.given is None else self.given
+        kept = (recording["time"] >= row.first) & (recording["time"] <= row.last)
+        if not kept.any():
+            raise ParameterError(f"{recording.origin}: no row from first, {row.first:g} s, to last, {row.last:g} s.")
+        recording = recording.rows(kept)
         plant = self._build_plant(recording, row)
         with ambient_pressure(plant.ambient.pressure):
             signal = build_input_signal(table, plant.input_variables, in_input)
@@ -104,13 +108,6 @@ class Record:
             if len(runs) != 1:
                 raise ParameterError(f"{row.file} contains {len(runs)} runs; give one file for each record.")
             return with_observed(runs[0], observed, self.shared)
-
-    def _cut(self, recording: Recording, row: RecordTable) -> Recording:
-        """The rows from the time `first` to the time `last`."""
-        kept = (recording["time"] >= row.first) & (recording["time"] <= row.last)
-        if not kept.any():
-            raise ParameterError(f"{recording.origin}: no row from first, {row.first:g} s, to last, {row.last:g} s.")
-        return recording.rows(kept)
 
 
 def build_records(

@@ -15,7 +15,7 @@ from ...bench.identify.group_refits import LEVEL, degrees_of_freedom, root_mean_
 from ...bench.identify.prediction import PlantUncertainty
 from ...bench.identify.prediction.dynamic import NORMAL_QUANTILE
 from ...bench.segment import estimate_noise, maximum_rate
-from ...core import ParameterError, tree
+from ...core import Array, ParameterError, tree
 from ...physics.plant.plant import Plant
 from ..library import Location, ParameterUncertainty, custom_field, located_errors
 from .values import BySignal, table_reader
@@ -42,21 +42,18 @@ def fit_uncertainty(fit: DynamicFit, cross: Sequence[Mapping[str, float]] = ()) 
         joint = root_mean_square([fit.rms(name, i) for i in range(len(models))])
         predicted = [each[name] for each in cross if name in each]
         error = max([joint, *([root_mean_square(predicted)] if predicted else [])])
-        deviations[name] = error * tail_factor(fit, name)
+        residuals = [fit.residuals(i)[name] for i in range(len(models))]
+        residuals = [each[np.isfinite(each)] for each in residuals]
+        deviations[name] = error * _tail_factor(np.concatenate(residuals))
         if len(predicted) > 1:
-            factors[name] = t_quantile(degrees_of_freedom(error, _noise(fit, name), len(predicted)))
+            noise = root_mean_square([estimate_noise(each) for each in residuals])  # contains no error of the model
+            factors[name] = t_quantile(degrees_of_freedom(error, noise, len(predicted)))
     known = {name: value for name, value in deviations.items() if value > 0.0}
     records = [model.experiment.recording for model in models]
     table: dict[str, Any] = {"deviations": known, "records": len(models), **({"factors": factors} if factors else {})}
     columns = {name: np.concatenate([record[name] for record in records]) for name in deviations}
     ranges = {name: [float(np.nanmin(each)), float(np.nanmax(each))] for name, each in columns.items()}
     return {**table, "ranges": ranges, "rates": {n: maximum_rate(records, n) for n in deviations}, **_covariance(fit)}
-
-
-def _noise(fit: DynamicFit, name: str) -> float:
-    """The rms noise of a quantity [SI] from the second differences of its residuals, which contain no model error."""
-    residuals = [fit.residuals(i)[name] for i in range(len(fit.problem.record_models))]
-    return root_mean_square([estimate_noise(each[np.isfinite(each)]) for each in residuals])
 
 
 def _covariance(fit: DynamicFit) -> dict[str, Any]:
@@ -92,10 +89,8 @@ def uncertainty_table(found: PlantUncertainty) -> dict[str, Any]:
     return {"deviations": found.deviations, **dataclasses.asdict(parameter_uncertainty(found))}
 
 
-def tail_factor(fit: DynamicFit, name: str) -> float:
-    """The 95 % quantile of the residuals of a quantity over that of a normal distribution of their rms; at least 1."""
-    residuals = np.concatenate([fit.residuals(i)[name] for i in range(len(fit.problem.record_models))])
-    residuals = residuals[np.isfinite(residuals)]
+def _tail_factor(residuals: Array) -> float:
+    """The 95 % quantile of residuals (N,) over that of a normal distribution of their rms; at least 1."""
     rms = float(np.sqrt(np.mean(residuals**2)))
     return 1.0 if rms == 0.0 else max(float(np.quantile(np.abs(residuals), LEVEL)) / (NORMAL_QUANTILE * rms), 1.0)
 

@@ -57,8 +57,14 @@ class PlantModel:
         scenario states. Raises ColumnError for a recording without a predictable quantity, ParameterError otherwise.
         """
         with located_errors(recording.origin):
-            recording = self._with_observed(recording)
-            names = self.predicted_names(recording)
+            headings = [split_unit(heading)[0] for heading in recording]
+            kept = {name: observed for name, observed in self._observed.items() if observed[1] in headings}
+            recording = with_observed(recording, kept, self.scenario.plant)
+            plant_columns = [n for kind in PREDICTABLE for n in self._outputs() if n.rpartition(".")[2] == kind]
+            known = self._observed or plant_columns
+            names = [name for name in known if name in recording]
+            if not names:
+                raise ColumnError(f"no column can be predicted; the plant gives {', '.join(known)}.")
             row = {"start_time": start_time, "initial_state": self._initial_state(recording)}
         place = Location(recording.origin, "", self.location.folder)
         experiment, _ = Record(row, place, self.tables, self.scenario.plant, recording, True).build_experiment({})
@@ -89,20 +95,6 @@ class PlantModel:
         uncertainty = self.scenario.uncertainty
         stated = () if uncertainty is None else uncertainty.deviations
         return {name: (0.0, name) for name in stated} | dict(self.scenario.observed)
-
-    def _with_observed(self, recording: Recording) -> Recording:
-        """The recording with those columns of the fit that it has under the names of the outputs."""
-        columns = [split_unit(heading)[0] for heading in recording]
-        kept = {name: observed for name, observed in self._observed.items() if observed[1] in columns}
-        return with_observed(recording, kept, self.scenario.plant)
-
-    def predicted_names(self, recording: Recording) -> tuple[str, ...]:
-        """The quantities to predict: the recorded ones of the fit, else all of the plant. Raises ColumnError."""
-        known = self._observed or [n for kind in PREDICTABLE for n in self._outputs() if n.rpartition(".")[2] == kind]
-        names = tuple(name for name in known if name in recording)
-        if not names:
-            raise ColumnError(f"no column can be predicted; the plant gives {', '.join(known)}.")
-        return names
 
     def _outputs(self) -> Mapping[str, Any]:
         plant = self.scenario.plant

@@ -151,33 +151,30 @@ def build_scenario(
         required_table(tables, key, location)
     plant = plant or build_plant(tables["plant"], location.inside("plant"))
     with ambient_pressure(plant.ambient.pressure):  # that of the texts
-        read = table_reader(plant).build(tables, location, {"plant": plant}, kind=ScenarioTables)
-        return _build_run(tables, read, location, equilibrium)
-
-
-def _build_run(
-    tables: Mapping[str, Any], read: ScenarioTables, location: Location, equilibrium: dict[str, float] | None
-) -> Scenario:
-    run, plant, in_input = read.run, read.plant, location.inside("input")
-    signal: InputSignal | ControlLoop | None = None
-    if "controller" not in read.input:  # before the search for an equilibrium, from which units of a loop follow
-        signal = build_input_signal(read.input, plant.input_variables, in_input)
-    place = location.inside("run").inside("initial_state")
-    initial_state = build_initial_state(run.initial_state, plant, place, equilibrium)
-    if signal is None:
-        signal = build_control_loop(read.input, plant, signal_units(plant, initial_state), in_input)
-    with located_errors(in_input):
-        problem = Problem(plant, signal, run.duration, initial_state, run.start_time, run.output_times, run.integrator)
-    known = list(run_column_units(problem))
-    check_known(f"{location.inside('output')}: the run has no column", read.output.columns, known)
-    return Scenario(
-        title=read.title.strip() or Path(location.file).stem,
-        problem=problem,
-        columns=read.output.columns,
-        uncertainty=read.uncertainty,
-        observed=read.observed,
-        defaults=tuple(field.name for field in dataclasses.fields(RunTable) if field.name not in tables["run"]),
-    )
+        reader = table_reader(plant)
+        read: ScenarioTables = reader.build(tables, location, {"plant": plant}, kind=ScenarioTables)
+        run, in_input = read.run, location.inside("input")
+        signal: InputSignal | ControlLoop | None = None
+        if "controller" not in read.input:  # before the search for an equilibrium, from which units of a loop follow
+            signal = build_input_signal(read.input, plant.input_variables, in_input)
+        place = location.inside("run").inside("initial_state")
+        initial_state = build_initial_state(run.initial_state, plant, place, equilibrium)
+        if signal is None:
+            signal = build_control_loop(read.input, plant, signal_units(plant, initial_state), in_input)
+        with located_errors(in_input):
+            problem = Problem(
+                plant, signal, run.duration, initial_state, run.start_time, run.output_times, run.integrator
+            )
+        known = list(run_column_units(problem))
+        check_known(f"{location.inside('output')}: the run has no column", read.output.columns, known)
+        return Scenario(
+            title=read.title.strip() or Path(location.file).stem,
+            problem=problem,
+            columns=read.output.columns,
+            uncertainty=read.uncertainty,
+            observed=read.observed,
+            defaults=tuple(field.name for field in dataclasses.fields(RunTable) if field.name not in tables["run"]),
+        )
 
 
 def run_column_units(problem: Problem) -> dict[str, str]:
