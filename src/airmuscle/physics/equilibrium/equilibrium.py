@@ -10,9 +10,10 @@ import numpy.typing as npt
 from ...core import AirmuscleError, Array, EquilibriumError, ParameterError, System, one_line, quantity
 from ...engine.compile.program import CompiledSystem, compile_system
 from ...engine.loop.inputs import check_input_names
+from ..plant.static_plant import StaticPlant
 from .single_dof import GRID_POINTS, equilibria_of_one_coordinate, grid
 from .stability import are_stable, equilibria_of_several_coordinates, no_equilibrium
-from .statics import Rows, StaticPlant, Statics
+from .statics import Rows, Statics
 
 MuscleValues: TypeAlias = float | str | Sequence[float | str] | None
 """One number for all muscles, or one for each; None where the other quantity is given."""

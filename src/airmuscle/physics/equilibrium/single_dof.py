@@ -1,6 +1,6 @@
 """Equilibria of plants with one coordinate: grid over the permitted range, and roots between its points."""
 
-import dataclasses
+import functools
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -26,48 +26,33 @@ def equilibria_of_one_coordinate(statics: Statics) -> tuple[Rows, Array]:
     Plants in equilibrium at every point of the grid, or without a permitted point, have none.
     """
     x = grid(statics)
-    line = Line(statics)
-    f = line.accelerations(x)
+    f = _accelerations(statics, x)
     plain = np.flatnonzero(((f != 0.0) & np.isfinite(f)).any(axis=1))
     if not plain.size:
         return plain, np.empty((0, 1))
-    balanced, place = balances(line if plain.size == len(f) else line.of(plain), x[plain], f[plain])
+    balanced, place = balances(statics if plain.size == len(f) else statics.of(plain), x[plain], f[plain])
     return plain[balanced], place[:, None]
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Line:
-    """Plants as functions of their one coordinate, at one point each (N,) or at several (N, K)."""
+def _places(x: Array) -> Array:
+    """Values of the one coordinate, (N,) or (N, K), as coordinates (N, K, 1) of the plants."""
+    return x.reshape(len(x), -1, 1)
 
-    statics: Statics
 
-    def of(self, rows: Rows) -> "Line":
-        """Some of the plants."""
-        return Line(self.statics.of(rows))
-
-    def accelerations(self, x: Array) -> Array:
-        """Acceleration from rest."""
-        return self.statics.accelerations(x.reshape(len(x), -1, 1)).reshape(x.shape)
-
-    def contractions(self, x: Array) -> list[Array]:
-        """Contraction of every muscle (N, K) at coordinates (N, K)."""
-        return self.statics.contractions(x[..., None])
-
-    def within_reach(self, x: Array) -> npt.NDArray[np.bool_]:
-        """Whether the contraction of every muscle is permitted at coordinates (N, K)."""
-        return self.statics.within_reach(x[..., None])
+def _accelerations(plants: Statics, x: Array) -> Array:
+    """Acceleration from rest at one point each (N,) or at several (N, K)."""
+    return plants.accelerations(_places(x)).reshape(x.shape)
 
 
 def grid(statics: Statics) -> Array:
     """Permitted coordinates (N, K) in ascending order; rows with fewer than K end with NaN."""
-    line = Line(statics)
-    low, high, linear = _ends_if_linear(line)
+    low, high, linear = _ends_if_linear(statics)
     x = np.linspace(low, high, GRID_POINTS, axis=1)
     x[~(low < high)] = np.nan
     if linear.all():
         return x
     nonlinear = np.flatnonzero(~linear)
-    part = _inside(line.of(nonlinear))
+    part = _inside(statics.of(nonlinear))
     rows = np.full((len(x), max(part.shape[1], GRID_POINTS)), np.nan)
     rows[:, :GRID_POINTS] = x
     rows[nonlinear] = np.nan
@@ -75,12 +60,12 @@ def grid(statics: Statics) -> Array:
     return rows
 
 
-def _ends_if_linear(line: Line) -> tuple[Array, Array, npt.NDArray[np.bool_]]:
+def _ends_if_linear(plants: Statics) -> tuple[Array, Array, npt.NDArray[np.bool_]]:
     """Both ends of the range (N,), and whether the contractions are linear functions of the coordinate."""
-    size, low, high = line.statics.limits(0)
+    size, low, high = plants.limits(0)
     linear = np.ones(size.shape, dtype=bool)
-    at = [line.contractions(k * size) for k in (0.0, 1.0, -3.0)]
-    for zero, one, other, reach in zip(*at, line.statics.contraction_limits, strict=True):
+    at = [plants.contractions(_places(k * size)) for k in (0.0, 1.0, -3.0)]
+    for zero, one, other, reach in zip(*at, plants.contraction_limits, strict=True):
         rate = (one - zero) / size
         linear &= np.abs(other - (zero - 3.0 * size * rate)) <= 1e-12
         with np.errstate(divide="ignore", invalid="ignore"):
@@ -90,15 +75,15 @@ def _ends_if_linear(line: Line) -> tuple[Array, Array, npt.NDArray[np.bool_]]:
     return low[:, 0], high[:, 0], linear[:, 0]
 
 
-def _inside(line: Line) -> Array:
+def _inside(plants: Statics) -> Array:
     """Permitted points of an even grid, and both ends of every interval of them; then NaN."""
-    _, low, high = line.statics.limits(0)
+    _, low, high = plants.limits(0)
     with np.errstate(invalid="ignore"):
         x = np.linspace(low[:, 0], high[:, 0], GRID_POINTS, axis=1)
-    inside = line.within_reach(x)
+    inside = plants.within_reach(_places(x))
     rows, i = np.nonzero(inside[:, :-1] != inside[:, 1:])
     first = inside[rows, i]
-    edges = _edges(line.of(rows), *(np.where(first, x[rows, i + k], x[rows, i + 1 - k]) for k in (0, 1)))
+    edges = _edges(plants.of(rows), *(np.where(first, x[rows, i + k], x[rows, i + 1 - k]) for k in (0, 1)))
     columns = np.full((len(x), np.bincount(rows, minlength=1).max(initial=0)), np.nan)
     columns[rows, np.arange(rows.size) - np.searchsorted(rows, rows)] = edges
     places = np.sort(np.hstack([np.where(inside, x, np.nan), columns]), axis=1)
@@ -106,16 +91,16 @@ def _inside(line: Line) -> Array:
     return np.sort(places, axis=1)
 
 
-def _edges(line: Line, inside: Array, outside: Array) -> Array:
+def _edges(plants: Statics, inside: Array, outside: Array) -> Array:
     """Last permitted coordinate (R,) between a permitted one and one that is not, by bisection."""
     for _ in range(60 if inside.size else 0):
         middle = 0.5 * (inside + outside)
-        there = line.within_reach(middle[:, None])[:, 0]
+        there = plants.within_reach(_places(middle))[:, 0]
         inside, outside = np.where(there, middle, inside), np.where(there, outside, middle)
     return inside
 
 
-def balances(plants: Line, x: Array, f: Array) -> tuple[Rows, Array]:
+def balances(plants: Statics, x: Array, f: Array) -> tuple[Rows, Array]:
     """Rows of the plants and coordinates of all roots, in ascending order, from accelerations f (N, K) at ascending x.
 
     Roots are the points with f = 0 (both ends of an interval with f = 0), one point between neighbours of different
@@ -138,27 +123,27 @@ def balances(plants: Line, x: Array, f: Array) -> tuple[Rows, Array]:
     return row[order], place[order]
 
 
-def _roots(plants: Line, f: Array, rows: Rows, low: Array, high: Array) -> tuple[Rows, Array]:
+def _roots(plants: Statics, f: Array, rows: Rows, low: Array, high: Array) -> tuple[Rows, Array]:
     """The roots between points of different sign; there is none where the function passes through infinity."""
     if not rows.size:
         return rows, low
     there = plants.of(rows)
     root = between(there, low, high)
-    left, size = np.abs(there.accelerations(root)), np.abs(f)[rows]
+    left, size = np.abs(_accelerations(there, root)), np.abs(f)[rows]
     kept = left <= JUMP * np.nanmin(size, axis=1)
     doubtful = np.flatnonzero(~kept)
     kept[doubtful] = left[doubtful] <= JUMP * np.nanmedian(size[doubtful], axis=1)
     return rows[kept], root[kept]
 
 
-def between(plants: Line, low: Array, high: Array) -> Array:
+def between(plants: Statics, low: Array, high: Array) -> Array:
     """The roots between points (R,) of different sign by the false position method (Illinois variant)."""
-    search = _Search(np.arange(low.size), low, high, plants.accelerations(low), plants.accelerations(high), low)
+    search = _Search(np.arange(low.size), low, high, _accelerations(plants, low), _accelerations(plants, high), low)
     close = np.maximum(CLOSE * (high - low), np.spacing(np.maximum(np.abs(low), np.abs(high))))
     roots, ended = low.copy(), np.zeros(low.size, dtype=bool)
     for _ in range(200):
         middle = search.middle()
-        at = plants.accelerations(middle)
+        at = _accelerations(plants, middle)
         roots[search.rows] = np.where(ended, roots[search.rows], middle)
         inside = (search.low < middle) & (middle < search.high)
         ended |= (at == 0.0) | (np.abs(middle - search.last) <= close[search.rows]) | ~inside
@@ -214,11 +199,11 @@ def _nears_zero(f: Array) -> npt.NDArray[np.bool_]:
     return np.asarray(one_sign & (b <= np.minimum(a, c)) & (b < np.maximum(a, c)))
 
 
-def _pairs(plants: Line, f: Array, rows: Rows, x: Array, sign: Array) -> list[tuple[Rows, Array]]:
+def _pairs(plants: Statics, f: Array, rows: Rows, x: Array, sign: Array) -> list[tuple[Rows, Array]]:
     """The two roots between three points x (3, R) of equal sign, if the function crosses zero twice there."""
     if not rows.size:
         return []
-    turn = _across(plants.of(rows).accelerations, x[0], x[2], sign)
+    turn = _across(functools.partial(_accelerations, plants.of(rows)), x[0], x[2], sign)
     there = np.isfinite(turn)
     rows, x, turn = rows[there], x[:, there], turn[there]
     return [_roots(plants, f, rows, low, high) for low, high in ((x[0], turn), (turn, x[2]))]

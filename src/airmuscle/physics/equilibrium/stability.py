@@ -8,8 +8,9 @@ import numpy.typing as npt
 
 from ...core import Array, EquilibriumError, GeometryLimitError, PhysicsError
 from ...engine.compile.program import CompiledSystem, Program
+from ..plant.static_plant import StaticPlant
 from .single_dof import grid
-from .statics import MAX_PRESSURE, Rows, StaticPlant, Statics
+from .statics import MAX_PRESSURE, Rows, Statics
 
 MARGIN = 1e-9
 """Real part of an eigenvalue, relative to the largest eigenvalue, up to which it counts as zero (chosen)."""

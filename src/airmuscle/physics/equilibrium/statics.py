@@ -1,61 +1,20 @@
 """Statics of plants: states at rest and residual accelerations as functions of the coordinates."""
 
-import abc
 import dataclasses
 import functools
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from ...core import AirmuscleError, Array, System, Value, Values, ops, tree
+from ...core import AirmuscleError, Array, Value, ops, tree
 from ...engine.compile.cache.kernel import evaluate_rates
 from ...engine.compile.program import CompiledSystem
-from ..mechanism import Mechanism
 from ..muscle import Muscle
-from ..pneumatics.gas import Ambient, Gas, absolute_pressure, gauge_pressure
-
-
-class StaticPlant(System):
-    """A system of muscles that act on a mechanism; its only implementation is the Plant, which imports this package."""
-
-    mechanism: Mechanism
-    gas: Gas
-    ambient: Ambient
-
-    @property
-    @abc.abstractmethod
-    def muscles(self) -> tuple[Muscle, ...]:
-        """The muscles, one or more."""
-
-    @property
-    @abc.abstractmethod
-    def prefixes(self) -> tuple[str, ...]:
-        """Prefixes of the names of each muscle's quantities."""
-
-    @property
-    @abc.abstractmethod
-    def resting_lengths(self) -> list[Value]:
-        """Resting length [m] of each muscle."""
-
-    @abc.abstractmethod
-    def muscle_states(self, state: Values) -> tuple[Any, ...]:
-        """Every muscle at a state."""
-
-    @abc.abstractmethod
-    def state_at(self, *, pressure: float | str | Sequence[float | str], **values: float | str) -> dict[str, float]:
-        """A state by the gauge pressure of each muscle, and by states by name."""
-
-    @abc.abstractmethod
-    def settle_muscles(self, pressures: Sequence[Value], state: Values) -> tuple[dict[str, Value], list[Value]]:
-        """`state` with the muscles' own states in steady state, and the volume [m3] of each muscle."""
-
-    @abc.abstractmethod
-    def fill_muscles(self, pressures: Sequence[Value], volumes: Sequence[Value], state: Values) -> dict[str, Value]:
-        """`state` with air at these gauge pressures [Pa] in these volumes [m3], and circuits settled."""
-
+from ..plant.static_plant import StaticPlant
+from ..pneumatics.gas import absolute_pressure, gauge_pressure
 
 MAX_PRESSURE = 1e8
 """Maximum absolute pressure [Pa] of the search."""

@@ -1,12 +1,11 @@
 """State of the muscles of a plant: one instant, steady state, evaluation of the whole plant."""
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
-from ...core import StateVariable, Value, Values, select_prefix, with_prefix
+from ...core import StateVariable, Value, Values
 from ..muscle import Muscle
 from ..muscle.friction import NoFriction
-from ..pneumatics import Air, Ambient, CircuitFlows, Flow, Gas, absolute_pressure, gauge_pressure
+from ..pneumatics import Air, Ambient, CircuitFlows, Flow, Gas, gauge_pressure
 
 _TYPICAL_CONTRACTION = 0.05
 """Contraction whose muscle volume defines the nominal value of the air mass (chosen)."""
@@ -74,32 +73,6 @@ def states_of_muscle(prefix: str, muscle: Muscle, states: tuple[StateVariable, .
 def air_states(muscle: Muscle, gas: Gas, ambient: Ambient) -> tuple[StateVariable, ...]:
     """States of the air in a muscle, by their own names."""
     return gas.states(muscle.geometry.volume(_TYPICAL_CONTRACTION), ambient)
-
-
-def settle_muscles(
-    muscles: Sequence[Muscle], prefixes: Sequence[str], contractions: Sequence[Value], pressures: Sequence[Value],
-    state: Values,
-) -> tuple[dict[str, Value], list[Value]]:  # fmt: skip
-    """`state` with the muscles' own states, in steady state unless they are given, and the volume [m3] of each."""
-    settled, volumes = dict(state), []
-    for muscle, prefix, pressure, contraction in zip(muscles, prefixes, pressures, contractions, strict=True):
-        own = {**muscle.steady_state(pressure, contraction), **select_prefix(prefix, state)}
-        volumes.append(muscle.volume(muscle.inner_contraction(contraction, own), own))
-        settled = {**with_prefix(prefix, own), **settled}
-    return settled, volumes
-
-
-def fill_muscles(
-    gas: Gas, ambient: Ambient, prefixes: Sequence[str], pressures: Sequence[Value], volumes: Sequence[Value]
-) -> tuple[dict[str, Value], list[Air]]:
-    """The states of the air at gauge pressures [Pa] in volumes [m3], and the air itself."""
-    filled: dict[str, Value] = {}
-    airs = []
-    for prefix, pressure, volume in zip(prefixes, pressures, volumes, strict=True):
-        content = gas.state_at(absolute_pressure(pressure, ambient), volume, ambient)
-        airs.append(gas.air(content, volume, ambient))
-        filled |= with_prefix(prefix, content)
-    return filled, airs
 
 
 class PlantEvaluation(NamedTuple):

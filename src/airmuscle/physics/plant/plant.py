@@ -1,9 +1,8 @@
 """Plant: muscles, the circuits that feed them, the mechanism that they act on, and the ambient air."""
 
 import functools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from types import MappingProxyType
 from typing import Any, ClassVar
 
 from ...core import (
@@ -14,28 +13,18 @@ from ...core import (
     GeometryLimitError,
     Value,
     Values,
-    check_known,
     model,
 )
 from ...core.system import Input, StateVariable, add_prefix, select_prefix, with_prefix
 from ..equilibrium.equilibrium import equilibria_at_ambient_pressure, equilibrium_at_ambient_pressure
-from ..equilibrium.statics import StaticPlant
 from ..mechanism import Mechanism
 from ..muscle import Muscle
-from ..pneumatics import DEFAULT_GAS, Air, Ambient, Circuit, CircuitFlows, Gas, key_by_muscle, key_by_port
+from ..pneumatics import DEFAULT_GAS, Ambient, Circuit, CircuitFlows, Gas
 from . import diagnostics
 from .display import PlantDisplay
-from .muscle_state import (
-    MuscleState,
-    PlantEvaluation,
-    air_states,
-    fill_muscles,
-    muscle_outputs,
-    muscle_state,
-    settle_muscles,
-    states_of_muscle,
-)
-from .validation import as_quantity, check_parts, check_pressures, check_unique, convert_pressures
+from .muscle_state import MuscleState, PlantEvaluation, air_states, muscle_outputs, states_of_muscle
+from .static_plant import StaticPlant
+from .validation import check_parts, check_unique, convert_pressures
 
 _AIR_STATES = ("air_mass", "internal_energy")
 _ROUNDING = 1e-3
@@ -63,35 +52,6 @@ class Plant(PlantDisplay, StaticPlant):
         check_parts(self.muscles, self.circuit, self.circuits, self.mechanism, self.gas, self.ambient)
         convert_pressures(self)
         check_unique([*(s.name for s in self.states), *self.inputs])
-
-    @functools.cached_property
-    def muscles(self) -> tuple[Muscle, ...]:
-        """The muscles, one or more."""
-        return self.muscle if isinstance(self.muscle, tuple) else (self.muscle,)
-
-    @functools.cached_property
-    def circuits(self) -> tuple[Circuit, ...]:
-        """The circuits: one for each muscle, or a single one for all."""
-        return self.circuit if isinstance(self.circuit, tuple) else (self.circuit,)
-
-    @functools.cached_property
-    def prefixes(self) -> tuple[str, ...]:
-        """Prefixes of the names of each muscle's quantities."""
-        return ("",) if len(self.muscles) == 1 else tuple(f"{m.name}." for m in self.muscles)
-
-    @property
-    def circuit_prefixes(self) -> tuple[str, ...]:
-        """Prefixes of the names of each circuit's quantities."""
-        return ("",) if self._shared else self.prefixes
-
-    @property
-    def _shared(self) -> bool:
-        return len(self.circuits) < len(self.muscles)
-
-    @property
-    def resting_lengths(self) -> list[Value]:
-        """Resting lengths of the muscles [m]."""
-        return [m.geometry.resting_length for m in self.muscles]
 
     @functools.cached_property
     def states(self) -> tuple[StateVariable, ...]:
@@ -142,30 +102,6 @@ class Plant(PlantDisplay, StaticPlant):
     def affects_default_state(self, path: str) -> bool:
         """Whether a parameter affects the equilibrium; those of a circuit without states do not."""
         return not path.startswith("circuit") or any(circuit.states(self.ambient) for circuit in self.circuits)
-
-    def _circuits(self) -> Iterator[tuple[str, Circuit]]:
-        return zip(self.circuit_prefixes, self.circuits, strict=True)
-
-    def _by_circuit(self, airs: list[Air]) -> list[tuple[Air, ...]]:
-        return [tuple(airs)] if self._shared else [(air,) for air in airs]
-
-    def _outside(self, prefix: str, values: Mapping[str, Any]) -> dict[str, Any]:
-        """Values under a circuit's own names, by the plant's names."""
-        return key_by_muscle(self.prefixes, values) if self._shared else with_prefix(prefix, values)
-
-    def _within(self, prefix: str, values: Values) -> Values:
-        """Values under the plant's names, by a circuit's own names."""
-        return key_by_port(self.prefixes, values) if self._shared else select_prefix(prefix, values)
-
-    def muscle_states(self, state: Values, inputs: Values = MappingProxyType({})) -> tuple[MuscleState, ...]:
-        """Every muscle at a state; `inputs` are required if shortenings are inputs."""
-        place = {**inputs, **state}
-        contractions = self.mechanism.contractions(place, self.resting_lengths)
-        speeds = self.mechanism.contraction_speeds(place, place, self.resting_lengths)
-        return tuple(
-            muscle_state(m, select_prefix(prefix, state), contraction, speed, self.gas, self.ambient)
-            for m, prefix, contraction, speed in zip(self.muscles, self.prefixes, contractions, speeds, strict=True)
-        )
 
     def circuit_flows(
         self, muscles: tuple[MuscleState, ...], state: Values, inputs: Values
@@ -220,43 +156,6 @@ class Plant(PlantDisplay, StaticPlant):
         """Both from one evaluation."""
         at = self.evaluate(state, inputs)
         return self.rates_of(at, state), self.outputs_of(at)
-
-    def state_at(self, *, pressure: float | str | Sequence[float | str], **values: float | str) -> dict[str, float]:
-        """A state by the gauge pressure [Pa] of the muscle (or of each), and by states by name; also texts with a unit.
-
-        Coordinates and speeds that are not given are 0; walls, tubes, tanks and series springs are in steady state at
-        this pressure, bristles relaxed. Names with a dot are passed as `**{"left.bristle": 1e-4}`. Raises
-        ParameterError for a pressure below absolute zero, another number of pressures than muscles, an unknown name, or
-        a volume that is not positive; GeometryLimitError for an impossible contraction.
-        """
-        pressures = check_pressures(pressure, len(self.muscles), self.ambient)
-        muscles = zip(self.prefixes, self.muscles, strict=True)
-        air = {f"{p}{s.name}" for p, m in muscles for s in air_states(m, self.gas, self.ambient)}
-        units = {s.name: s.unit for s in self.states if s.name not in air}
-        check_known("Plant: no coordinate", values, list(units))
-        given = {n: as_quantity(f"Plant: the {n} of a state", v, units[n], self.ambient) for n, v in values.items()}
-        state: dict[str, Value] = {n: 0.0 for c in self.mechanism.coordinates for n in (c.name, c.speed)} | given
-        contractions = self.mechanism.contractions(state, self.resting_lengths)
-        for muscle, contraction in zip(self.muscles, contractions, strict=True):
-            muscle.geometry.check_contraction(contraction)
-        state, volumes = self.settle_muscles(pressures, state)
-        diagnostics.check_volumes(self.muscles, pressures, volumes)
-        state = self.fill_muscles(pressures, volumes, state)
-        return {s.name: float(state[s.name]) for s in self.states}
-
-    def settle_muscles(self, pressures: Sequence[Value], state: Values) -> tuple[dict[str, Value], list[Value]]:
-        """As StaticPlant; nothing is checked, and values and parameters may be arrays that broadcast."""
-        contractions = self.mechanism.contractions(state, self.resting_lengths)
-        state = {**{s.name: 0.0 for s in self.mechanism.inner_states}, **state}
-        return settle_muscles(self.muscles, self.prefixes, contractions, pressures, state)
-
-    def fill_muscles(self, pressures: Sequence[Value], volumes: Sequence[Value], state: Values) -> dict[str, Value]:
-        """`state` with air at these gauge pressures [Pa] in muscles of these volumes [m3], and circuits settled."""
-        content, airs = fill_muscles(self.gas, self.ambient, self.prefixes, pressures, volumes)
-        filled = {**state, **content}
-        for (prefix, circuit), air in zip(self._circuits(), self._by_circuit(airs), strict=True):
-            filled = {**self._outside(prefix, circuit.steady_state(air, self.ambient)), **filled}
-        return filled
 
     def check_state(self, state: Mapping[str, float]) -> None:
         """Raise GeometryLimitError for an impossible contraction, ParameterError for a volume that is not positive."""
