@@ -223,7 +223,7 @@ def pair_program(plant: am.Plant) -> str:
     x = casadi.SX.sym("x", 3)
     names = ("torque", "stiffness", "torque_by_pressure", "stiffness_by_pressure", "tension", "shut_valves")
     first, second = (
-        dict(zip(function.row.names, casadi.horzsplit(function.row.function(x[0], x[i])), strict=True))
+        dict(zip(function.names, casadi.horzsplit(function.function(x[0], x[i])), strict=True))
         for i, function in enumerate(torque_functions(plant), 1)
     )
     torque, stiffness, by_pressure, bending, tension, shut = names

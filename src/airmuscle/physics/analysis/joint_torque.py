@@ -1,13 +1,16 @@
-"""Torque of a joint: torque and stiffness of each muscle as traced functions; limits of taut muscles."""
+"""Torque of a joint: traced functions of its muscles, limits of taut ones, pressures and angles that satisfy them."""
 
 import dataclasses
 import functools
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from ...core import Array, ArrayProgram, ParameterError, Value, Values, make_program
-from ...engine.compile.function import LanesFunction
+from ...engine.compile.cache.kernel import Kernel
+from ...engine.compile.function import LANES, LanesFunction, lanes_array
 from ..muscle import ElasticSeriesElement, Muscle
 from ..plant.plant import Plant
 from ..pneumatics.gas import absolute_pressure
@@ -25,23 +28,51 @@ QUANTITIES = (
 """Quantities of a muscle of a joint: torque Q [N m], -dQ/dtheta at constant pressure [N m/rad], their derivatives with
 respect to the pressure, tension [N], -dQ/dtheta with closed valves, that is, at constant air mass [N m/rad], and moment
 arm [m]."""
+LEVELS = 129
+"""Number of pressures of each muscle at which the reachable stiffnesses are evaluated (chosen)."""
+BISECTIONS = 50
+"""Bisections of the pressure at which a muscle becomes taut; they reach rounding precision."""
+CELLS = 32
+"""Number of cells of each pressure in the search for all solutions (chosen)."""
+STEPS = 128
+"""Number of steps of the angle in the search for equilibria (chosen)."""
+CHUNK = 1000
+"""Number of points that are searched at once, which limits the memory (chosen)."""
+_RESIDUAL = 1e-11
+"""Relative residual of torque and stiffness at which a solution is accepted (chosen)."""
+_MARGIN = 1e-12
+"""Fraction of the pressure range by which a solution may exceed it through rounding."""
+ROOM = 4
+"""Number of solutions of a point for which room is made at first (chosen)."""
+MAX_BISECTIONS = 80
+AT_PRESSURE = QUANTITIES[:4]
+
+pair_solutions = Kernel("pair_solutions", "newton")
+
+Rows = npt.NDArray[np.intp]
+Mask = npt.NDArray[np.bool_]
+Range = tuple[float, float]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class TracedRow:
-    """Function of one or two arguments with several outputs, evaluated on arrays; `names` are those of the outputs."""
+    """Function of one or two arguments with several outputs, evaluated on arrays; `names` are those of the outputs.
+
+    `affine` is whether the first output of a muscle, its torque, is affine in the pressure.
+    """
 
     function: Any
     names: tuple[str, ...]
+    affine: bool = False
     programs: dict[tuple[str, ...], ArrayProgram | None] = dataclasses.field(default_factory=dict)
 
-    def __call__(self, *arguments: Array, names: tuple[str, ...] = ()) -> list[Array]:
-        """The named outputs, by default all, at arguments that broadcast."""
-        names = names or self.names
+    def __call__(self, *arguments: Array | str) -> list[Array]:
+        """The outputs whose names follow the arguments, by default all, at arguments that broadcast."""
+        names = tuple(each for each in arguments if isinstance(each, str)) or self.names
         columns = [self.names.index(name) for name in names]
         if names not in self.programs:
             self.programs[names] = make_program(self.function, 0, columns)
-        broadcast = np.broadcast_arrays(*arguments)
+        broadcast = np.broadcast_arrays(*(each for each in arguments if not isinstance(each, str)))
         points = [np.ascontiguousarray(x, dtype=float).reshape(-1) for x in broadcast]
         program = self.programs[names]
         if program is not None:
@@ -51,29 +82,17 @@ class TracedRow:
             table = table.reshape(len(self.names), -1, order="F")[columns]
         return [row.reshape(broadcast[0].shape) for row in table]
 
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class TorqueFunction:
-    """Torque of one muscle as a traced function of angle [rad] and gauge pressure [Pa].
-
-    `affine` is whether the torque is affine in the pressure.
-    """
-
-    row: TracedRow
-    affine: bool
-
-    def __call__(self, angle: Array, pressure: Array, *names: str) -> list[Array]:
-        """The named QUANTITIES at angles and pressures that broadcast."""
-        return self.row(angle, pressure, names=names)
-
     @functools.cached_property
     def compiled(self) -> LanesFunction:
-        """The first five QUANTITIES, up to the tension, compiled for several points at once."""
+        """The first five QUANTITIES of a muscle, up to the tension, compiled for several points at once."""
         import casadi
 
         angle, pressure = casadi.SX.sym("angle"), casadi.SX.sym("pressure")
-        values = self.row.function(angle, pressure)[: QUANTITIES.index("tension") + 1]
+        values = self.function(angle, pressure)[: QUANTITIES.index("tension") + 1]
         return LanesFunction({"angle": angle, "pressure": pressure}, {"values": values.T})
+
+
+Functions = Sequence[TracedRow]
 
 
 def check_joint(plant: Plant) -> None:
@@ -95,11 +114,6 @@ def check_joint(plant: Plant) -> None:
             )
 
 
-def torque_functions(plant: Plant, *, limited: bool = True) -> tuple[TorqueFunction, ...]:
-    """The torque function of each muscle of a joint; without the limits of the force laws unless `limited`."""
-    return tuple(_torque_function(plant, index, limited) for index in range(len(plant.muscles)))
-
-
 def load_function(plant: Plant) -> TracedRow:
     """The torque [N m] of weights, springs and stops against the angle [rad], and its derivative."""
     import casadi
@@ -111,35 +125,37 @@ def load_function(plant: Plant) -> TracedRow:
     return TracedRow(casadi.Function("load", [angle], [casadi.densify(row)]), ("torque", "slope"))
 
 
-def _torque_function(plant: Plant, index: int, limited: bool) -> TorqueFunction:
+def torque_functions(plant: Plant, *, limited: bool = True) -> tuple[TracedRow, ...]:
+    """The QUANTITIES of each muscle of a joint as functions of angle [rad] and gauge pressure [Pa].
+
+    Unless `limited`, they are those of the static tension before the limits of law and slackness are applied.
+    """
     import casadi
 
     angle, pressure = casadi.SX.sym("angle"), casadi.SX.sym("pressure")
-    q = {plant.mechanism.coordinates[0].name: angle}
-    muscle, contraction = plant.muscles[index], plant.mechanism.contractions(q, plant.resting_lengths)[index]
-    length = muscle.geometry.resting_length
-    arm = casadi.jacobian(casadi.SX(length * contraction), angle)
-    tension = casadi.SX(muscle.tension(pressure, contraction) if limited else _unlimited(muscle, pressure, contraction))
-    torque = arm * tension
-    stiffness = -casadi.jacobian(torque, angle)
-    by_pressure = casadi.jacobian(torque, pressure)
-    squeezed = by_pressure * _pressure_slope(plant, muscle, pressure, contraction) * arm / length
-    row = casadi.horzcat(
-        torque, stiffness, by_pressure, casadi.jacobian(stiffness, pressure), tension, stiffness - squeezed, arm
-    )
-    function = casadi.Function("torque", [angle, pressure], [casadi.densify(casadi.cse(row))])
-    affine = not any(casadi.which_depends(by_pressure, pressure, 1, False))
-    return TorqueFunction(TracedRow(function, QUANTITIES), affine)
-
-
-def _unlimited(muscle: Muscle, pressure: Value, contraction: Value) -> Value:
-    """Static tension [N] before limits of the law and of slackness are applied."""
-    length = muscle.geometry.resting_length
-    return (
-        muscle.contractile.unclamped_force(pressure, contraction)
-        - muscle.spring.force(pressure, contraction, length)
-        - muscle.stop.force(contraction, 0.0, length)
-    )
+    contractions = plant.mechanism.contractions({plant.mechanism.coordinates[0].name: angle}, plant.resting_lengths)
+    functions = []
+    for muscle, contraction in zip(plant.muscles, contractions, strict=True):
+        length = muscle.geometry.resting_length
+        arm = casadi.jacobian(casadi.SX(length * contraction), angle)
+        tension = casadi.SX(
+            muscle.tension(pressure, contraction)
+            if limited
+            else muscle.contractile.unclamped_force(pressure, contraction)
+            - muscle.spring.force(pressure, contraction, length)
+            - muscle.stop.force(contraction, 0.0, length)
+        )
+        torque = arm * tension
+        stiffness = -casadi.jacobian(torque, angle)
+        by_pressure = casadi.jacobian(torque, pressure)
+        squeezed = by_pressure * _pressure_slope(plant, muscle, pressure, contraction) * arm / length
+        row = casadi.horzcat(
+            torque, stiffness, by_pressure, casadi.jacobian(stiffness, pressure), tension, stiffness - squeezed, arm
+        )
+        function = casadi.Function("torque", [angle, pressure], [casadi.densify(casadi.cse(row))])
+        affine = not any(casadi.which_depends(by_pressure, pressure, 1, False))
+        functions.append(TracedRow(function, QUANTITIES, affine))
+    return tuple(functions)
 
 
 def _pressure_slope(plant: Plant, muscle: Muscle, pressure: Value, contraction: Value) -> Value:
@@ -151,34 +167,20 @@ def _pressure_slope(plant: Plant, muscle: Muscle, pressure: Value, contraction: 
     return enclosed_pressure_slope(plant, muscle, contraction, volume, air, content)
 
 
-LEVELS = 129
-"""Number of pressures of each muscle at which the reachable stiffnesses are evaluated (chosen)."""
-BISECTIONS = 50
-"""Bisections of the pressure at which a muscle becomes taut; they reach rounding precision."""
-
-
-def taut_branch(function: TorqueFunction, angle: Array, levels: Array) -> tuple[Array, Array]:
+def taut_branch(function: TracedRow, angle: Array, levels: Array) -> tuple[Array, Array]:
     """Torque and stiffness (N, LEVELS) at pressures from that at which the muscle becomes taut, to the maximum."""
     (tension,) = function(angle[:, None], levels, "tension")
     taut = tension > 0.0
     slack = np.where(taut.any(axis=1), taut.argmax(axis=1), 0)
-    start = _first_taut(function, angle, levels[np.maximum(slack - 1, 0)], levels[slack])
+    low, start = levels[np.maximum(slack - 1, 0)], levels[slack]
+    for _ in range(BISECTIONS):  # to a pressure on the taut side, because the stiffness of a slack muscle is zero
+        middle = 0.5 * (low + start)
+        pulls = function(angle, middle, "tension")[0] > 0.0
+        low, start = np.where(pulls, low, middle), np.where(pulls, middle, start)
     inner = start[:, None] + np.linspace(0.0, 1.0, LEVELS) * (levels[-1] - start)[:, None]
     torque, stiffness = function(angle[:, None], inner, "torque", "stiffness")
     invalid = (~taut.any(axis=1)).reshape(-1, 1)
     return np.where(invalid, np.nan, torque), np.where(invalid, np.nan, stiffness)
-
-
-def _first_taut(function: TorqueFunction, angle: Array, low: Array, high: Array) -> Array:
-    """Least pressure (N,) at which a muscle is taut, by bisection from a slack one to a taut one.
-
-    It is on the taut side, because the stiffness of a slack muscle is zero.
-    """
-    for _ in range(BISECTIONS):
-        middle = 0.5 * (low + high)
-        taut = function(angle, middle, "tension")[0] > 0.0
-        low, high = np.where(taut, low, middle), np.where(taut, middle, high)
-    return high
 
 
 def stiffness_range(pairs: list[tuple[Array, Array]], row: int, torque: float) -> tuple[float, float]:
@@ -192,3 +194,105 @@ def stiffness_range(pairs: list[tuple[Array, Array]], row: int, torque: float) -
         sums.append(own_k[row][inside] + np.interp(needed[inside], x, k))
     both = np.concatenate(sums)
     return (float(both.min()), float(both.max())) if both.size else (np.nan, np.nan)
+
+
+def affine_candidates(unlimited: Functions, pressures: Range, angle: Array, torque: Array, stiffness: Array) -> Array:
+    """The pressures (N, 1, 2) for laws that are affine in the pressure; NaN where they are out of range.
+
+    A law without its limits is solved; a muscle at a limit of its law, such as a slack one, is no solution.
+    """
+    zero = np.zeros(1)
+    (q, k, a, c), (other_q, other_k, b, d) = (function(angle, zero, *AT_PRESSURE) for function in unlimited)
+    x, y = torque - q - other_q, stiffness - k - other_k
+    with np.errstate(all="ignore"):
+        determinant = a * d - b * c
+        pairs = np.stack([(d * x - b * y) / determinant, (a * y - c * x) / determinant], axis=1)
+        margin = _MARGIN * (pressures[1] - pressures[0])
+        inside = np.asarray(((pairs >= pressures[0] - margin) & (pairs <= pressures[1] + margin)).all(axis=1))
+    return np.asarray(np.where(inside[:, None], np.clip(pairs, *pressures), np.nan)[:, None, :])
+
+
+def general_candidates(limited: Functions, pressures: Range, angle: Array, torque: Array, stiffness: Array) -> Array:
+    """All pressures (N, S, 2) of any force laws, by a search in cells and Newton's method, by ascending first pressure;
+    S is the maximum number of solutions of a point, at least 1.
+
+    The torques and stiffnesses at the boundaries of CELLS cells of each pressure exclude most of the CELLS^2 cells; as
+    they need not be monotonic in a cell, its range is widened by half on both sides. Newton's method starts from the
+    centre of each cell that is left. All this is compiled, several levels or cells at once.
+    """
+    first, second = (function.compiled for function in limited)
+    levels = np.linspace(*pressures, CELLS + 1)
+    padded = np.append(levels, np.full(-levels.size % LANES, levels[-1])).reshape(-1, LANES)
+    counts, room = np.zeros(angle.size, dtype=np.int64), ROOM
+    work = lanes_array(3), lanes_array(5), lanes_array(5), np.zeros((2, 3, 2, CELLS))
+    cells, points = np.zeros(CELLS**2 + LANES, dtype=np.int64), [np.array(v) for v in (angle, torque, stiffness)]
+    while True:
+        pairs = np.full((angle.size, room, 2), np.nan)
+        pair_solutions(
+            first.address, second.address, float(pressures[0]), float(pressures[1]), *points, padded, pairs, counts,
+            *work, cells,
+        )  # fmt: skip
+        most = int(counts.max(initial=1))
+        if most <= room:
+            break
+        room = most
+    pairs = pairs[:, : max(most, 1)]
+    order = np.argsort(pairs[..., 0], axis=1)
+    return np.asarray(np.take_along_axis(pairs, order[..., None], axis=1))
+
+
+def balanced_angles(
+    torques: Functions, load_torque: TracedRow, angles: Range, pressures: tuple[Array, Array], load: Array
+) -> Array:
+    """All angles (N, S) at which the muscles balance weight and load, in ascending order; NaN where there are fewer."""
+
+    def excess(angle: Array, rows: Rows) -> Array:
+        carried = sum(f(angle, p[rows], "torque")[0] for f, p in zip(torques, pressures, strict=True))
+        return np.asarray(carried - load_torque(angle, "torque")[0] - load[rows])
+
+    def slope(angle: Array, rows: Rows) -> Array:
+        stiffness = sum(f(angle, p[rows], "stiffness")[0] for f, p in zip(torques, pressures, strict=True))
+        return np.asarray(-stiffness - load_torque(angle, "slope")[0])
+
+    grid = np.linspace(*angles, STEPS + 1)
+    values = np.concatenate([
+        excess(np.broadcast_to(grid, (part.size, grid.size)), part[:, None])
+        for part in np.array_split(np.arange(load.size), 1 + load.size // CHUNK)
+    ])  # fmt: skip
+    row, step = np.nonzero((values[:, :-1] > 0.0) != (values[:, 1:] > 0.0))
+    roots = _bracketed_root(excess, slope, row, grid[step], grid[step + 1], values[row, step] > 0.0)
+    count = np.bincount(row, minlength=load.size)
+    table = np.full((load.size, max(1, int(count.max(initial=0)))), np.nan)
+    table[row, np.arange(row.size) - np.searchsorted(row, row)] = roots
+    return table
+
+
+def _bracketed_root(
+    excess: Callable[[Array, Rows], Array], slope: Callable[[Array, Rows], Array], row: Rows, low: Array, high: Array,
+    positive: Mask,
+) -> Array:  # fmt: skip
+    """Roots by Newton's method, with bisection where a step would leave its interval."""
+    x = 0.5 * (low + high)
+    for _ in range(MAX_BISECTIONS):
+        value = excess(x, row)
+        same = (value > 0.0) == positive
+        low, high = np.where(same, x, low), np.where(same, high, x)
+        with np.errstate(all="ignore"):
+            newton = x - value / slope(x, row)
+        inside = (newton > low) & (newton < high)
+        following = np.where(value == 0.0, x, np.where(inside, newton, 0.5 * (low + high)))
+        done = np.abs(following - x) <= 4e-16 * (1.0 + np.abs(x))
+        x = following
+        if done.all():
+            break
+    return x
+
+
+def are_balanced(first: Sequence[Array], second: Sequence[Array], torque: Array, stiffness: Array) -> Mask:
+    """Whether torque and stiffness are balanced by two taut muscles, each given by torque, stiffness and tension."""
+    (q, k, tension), (other_q, other_k, other_tension) = first, second
+    scale = np.abs(q) + np.abs(other_q) + np.abs(torque)
+    rigid = np.abs(k) + np.abs(other_k) + np.abs(stiffness)
+    balanced = np.abs(q + other_q - torque) <= _RESIDUAL * scale
+    stiff = np.abs(k + other_k - stiffness) <= _RESIDUAL * rigid
+    return np.asarray(balanced & stiff & (tension > 0.0) & (other_tension > 0.0))

@@ -9,12 +9,14 @@ from ...core import BLUE, RED, Array, ParameterError, ShortRepr, SolveError, new
 from ...recording import Recording
 from ..plant.plant import Plant
 from ..pneumatics.gas import gauge_pressure
-from .joint_solutions import affine_candidates, are_balanced, balanced_angles, general_candidates
 from .joint_torque import (
     LEVELS,
-    TorqueFunction,
     TracedRow,
+    affine_candidates,
+    are_balanced,
+    balanced_angles,
     check_joint,
+    general_candidates,
     load_function,
     stiffness_range,
     taut_branch,
@@ -66,8 +68,8 @@ class JointStatics(ShortRepr):
     plant: Plant
     pressure_range: tuple[float, float]
     """Minimum and maximum gauge pressure [Pa] of both muscles."""
-    torques: tuple[TorqueFunction, ...]
-    unlimited: tuple[TorqueFunction, ...]
+    torques: tuple[TracedRow, ...]
+    unlimited: tuple[TracedRow, ...]
     load: TracedRow
 
     def pressures(self, angle: Any, stiffness: Any, load: Any = 0.0) -> JointPoints:
@@ -80,7 +82,7 @@ class JointStatics(ShortRepr):
         as one, and refined by Newton's method to rounding. Raises ParameterError for values that are not finite.
         """
         angle, stiffness, load = _as_points("angle, stiffness and load", angle, stiffness, load)
-        torque = self.load(angle, names=("torque",))[0] + load
+        torque = self.load(angle, "torque")[0] + load
         affine = all(function.affine for function in self.unlimited)
         solve, functions = (affine_candidates, self.unlimited) if affine else (general_candidates, self.torques)
         pairs = solve(functions, self.pressure_range, angle, torque, stiffness)
@@ -132,7 +134,7 @@ class JointStatics(ShortRepr):
         (angle,) = _as_points("angle", angle)
         levels = np.linspace(*self.pressure_range, LEVELS)
         first, second = (function(angle[:, None], levels, "torque")[0] for function in self.torques)
-        weight = self.load(angle, names=("torque",))[0]
+        weight = self.load(angle, "torque")[0]
         return (first.min(axis=1) + second.min(axis=1) - weight, first.max(axis=1) + second.max(axis=1) - weight)
 
     def stiffness_limits(self, angle: Any, load: Any = 0.0) -> tuple[Array, Array]:
@@ -142,7 +144,7 @@ class JointStatics(ShortRepr):
         muscle; exact for laws that are affine in the pressure. An upper limit of the force of such a law is ignored.
         """
         angle, load = _as_points("angle and load", angle, load)
-        torque = self.load(angle, names=("torque",))[0] + load
+        torque = self.load(angle, "torque")[0] + load
         functions = self.unlimited if all(f.affine for f in self.unlimited) else self.torques
         levels = np.linspace(*self.pressure_range, LEVELS)
         pairs = [taut_branch(function, angle, levels) for function in functions]
@@ -193,7 +195,7 @@ class JointStatics(ShortRepr):
             known = np.isfinite(angle) & np.isfinite(pressures).all(axis=2)
             if torque is not None and stiffness is not None:
                 known &= are_balanced(muscles[0][:3], muscles[1][:3], torque, stiffness)
-            restoring = k + other_k + self.load(angle, names=("slope",))[0]
+            restoring = k + other_k + self.load(angle, "slope")[0]
             stable = np.where(restoring > 0.0, 1.0, 0.0)
         cocontraction = np.minimum(np.abs(q), np.abs(other_q))
         columns = (angle, k + other_k, shut + other_shut, cocontraction, stable)
@@ -212,7 +214,10 @@ def joint_statics(plant: Plant, pressure_range: tuple[float, float] | None = Non
     springs, and for an empty pressure range.
     """
     check_joint(plant)
-    low, high = (0.0, _supply_pressure(plant)) if pressure_range is None else pressure_range
+    supplies = [circuit.supply for circuit in plant.circuits]
+    airs = [supply.air(supply.steady_state(plant.ambient), plant.ambient) for supply in supplies]
+    lowest = min(float(gauge_pressure(air.pressure, plant.ambient)) for air in airs)
+    low, high = (0.0, lowest) if pressure_range is None else pressure_range
     if not (np.isfinite([low, high]).all() and low < high):
         raise ParameterError(
             f"joint_statics: pressure_range is {low:g} to {high:g} Pa; the minimum must be less than the maximum. Give "
@@ -220,13 +225,6 @@ def joint_statics(plant: Plant, pressure_range: tuple[float, float] | None = Non
         )
     limited, unlimited = torque_functions(plant), torque_functions(plant, limited=False)
     return JointStatics(plant, (float(low), float(high)), limited, unlimited, load_function(plant))
-
-
-def _supply_pressure(plant: Plant) -> float:
-    """Lowest gauge pressure [Pa] of the supplies at rest."""
-    supplies = [circuit.supply for circuit in plant.circuits]
-    airs = [supply.air(supply.steady_state(plant.ambient), plant.ambient) for supply in supplies]
-    return min(float(gauge_pressure(air.pressure, plant.ambient)) for air in airs)
 
 
 def _as_points(label: str, *values: Any) -> list[Array]:
@@ -247,19 +245,15 @@ def plot_reachable_region(statics: JointStatics, load: float = 0.0) -> Any:
     equilibria, the lowest stable angle is drawn.
     """
     figure, (region, plane) = new_figure(1, 2, width=7.2, height=3.4)
-    _draw_region(region, statics, load)
-    _draw_plane(plane, statics, load)
-    return figure
-
-
-def _draw_region(axes: Any, statics: JointStatics, load: float) -> None:
     angle = np.linspace(*statics.angle_range, ANGLES)
     low, high = statics.stiffness_limits(angle, load)
-    axes.fill_between(np.degrees(angle), low, high, color=BLUE, alpha=0.2, linewidth=0.0)
+    region.fill_between(np.degrees(angle), low, high, color=BLUE, alpha=0.2, linewidth=0.0)
     for limit in (low, high):
-        axes.plot(np.degrees(angle), limit, color=BLUE)
+        region.plot(np.degrees(angle), limit, color=BLUE)
     title = f"Reachable region, load {load:.4g} N m"
-    axes.set(xlabel="angle [deg]", ylabel="stiffness at constant pressure [N m/rad]", title=title)
+    region.set(xlabel="angle [deg]", ylabel="stiffness at constant pressure [N m/rad]", title=title)
+    _draw_plane(plane, statics, load)
+    return figure
 
 
 def _draw_plane(axes: Any, statics: JointStatics, load: float) -> None:
