@@ -134,6 +134,10 @@ RESULTS: dict[str, Callable[[], Any]] = {
         control_plants.JOINT.muscles, control_plants.JOINT.mechanism, (0.02, 0.02)
     ),
     "a reader of rows": lambda: bench.RowReader("log"),
+    "tables of forces and of volumes": lambda: (
+        physics.Tabulated((1e5, 1e5, 2e5, 2e5), (0.0, 0.1, 0.0, 0.1), (50.0, 20.0, 90.0, 40.0)),
+        physics.TabulatedGeometry((0.0, 0.1), (1e-4, 2e-4), 0.2),
+    ),
 }
 
 

@@ -8,8 +8,7 @@ import airmuscle as am
 
 from ..core import autodiff
 from ..physics.muscle.characteristic.saga2007 import RUBBER_TEST_STRAIN
-from ..physics.muscle.geometry.meridian import SAGA_2007
-from ..physics.muscle.geometry.meridian_shapes import FERRARESI_2001
+from ..physics.muscle.geometry.meridian import FERRARESI_2001, SAGA_2007
 from ..physics.muscle.geometry.pleated import DAERDEN_LEFEBER_2001
 from ..report.chapter import Chapter, Table
 from ..report.claims import claims_of

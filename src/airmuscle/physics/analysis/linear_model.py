@@ -15,17 +15,8 @@ from ...engine.compile.program import CompiledSystem, compile_system
 from ...recording.columns import column_units
 from ..equilibrium import complete_inputs
 from ..plant.plant import Plant
-from .sampled_model import (
-    SampledModel,
-    bode_figure,
-    checked_frequencies,
-    control_model,
-    control_names,
-    imported_control,
-    responses_at,
-    sampled,
-    with_pade,
-)
+from . import sampled_model
+from .sampled_model import SampledModel, checked_frequencies, control_model, responses_at, sampled
 from .static_stiffness import Stiffness, stiffness
 
 ROUNDING = 1e-12
@@ -118,7 +109,7 @@ class LinearModel:
         """The model with Pade approximations of this order in place of the delays, as further states."""
         if not 1 <= order <= MAX_PADE:
             raise ParameterError(f"pade: the order is {order}; allowed range: 1 to {MAX_PADE}.")
-        return dataclasses.replace(self, **with_pade(self, order)) if any(self.delays.values()) else self
+        return dataclasses.replace(self, **sampled_model.with_pade(self, order)) if any(self.delays.values()) else self
 
     def sampled(self, sample_time: float) -> SampledModel:
         """The model at sampling instants, exact for inputs that are held over a sample time [s], with their delays."""
@@ -126,7 +117,7 @@ class LinearModel:
 
     def bode(self, frequencies: npt.ArrayLike) -> Any:
         """A Matplotlib figure of gain and phase of every output to every input at frequencies (F,) [Hz]."""
-        return bode_figure(self, checked_frequencies(frequencies))
+        return sampled_model.bode_figure(self, checked_frequencies(frequencies))
 
     def frequency_response(self, frequencies: npt.ArrayLike) -> npt.NDArray[np.complex128]:
         """H(j 2 pi f) = (C (j 2 pi f I - A)^-1 B + D) exp(-j 2 pi f T) at frequencies (F,) [Hz], of shape (F, k, m).
@@ -157,12 +148,12 @@ class LinearModel:
         """
         if not nonlinear:
             return control_model(self.pade(pade)) if sample_time is None else self.sampled(sample_time).to_control()
-        control = imported_control()
+        control = sampled_model.imported_control()
         if self.system is None:
             raise ParameterError("to_control: this model has no system; use the result of linearise.")
         response = _Response(compile_system(self.system), self.inputs, self.outputs, dict(self.input_values))
         return control.NonlinearIOSystem(
-            response.rates, response.outputs, name=type(self.system).__name__, **control_names(self)
+            response.rates, response.outputs, name=type(self.system).__name__, **sampled_model.control_names(self)
         )
 
     def __repr__(self) -> str:

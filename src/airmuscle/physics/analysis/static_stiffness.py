@@ -7,8 +7,8 @@ from typing import NamedTuple
 from ...core import ShortRepr, Value, Values, autodiff
 from ...core.system import state_vector
 from ..muscle import ElasticSeriesElement, Muscle
-from ..plant.muscle_state import MuscleState
 from ..plant.plant import Plant
+from ..plant.static_plant import MuscleState
 from ..pneumatics.gas import NO_FLOW, Air, gauge_pressure
 
 

@@ -9,19 +9,8 @@ from ...core import BLUE, RED, Array, ParameterError, ShortRepr, SolveError, new
 from ...recording import Recording
 from ..plant.plant import Plant
 from ..pneumatics.gas import gauge_pressure
-from .joint_torque import (
-    LEVELS,
-    TracedRow,
-    affine_candidates,
-    are_balanced,
-    balanced_angles,
-    check_joint,
-    general_candidates,
-    load_function,
-    stiffness_range,
-    taut_branch,
-    torque_functions,
-)
+from . import joint_torque
+from .joint_torque import LEVELS, TracedRow, affine_candidates, general_candidates, torque_functions
 
 ANGLES = 121
 """Number of angles of the reachable region (chosen)."""
@@ -96,7 +85,7 @@ class JointStatics(ShortRepr):
         are defined are searched in 128 steps and refined by bisection to rounding.
         """
         first, second, load = _as_points("pressures and load", *pressures, load)
-        balanced = balanced_angles(self.torques, self.load, self.angle_range, (first, second), load)
+        balanced = joint_torque.balanced_angles(self.torques, self.load, self.angle_range, (first, second), load)
         both = np.stack([np.broadcast_to(p[:, None], balanced.shape) for p in (first, second)], axis=2)
         return self._points(balanced, np.where(np.isnan(balanced)[..., None], np.nan, both))
 
@@ -147,8 +136,8 @@ class JointStatics(ShortRepr):
         torque = self.load(angle, "torque")[0] + load
         functions = self.unlimited if all(f.affine for f in self.unlimited) else self.torques
         levels = np.linspace(*self.pressure_range, LEVELS)
-        pairs = [taut_branch(function, angle, levels) for function in functions]
-        limits = np.array([stiffness_range(pairs, row, torque[row]) for row in range(angle.size)])
+        pairs = [joint_torque.taut_branch(function, angle, levels) for function in functions]
+        limits = np.array([joint_torque.stiffness_range(pairs, row, torque[row]) for row in range(angle.size)])
         return limits[:, 0], limits[:, 1]
 
     def explain(self, angle: float, stiffness: float, load: float = 0.0) -> str:
@@ -194,7 +183,7 @@ class JointStatics(ShortRepr):
         with np.errstate(invalid="ignore"):
             known = np.isfinite(angle) & np.isfinite(pressures).all(axis=2)
             if torque is not None and stiffness is not None:
-                known &= are_balanced(muscles[0][:3], muscles[1][:3], torque, stiffness)
+                known &= joint_torque.are_balanced(muscles[0][:3], muscles[1][:3], torque, stiffness)
             restoring = k + other_k + self.load(angle, "slope")[0]
             stable = np.where(restoring > 0.0, 1.0, 0.0)
         cocontraction = np.minimum(np.abs(q), np.abs(other_q))
@@ -213,7 +202,7 @@ def joint_statics(plant: Plant, pressure_range: tuple[float, float] | None = Non
     supplies of the plant. Raises ParameterError for a plant that is not a joint with two muscles without series
     springs, and for an empty pressure range.
     """
-    check_joint(plant)
+    joint_torque.check_joint(plant)
     supplies = [circuit.supply for circuit in plant.circuits]
     airs = [supply.air(supply.steady_state(plant.ambient), plant.ambient) for supply in supplies]
     lowest = min(float(gauge_pressure(air.pressure, plant.ambient)) for air in airs)
@@ -224,7 +213,7 @@ def joint_statics(plant: Plant, pressure_range: tuple[float, float] | None = Non
             "gauge pressures, such as (0.0, 6e5)."
         )
     limited, unlimited = torque_functions(plant), torque_functions(plant, limited=False)
-    return JointStatics(plant, (float(low), float(high)), limited, unlimited, load_function(plant))
+    return JointStatics(plant, (float(low), float(high)), limited, unlimited, joint_torque.load_function(plant))
 
 
 def _as_points(label: str, *values: Any) -> list[Array]:

@@ -6,16 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core import (
-    Array,
-    chosen_scale,
-    contraction_text,
-    given_axes,
-    legend_outside,
-    new_figure,
-    plotting,
-    quantity_text,
-)
+from ...core import Array, chosen_scale, contraction_text, new_figure, plotting, quantity_text
 from ...recording import Recording
 from .characteristic import Characteristic, ContractionLaw, ValidityRange, validity_range_of, values_or_nan
 
@@ -218,7 +209,7 @@ def isobar_figure(
         _shade_extrapolation(axes, validity_range, curves)
     if point is not None:
         _draw_working_point(axes, characteristic, curves, point)
-    legend_outside(axes, title="gauge pressure")
+    plotting.legend_outside(axes, title="gauge pressure")
     return figure
 
 
@@ -286,7 +277,7 @@ def plot_isobars(
         shown, axes = new_figure(height=3.0)
         title = textwrap.shorten(title, 90, placeholder=" …")
     else:
-        shown, axes = ax, given_axes(ax, 1, "plot of a muscle")[0]
+        shown, axes = ax, plotting.given_axes(ax, 1, "plot of a muscle")[0]
     draw_isobars(axes, curves, title)
-    legend_outside(axes, title="gauge pressure")
+    plotting.legend_outside(axes, title="gauge pressure")
     return shown

@@ -6,8 +6,6 @@ from types import MappingProxyType
 from typing import Any, ClassVar, NamedTuple
 
 from ...core import (
-    AirmuscleWarning,
-    ParameterError,
     Reference,
     StateVariable,
     Value,
@@ -19,21 +17,15 @@ from ...core import (
     ops,
     quantity_text,
 )
+from ...core.errors import AirmuscleWarning, ParameterError
 from ...recording.notebook import Card, NotebookDisplay
-from .characteristic import (
-    HOSOVSKY_HILL,
-    Characteristic,
-    Clamped,
-    ForceLaw,
-    ValidityRange,
-    VirtualWork,
-    validity_range_of,
-)
+from .characteristic import HOSOVSKY_HILL, Characteristic, Clamped, ForceLaw, VirtualWork
+from .characteristic.validity_range import ValidityRange, validity_range_of
 from .friction.base import Friction, NoFriction
 from .geometry.base import Geometry
 from .isobars import plot_isobars
 from .passive_elements import CreepElements, Damper, LinearDamper, LinearSpring, NoStop, RigidWall, Spring, Stop, Wall
-from .quantity_arguments import accept_quantities_in
+from .quantity_arguments import QuantityMethods, Units
 from .ratings import Ratings
 from .series import ElasticSeriesElement, RigidSeriesElement, SeriesElement, solve_inner_contraction, without_derivative
 
@@ -54,7 +46,7 @@ class MuscleForce(NamedTuple):
 
 
 @model
-class Muscle(NotebookDisplay):
+class Muscle(QuantityMethods, NotebookDisplay):
     """Hill-type muscle with a pneumatic port (p, V) and a mechanical port (F, v).
 
         F = max(0, F_KE(p, eps) - F_PP(p, eps) - F_TL(p, eps, v) - F_R - F_C) - F_S
@@ -70,6 +62,11 @@ class Muscle(NotebookDisplay):
 
     references: ClassVar[tuple[Reference, ...]] = (HOSOVSKY_HILL,)
     checks_structure: ClassVar[bool] = True
+    argument_units: ClassVar[Units] = {
+        "tension": ("Pa", "1", "m/s"),
+        "static_force": ("Pa", "1"),
+        "stiffness": ("Pa", "1"),
+    }
 
     contractile: ForceLaw
     geometry: Geometry
@@ -271,8 +268,3 @@ class Muscle(NotebookDisplay):
         closed valves the pressure changes and the stiffness is larger: see `airmuscle.physics.stiffness`.
         """
         return 0.0 - autodiff.derivative(self, "static_force", pressure, contraction, wrt=1)  # not -0 where slack
-
-
-accept_quantities_in(
-    Muscle, {"tension": ("Pa", "1", "m/s"), **dict.fromkeys(("static_force", "stiffness"), ("Pa", "1"))}
-)

@@ -3,7 +3,7 @@
 import functools
 import inspect
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -14,6 +14,8 @@ _EXAMPLES = {"Pa": "'3 bar'", "N": "'200 N'", "1": "'10 %'"}
 """A text for each unit of an argument."""
 
 
+Units = Mapping[str, Sequence[str]]
+"""Units of the leading arguments of methods, by the name of the method."""
 RatioCheck = Callable[[Any, object], None]
 """Check of a ratio, of the value and the object: called for every value that is not a float of at most 1."""
 
@@ -60,14 +62,19 @@ def accept_quantities(
     return converted
 
 
-def accept_quantities_in(
-    cls: type[Any], units: Mapping[str, Sequence[str]], check_ratio: RatioCheck | None = None
-) -> None:
-    """Let the methods that a class defines itself accept quantities; `units` are those of their arguments."""
-    for name, of_arguments in units.items():
-        method = cls.__dict__.get(name)
-        if inspect.isfunction(method) and not getattr(method, "__isabstractmethod__", False):
-            setattr(cls, name, accept_quantities(method, of_arguments, check_ratio))
+class QuantityMethods:
+    """Base of classes that let the methods which they define accept quantities, as `accept_quantities` does."""
+
+    argument_units: ClassVar[Units]
+    check_ratio: ClassVar[Any] = None
+    """A RatioCheck as a static method, or None."""
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        super().__init_subclass__(**options)
+        for name, units in cls.argument_units.items():
+            method = cls.__dict__.get(name)
+            if inspect.isfunction(method) and not getattr(method, "__isabstractmethod__", False):
+                setattr(cls, name, accept_quantities(method, units, cls.check_ratio))
 
 
 def _as_number(value: Any, name: str, units: Mapping[str, str], owner: str) -> Any:

@@ -7,8 +7,8 @@ from ...core import StateVariable, System, Value, Values, model
 from ...core.declaration import forwarded
 from ..muscle import ElasticSeriesElement, Muscle
 from ..muscle.friction import NoFriction
-from .muscle_state import MuscleState, PlantEvaluation
 from .plant import Plant
+from .static_plant import MuscleState, PlantEvaluation
 
 _METERS = (
     StateVariable("work_of_tension", "J", 1.0, "work of all tensions on the mechanism"),

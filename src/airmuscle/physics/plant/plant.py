@@ -5,16 +5,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, ClassVar
 
-from ...core import (
-    ColumnLimit,
-    Columns,
-    Diagnostic,
-    DiagnosticCode,
-    GeometryLimitError,
-    Value,
-    Values,
-    model,
-)
+from ...core import GeometryLimitError, Value, Values, model
+from ...core.diagnostics import ColumnLimit, Columns, Diagnostic, DiagnosticCode
 from ...core.system import Input, StateVariable, add_prefix, select_prefix, with_prefix
 from ..equilibrium.equilibrium import equilibria_at_ambient_pressure, equilibrium_at_ambient_pressure
 from ..mechanism import Mechanism
@@ -22,8 +14,7 @@ from ..muscle import Muscle
 from ..pneumatics import DEFAULT_GAS, Ambient, Circuit, CircuitFlows, Gas
 from . import diagnostics
 from .display import PlantDisplay
-from .muscle_state import MuscleState, PlantEvaluation, air_states, muscle_outputs, states_of_muscle
-from .static_plant import StaticPlant
+from .static_plant import MuscleState, PlantEvaluation, StaticPlant, air_states, muscle_outputs, states_of_muscle
 from .validation import check_parts, check_unique, convert_pressures
 
 _AIR_STATES = ("air_mass", "internal_energy")

@@ -10,8 +10,8 @@ from ...core.system import Input, StateVariable, System, select_prefix, with_pre
 from ..mechanism import ExternalLoad, Mechanism
 from ..muscle import Muscle
 from ..muscle.muscle import MuscleForce
-from .muscle_state import states_of_muscle
 from .plant import Plant
+from .static_plant import states_of_muscle
 
 
 @model

@@ -8,19 +8,8 @@ import abc
 import dataclasses
 from typing import ClassVar, NamedTuple
 
-from ...core import (
-    ABSOLUTE,
-    AMBIENT_PRESSURE,
-    Reference,
-    StateVariable,
-    Value,
-    Values,
-    autodiff,
-    model,
-    ops,
-    parameter,
-    published,
-)
+from ...core import Reference, StateVariable, Value, Values, autodiff, model, ops, parameter, published
+from ...core.units import ABSOLUTE, AMBIENT_PRESSURE
 
 GAS_CONSTANT = 287.05
 """Specific gas constant of dry air [J/(kg K)]."""
@@ -82,6 +71,11 @@ class Flow:
 
     mass: Value
     enthalpy: Value
+
+    @classmethod
+    def at(cls, temperature: Value, mass: Value) -> "Flow":
+        """The flow of air of a temperature [K]."""
+        return cls(mass, SPECIFIC_HEAT_CONSTANT_PRESSURE * temperature * mass)
 
     def __add__(self, other: "Flow") -> "Flow":
         return Flow(self.mass + other.mass, self.enthalpy + other.enthalpy)

@@ -7,17 +7,7 @@ from typing import Any, ClassVar
 from ...core import Reference, Value, Values, model, ops, parameter, published, unflatten, within
 from ...core.system import StateVariable, add_prefix, select_prefix, with_prefix
 from .circuit import Circuit, CircuitFlows, CircuitWrapper, ambient_air, port_prefix
-from .gas import (
-    GAS_CONSTANT,
-    SPECIFIC_HEAT_CONSTANT_PRESSURE,
-    Air,
-    Airs,
-    Ambient,
-    Flow,
-    Gas,
-    Isothermal,
-    gauge_pressure,
-)
+from .gas import GAS_CONSTANT, Air, Airs, Ambient, Flow, Gas, Isothermal, gauge_pressure
 from .valve import Orifice, Valve, orifice_flow
 
 MAX_SEGMENTS = 200
@@ -249,7 +239,7 @@ def _convected_flow(mass_flow: Value, air: Air, downstream: Air) -> Flow:
     temperature = air.temperature
     if downstream.temperature is not air.temperature:
         temperature = ops.where(mass_flow >= 0, air.temperature, downstream.temperature)
-    return Flow(mass_flow, SPECIFIC_HEAT_CONSTANT_PRESSURE * temperature * mass_flow)
+    return Flow.at(temperature, mass_flow)
 
 
 @model

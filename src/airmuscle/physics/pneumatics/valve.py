@@ -4,7 +4,7 @@ import abc
 from typing import ClassVar
 
 from ...core import Reference, Value, model, ops, parameter, published
-from .gas import REFERENCE_DENSITY, REFERENCE_TEMPERATURE, SPECIFIC_HEAT_CONSTANT_PRESSURE, Air, Flow
+from .gas import REFERENCE_DENSITY, REFERENCE_TEMPERATURE, Air, Flow
 
 
 class Orifice(abc.ABC):
@@ -132,8 +132,7 @@ def orifice_flow(orifice: Orifice, first: Air, second: Air, opening: Value = 1.0
     temperature = first.temperature
     if second.temperature is not first.temperature:  # avoids a selection between two equal temperatures
         temperature = ops.where(first.pressure >= second.pressure, first.temperature, second.temperature)
-    mass = orifice.mass_flow(first.pressure, second.pressure, opening, temperature)
-    return Flow(mass, SPECIFIC_HEAT_CONSTANT_PRESSURE * temperature * mass)
+    return Flow.at(temperature, orifice.mass_flow(first.pressure, second.pressure, opening, temperature))
 
 
 def proportional_opening(error: Value, band: Value) -> Value:

@@ -7,18 +7,13 @@ several solutions, the one reached from rest is returned: the smallest contracti
 
 import abc
 from collections.abc import Callable, Iterable
-from typing import Any, ClassVar, NamedTuple, Self
+from typing import ClassVar, NamedTuple, Self
 
 from ....core import IdentificationError, Reference, Value, autodiff, model, ops, parameter
-from ..quantity_arguments import accept_quantities_in
+from ..quantity_arguments import QuantityMethods, Units
 from .solve import check_solution, describe_range, solve_direction, warn_above_whole_length
 from .validity_range import MeasuredPoints
 
-_UNITS = {
-    "force": ("Pa", "1"), "contraction": ("Pa", "N"), "pressure": ("1", "N"), "slopes": ("Pa", "1"),
-    "stiffness": ("Pa", "1"),
-}  # fmt: skip
-"""Units of the arguments of the methods."""
 MIN_PRESSURE = 1e-300
 """Replaces a pressure of zero [Pa] as a divisor; no load then has a solution."""
 
@@ -32,7 +27,7 @@ class Slopes(NamedTuple):
     """dF/deps at constant pressure [N]; its negative is the stiffness per unit of contraction."""
 
 
-class Characteristic(abc.ABC):
+class Characteristic(QuantityMethods, abc.ABC):
     """Static relation between gauge pressure [Pa], contraction [1] and tension [N]; pulling is positive.
 
     Arguments are numbers, arrays or lists in SI units, or texts with a unit: `force("3 bar", "10 %")`.
@@ -43,6 +38,11 @@ class Characteristic(abc.ABC):
     """Whether the model is in closed form over `ops`; otherwise a plant uses it through `as_force_law`."""
     redundant: ClassVar[tuple[str, ...]] = ()
     """Parameters that a fit keeps at those of `guess`, because they only scale other parameters."""
+    argument_units: ClassVar[Units] = {
+        "force": ("Pa", "1"), "contraction": ("Pa", "N"), "pressure": ("1", "N"), "slopes": ("Pa", "1"),
+        "stiffness": ("Pa", "1"),
+    }  # fmt: skip
+    check_ratio = staticmethod(warn_above_whole_length)
 
     @classmethod
     def guess(cls, data: MeasuredPoints) -> Self:
@@ -66,10 +66,6 @@ class Characteristic(abc.ABC):
         """
         own = getattr(cls.guess, "__func__", None) is not getattr(Characteristic.guess, "__func__", None)
         return {cls.__name__: cls.guess(data)} if own else {}
-
-    def __init_subclass__(cls, **options: Any) -> None:
-        super().__init_subclass__(**options)
-        accept_quantities_in(cls, _UNITS, warn_above_whole_length)
 
     @property
     def pressure_range(self) -> tuple[float, float]:
@@ -128,9 +124,6 @@ class Characteristic(abc.ABC):
             f"{type(self).__name__}: no force in the range {limits} gives a contraction of {100 * contraction:.4g} % "
             f"at {pressure / 1e3:.4g} kPa. "
         )
-
-
-accept_quantities_in(Characteristic, _UNITS, warn_above_whole_length)
 
 
 class ForceLaw(Characteristic):

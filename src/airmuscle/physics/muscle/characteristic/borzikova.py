@@ -9,18 +9,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from ....core import (
-    GeometryLimitError,
-    ParameterError,
-    Reference,
-    Value,
-    bar,
-    model,
-    ops,
-    parameter,
-    percent,
-    published,
-)
+from ....core import GeometryLimitError, ParameterError, Reference, Value, model, ops, parameter, published
+from ....core.units import bar, percent
 from .base import ContractionLaw
 
 BORZIKOVA = published("borzikova-sam")

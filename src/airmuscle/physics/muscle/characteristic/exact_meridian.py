@@ -1,13 +1,13 @@
 """Exact meridian of a straight-fibre muscle with rubber wall, the reference for the assumed meridians."""
 
+import functools
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from ....core import Reference, Value, model, parameter
+from ....core import Array, Reference, Value, model, parameter
 from ..geometry.base import Profile, check_contraction_range
-from ..geometry.meridian import SAGA_2007, graded_quadrature
-from ..geometry.meridian_shapes import CircularArc
+from ..geometry.meridian import SAGA_2007, CircularArc
 from ..geometry.pleated import DAERDEN_LEFEBER_2001, PleatedTube, unwrap_scalar
 from .base import PressureLaw, Slopes
 from .rubber import RubberLaw, RubberLine
@@ -47,6 +47,18 @@ class _Curve(NamedTuple):
     axial: Any
     fibre: Any
     factor: Any
+
+
+@functools.cache
+def graded_quadrature(nodes: int) -> tuple[Array, Array]:
+    """Nodes v and weights, shape (nodes,) each, for integrals over 0 <= v <= 1 with a factor like 1/sqrt(1 - v).
+
+    The nodes are Gauss points y in v = y (2 - y), so that 1 - v = (1 - y)^2 removes the singularity at v = 1. The
+    integral is sum(weights f(nodes)).
+    """
+    points, weights = np.polynomial.legendre.leggauss(nodes)
+    y = (points + 1) / 2
+    return y * (2 - y), weights * (1 - y)
 
 
 @model

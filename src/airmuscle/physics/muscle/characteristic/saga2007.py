@@ -7,8 +7,7 @@ import numpy as np  # noqa: TID251  (polynomial roots are never traced)
 
 from ....core import ParameterError, Reference, Value, as_finite_float, autodiff, model, ops, parameter
 from ..geometry.base import check_contraction_range
-from ..geometry.meridian import SAGA_2007
-from ..geometry.meridian_shapes import Parabola
+from ..geometry.meridian import SAGA_2007, Parabola
 from ..geometry.straight_fibre import FibreSum, HalfShellFibreSum, StraightFibre
 from .base import PressureLaw
 from .rubber import AxialIntegral, RubberIntegral, RubberLaw, RubberLine

@@ -39,7 +39,7 @@ class Tabulated(Characteristic):
                 f"Tabulated: {len(self.pressures)} pressures, {len(self.contractions)} contractions and "
                 f"{len(self.forces)} forces; each row requires all three."
             )
-        table = _isobars(self)
+        table = self._isobars
         steps = np.diff(table.forces(np.array(self.contractions)), axis=0)
         if (steps < 0).any():
             contraction = self.contractions[int(np.argwhere(steps < 0)[0, 1])]
@@ -47,6 +47,10 @@ class Tabulated(Characteristic):
                 f"Tabulated: at a contraction of {100 * contraction:.4g} % the force decreases with pressure. Correct "
                 "the rows, or fit a surface to them."
             )
+
+    @functools.cached_property
+    def _isobars(self) -> "_IsobarTable":
+        return _IsobarTable(self)
 
     @property
     def pressure_range(self) -> tuple[float, float]:
@@ -57,14 +61,14 @@ class Tabulated(Characteristic):
         return (min(self.contractions), max(self.contractions))
 
     def force(self, pressure: Value, contraction: Value) -> Value:
-        return _isobars(self).evaluate(pressure, contraction)[0][()]
+        return self._isobars.evaluate(pressure, contraction)[0][()]
 
     def slopes(self, pressure: Value, contraction: Value) -> Slopes:
-        _, by_pressure, by_contraction = _isobars(self).evaluate(pressure, contraction)
+        _, by_pressure, by_contraction = self._isobars.evaluate(pressure, contraction)
         return Slopes(by_pressure[()], by_contraction[()])
 
     def pressure(self, contraction: Value, force: Value) -> Value:
-        table = _isobars(self)
+        table = self._isobars
         c, load = as_arrays(contraction, force)
         forces = table.forces(c)
         between = (forces[:-1] <= load) & (load <= forces[1:])
@@ -81,7 +85,7 @@ class Tabulated(Characteristic):
         return (table.levels[j] + fraction * (table.levels[j + 1] - table.levels[j]))[()]
 
     def contraction(self, pressure: Value, force: Value) -> Value:
-        table = _isobars(self)
+        table = self._isobars
         p, load = as_arrays(pressure, force)
         low, high = table.contraction_limits(p)
         ends = np.array([table.evaluate(p, low)[0], table.evaluate(p, high)[0]])
@@ -162,11 +166,6 @@ class _IsobarTable:
             return f"Tabulated: {point} is outside the table, which covers {limits}."
         limits = describe_range(100 * start, 100 * end, "%")
         return f"Tabulated: {point} is outside the table, which covers {limits} at this pressure."
-
-
-@functools.lru_cache(maxsize=64)
-def _isobars(law: Tabulated) -> _IsobarTable:
-    return _IsobarTable(law)
 
 
 def _curve(pressure: float, contractions: Array, forces: Array) -> Any:

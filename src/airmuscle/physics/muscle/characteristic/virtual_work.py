@@ -6,8 +6,7 @@ from typing import ClassVar, NamedTuple
 from ....core import ParameterError, Reference, TraceError, Value, model, ops, parameter
 from ..geometry.base import Geometry, check_contraction_range
 from ..geometry.braid import CHOU_HANNAFORD_1996
-from ..geometry.meridian import SAGA_2007
-from ..geometry.meridian_shapes import FERRARESI_2001, CircularArc
+from ..geometry.meridian import FERRARESI_2001, SAGA_2007, CircularArc
 from ..geometry.straight_fibre import StraightFibre
 from .base import AreaLaw, ForceLaw, Slopes
 from .rubber import RubberLaw, RubberLine

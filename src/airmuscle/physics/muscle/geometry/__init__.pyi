@@ -4,10 +4,10 @@ from .chebyshev import ChebyshevGeometry as ChebyshevGeometry
 from .chebyshev import TabulatedGeometry as TabulatedGeometry
 from .chebyshev import Vessel as Vessel
 from .chebyshev import as_polynomial as as_polynomial
-from .meridian_shapes import Catenary as Catenary
-from .meridian_shapes import CircularArc as CircularArc
-from .meridian_shapes import Parabola as Parabola
-from .meridian_shapes import TrueArcParabola as TrueArcParabola
+from .meridian import Catenary as Catenary
+from .meridian import CircularArc as CircularArc
+from .meridian import Parabola as Parabola
+from .meridian import TrueArcParabola as TrueArcParabola
 from .pleated import PleatedTube as PleatedTube
 from .straight_fibre import HalfShellFibreSum as HalfShellFibreSum
 from .straight_fibre import PrintedFibreSum as PrintedFibreSum

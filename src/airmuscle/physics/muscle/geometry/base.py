@@ -1,12 +1,12 @@
 """Geometry (interface): enclosed volume and outline of a muscle as functions of contraction."""
 
 import abc
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import numpy as np
 
 from ....core import Array, GeometryLimitError, ParameterError, Reference, Value, abridged, autodiff
-from ..quantity_arguments import accept_quantities_in
+from ..quantity_arguments import QuantityMethods, Units
 
 
 def check_contraction_range(contraction: Value, limits: tuple[float, float], owner: str, remark: str = "") -> None:
@@ -31,8 +31,6 @@ LENGTHS = (1e-3, 20.0)
 """Bounds of a resting length [m]."""
 Profile = tuple[Array, Array]
 """Axial positions [m] and radii [m]."""
-_UNITS = {"volume": ("1",), "volume_derivative": ("1",)}
-"""Units of the arguments of the methods."""
 
 
 def check_degree(owner: str, degree: object, least: int = 0) -> None:
@@ -41,7 +39,7 @@ def check_degree(owner: str, degree: object, least: int = 0) -> None:
         raise ParameterError(f"{owner}: degree is {abridged(degree)}; it must be an integer, {least} or more.")
 
 
-class Geometry(abc.ABC):
+class Geometry(QuantityMethods, abc.ABC):
     """Volume [m3] and outline of a muscle; contraction is (L_0 - L)/L_0.
 
     Every geometry declares `resting_length` L_0 [m]: the length between the fittings, unpressurised and unloaded.
@@ -49,11 +47,8 @@ class Geometry(abc.ABC):
 
     references: ClassVar[tuple[Reference, ...]] = ()
     traceable: ClassVar[bool] = True
+    argument_units: ClassVar[Units] = {"volume": ("1",), "volume_derivative": ("1",)}
     resting_length: float
-
-    def __init_subclass__(cls, **options: Any) -> None:
-        super().__init_subclass__(**options)
-        accept_quantities_in(cls, _UNITS)
 
     @property
     @abc.abstractmethod
@@ -86,6 +81,3 @@ class Geometry(abc.ABC):
         """Raise GeometryLimitError if a contraction [1] is outside `contraction_range`."""
         values = np.asarray(contraction, dtype=float)
         check_contraction_range(values, self.contraction_range, type(self).__name__)
-
-
-accept_quantities_in(Geometry, _UNITS)

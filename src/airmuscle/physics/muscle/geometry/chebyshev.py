@@ -36,20 +36,19 @@ class TabulatedGeometry(Geometry):
     def contraction_range(self) -> tuple[float, float]:
         return (self.contractions[0], self.contractions[-1])
 
+    @functools.cached_property
+    def _curve(self) -> Any:
+        from scipy.interpolate import PchipInterpolator  # slow to import and rarely needed
+
+        return PchipInterpolator(self.contractions, self.volumes, extrapolate=False)
+
     def volume(self, contraction: Value) -> Value:
         self.check_contraction(contraction)
-        return _curve(self)(contraction)[()]
+        return self._curve(contraction)[()]
 
     def volume_derivative(self, contraction: Value) -> Value:
         self.check_contraction(contraction)
-        return _curve(self).derivative()(contraction)[()]
-
-
-@functools.lru_cache(maxsize=64)
-def _curve(geometry: TabulatedGeometry) -> Any:
-    from scipy.interpolate import PchipInterpolator  # slow to import and rarely needed
-
-    return PchipInterpolator(geometry.contractions, geometry.volumes, extrapolate=False)
+        return self._curve.derivative()(contraction)[()]
 
 
 @model

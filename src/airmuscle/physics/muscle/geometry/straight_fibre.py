@@ -6,8 +6,7 @@ import numpy as np
 
 from ....core import Array, ParameterError, Value, model, ops, parameter
 from .base import LENGTHS, RESTING_LENGTH, Geometry, Profile, check_contraction_range
-from .meridian import Meridian, Segment
-from .meridian_shapes import CircularArc
+from .meridian import CircularArc, Meridian, Segment
 
 
 class FibreSum(abc.ABC):
