@@ -30,8 +30,11 @@ def _column(metric: str, values: Sequence[float], **declared: Any) -> TableColum
 
 def benchmark_chapter(result: BenchmarkResult, curves: Sequence[LearningCurve] = ()) -> Chapter:
     """The chapter of a benchmark: for each group ranking and errors, then searches, gains, truths and all metrics."""
-    groups = result.groups
-    tables = [table for group in groups for table in group_tables(result, group)]
+    tables: list[Table] = []
+    for group in result.groups:
+        is_ordered = len(result.contenders(group)) > 1 and len(result.truths) > 1
+        tables += [ranking_table(result, group), *([order_table(result, group)] if is_ordered else [])]
+        tables.append(error_table(result, "rmse", group))
     tables += [table for table in (search_table(result), gains_table(result)) if table]
     tables += [truth_table(result), metrics_table(result)]
     tables += [learning_table(curves)] if curves else []
@@ -49,14 +52,6 @@ def benchmark_chapter(result: BenchmarkResult, curves: Sequence[LearningCurve] =
         references=_references(result),
         chosen=_settings(result),
     )
-
-
-def group_tables(result: BenchmarkResult, group: Group) -> list[Table]:
-    """Ranking, order on each truth, and errors of one group."""
-    tables = [ranking_table(result, group), error_table(result, "rmse", group)]
-    if len(result.contenders(group)) > 1 and len(result.truths) > 1:
-        tables.insert(1, order_table(result, group))
-    return tables
 
 
 def ranking_table(result: BenchmarkResult, group: Group) -> Table:

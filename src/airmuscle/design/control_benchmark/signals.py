@@ -155,19 +155,10 @@ STEADY_TIME = 0.3
 RATED_STROKES = 5e8
 """Strokes of a valve in its life (chosen; state that of the valve used)."""
 
-METRICS = {
-    "rmse": ("rms error", "rad", "deg"),
-    "max_error": ("maximum error", "rad", "deg"),
-    "itae": ("ITAE", "rad s^2", "deg s^2"),
-    "settling": ("settling time", "s", "s"),
-    "overshoot": ("overshoot", "1", "%"),
-    "steady": ("steady-state error", "rad", "deg"),
-    "air": ("air", "m3/s (ANR)", "l/s (ANR)"),
-    "strokes": ("valve strokes", "1/s", "1/s"),
-    "valve_life": ("valve life", "s", "h"),
-    "stiffness_error": ("stiffness error", "1", "%"),
-}
-"""Names, SI units and shown units of the metrics, by the fields of TrackingMetrics, which are in the shown units."""
+
+def _metric(name: str, unit: str, shown: str) -> Any:
+    """A metric with its name, its SI unit and the unit in which it is shown, that of the field."""
+    return dataclasses.field(metadata={"column": (name, unit, shown)})
 
 
 @dataclasses.dataclass(frozen=True)
@@ -185,16 +176,20 @@ class TrackingMetrics:
     stiffness_error     rms of the stiffness of the truth over that wanted, less 1 [%], over the last 0.3 s
     """
 
-    rmse: float
-    max_error: float
-    itae: float
-    settling: float
-    overshoot: float
-    steady: float
-    air: float
-    strokes: float
-    valve_life: float
-    stiffness_error: float
+    rmse: float = _metric("rms error", "rad", "deg")
+    max_error: float = _metric("maximum error", "rad", "deg")
+    itae: float = _metric("ITAE", "rad s^2", "deg s^2")
+    settling: float = _metric("settling time", "s", "s")
+    overshoot: float = _metric("overshoot", "1", "%")
+    steady: float = _metric("steady-state error", "rad", "deg")
+    air: float = _metric("air", "m3/s (ANR)", "l/s (ANR)")
+    strokes: float = _metric("valve strokes", "1/s", "1/s")
+    valve_life: float = _metric("valve life", "s", "h")
+    stiffness_error: float = _metric("stiffness error", "1", "%")
+
+
+METRICS = {field.name: field.metadata["column"] for field in dataclasses.fields(TrackingMetrics)}
+"""Names, SI units and shown units of the metrics."""
 
 
 def track(

@@ -36,8 +36,6 @@ class CaseGroup:
     """Cases whose loops run in one batch: plants of one structure with the same loop.
 
     places          the cases among all
-    plant, loop     of the first of them
-    full_paths      the tuned gains as paths of `loop.controller`
     varied          values (m,) of the parameters in which the m plants differ, by path
     initial_states  values (m,) by state
     """

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core import Array, ParameterError, SimulationError, leaves
+from ...core import Array, ParameterError, SimulationError, check_known, leaves
 from ...engine.distribution import DistributedCalls
 from ...engine.processes import Workers, process_pool
 from ...engine.run.integrators import Integrator
@@ -192,9 +192,7 @@ class _Search:
         self.present_count = 0 if own is None else 1
         points = [] if own is None else [own]
         for number, gains in enumerate(start):
-            unknown = [path for path in gains if path not in self.evaluator.paths]
-            if unknown:
-                raise ParameterError(f"tune: start {number} names '{unknown[0]}', which bounds does not name.")
+            check_known(f"tune: start {number} names", gains, self.evaluator.paths, "bounds names")
             point = to_coordinates(self.ranges, {**present, **gains})
             if point is None:
                 raise ParameterError(f"tune: start {number} is outside the bounds: {dict(gains)}. Extend the bounds.")

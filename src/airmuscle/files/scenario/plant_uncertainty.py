@@ -15,7 +15,7 @@ from ...bench.identify.group_refits import LEVEL, degrees_of_freedom, root_mean_
 from ...bench.identify.prediction import PlantUncertainty
 from ...bench.identify.prediction.dynamic import NORMAL_QUANTILE
 from ...bench.segment import estimate_noise, maximum_rate
-from ...core import Array, ParameterError, tree
+from ...core import Array, ParameterError, check_known, tree
 from ...physics.plant.plant import Plant
 from ..library import Location, ParameterUncertainty, custom_field, located_errors
 from .values import BySignal, table_reader
@@ -130,10 +130,9 @@ def read_plant_uncertainty(value: Any, plant: Plant, where: Location) -> PlantUn
     with located_errors(place):
         fitted = ParameterUncertainty(table.parameters, table.standard_errors, table.correlations)
     groups = tuple(tuple(name.split(SEPARATOR)) for name in fitted.parameters)
-    paths = {leaf.path for leaf in tree.leaves(plant)}
-    unknown = [path for group in groups for path in group if path not in paths]
-    if unknown:
-        raise ParameterError(f"{place}, parameters: the plant has no parameter '{unknown[0]}'.")
+    known = [leaf.path for leaf in tree.leaves(plant)]
+    what = f"{place}, parameters: the plant has no parameter"
+    check_known(what, [path for group in groups for path in group], known, "its parameters are")
     return PlantUncertainty(
         table.deviations, groups, fitted.covariance, table.records, table.factors, table.ranges, table.rates
     )
