@@ -1,6 +1,5 @@
-from .angle_and_stiffness import AngleAndStiffness as AngleAndStiffness
-from .angle_and_stiffness import AntagonisticInverse as AntagonisticInverse
 from .composition import Cascade as Cascade
+from .composition import Decentralised as Decentralised
 from .composition import GainSchedule as GainSchedule
 from .composition import WithFeedForward as WithFeedForward
 from .enclosing import Multirate as Multirate
@@ -29,8 +28,9 @@ from .open_loop import SetpointCommand as SetpointCommand
 from .open_loop import SetpointLead as SetpointLead
 from .open_loop import StaticFeedForward as StaticFeedForward
 from .open_loop import StaticInverse as StaticInverse
+from .pressures import AngleAndStiffness as AngleAndStiffness
+from .pressures import AntagonisticInverse as AntagonisticInverse
 from .pressures import CoContraction as CoContraction
-from .pressures import Decentralised as Decentralised
 from .pressures import ProportionalFeedback as ProportionalFeedback
 from .single_column import PID as PID
 from .single_column import DeadZoneController as DeadZoneController

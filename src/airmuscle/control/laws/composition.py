@@ -1,4 +1,4 @@
-"""Laws composed of laws: cascade, feed-forward beside feedback, scheduled parameters."""
+"""Laws composed of laws: cascade, feed-forward beside feedback, decentralised control, scheduled parameters."""
 
 import itertools
 from collections.abc import Mapping
@@ -126,6 +126,53 @@ class WithFeedForward(ControlLaw):
         back, second = self.feedback.step(select_prefix("feedback.", memory), measurement._replace(ranges=ranges), dt)
         commands = {name: value + back[name] if name in back else value for name, value in ahead.items()}
         return commands, {**with_prefix("feed_forward.", first), **with_prefix("feedback.", second)}
+
+
+@model
+class Decentralised(ControlLaw):
+    """Decentralised control: independent control laws, such as one pressure controller for each muscle of a joint.
+
+    No input may be commanded by two laws.
+    Reference: Skogestad and Postlethwaite (2005), chapter 10.
+    """
+
+    references: ClassVar[tuple[Reference, ...]] = (published("skogestad-postlethwaite-2005"),)
+
+    laws: tuple[ControlLaw, ...]
+
+    def check(self) -> None:
+        if not self.laws:
+            raise ParameterError("Decentralised: there is no law; give at least one.")
+        named = [name for law in self.laws for name in law.inputs]
+        twice = [name for name in named if named.count(name) > 1]
+        if twice:
+            raise ParameterError(f"Decentralised: '{twice[0]}' is commanded by two laws; give each input to one law.")
+
+    @property
+    def measured_columns(self) -> tuple[str, ...]:
+        return united(*(law.measured_columns for law in self.laws))
+
+    @property
+    def setpoints(self) -> tuple[str, ...]:
+        return united(*(law.setpoints for law in self.laws))
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        return united(*(law.inputs for law in self.laws))
+
+    @property
+    def initial_memory(self) -> dict[str, float]:
+        """The values of all laws, with the prefixes `0.`, `1.`, ..."""
+        return {f"{i}.{name}": value for i, law in enumerate(self.laws) for name, value in law.initial_memory.items()}
+
+    def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
+        commands: dict[str, Value] = {}
+        later: dict[str, Value] = {}
+        for i, law in enumerate(self.laws):
+            own, kept = law.step(select_prefix(f"{i}.", memory), measurement, dt)
+            commands |= own
+            later |= with_prefix(f"{i}.", kept)
+        return commands, later
 
 
 @model

@@ -6,8 +6,8 @@ from typing import ClassVar
 from ...core import ParameterError, Reference, Value, model, ops, parameter, published, select_prefix, with_prefix
 from ...core.errors import check_known
 from ...engine.loop import ControlLaw, Measurement, Memory, MultivariableController, Sampled
-from .angle_and_stiffness import AntagonisticInverse
 from .open_loop import check_pair
+from .pressures import AntagonisticInverse
 
 FRANKLIN1998 = published("franklin-1998")
 

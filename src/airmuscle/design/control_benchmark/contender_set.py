@@ -4,9 +4,8 @@ import dataclasses
 import functools
 
 from ...control.laws import PID, SlidingMode, SuperTwisting, WithFeedForward, WithSetpointDelay
-from ...control.laws.angle_and_stiffness import AngleAndStiffness, AntagonisticInverse
 from ...control.laws.open_loop import FrictionFeedForward, MotionFeedForward, SetpointLead
-from ...control.laws.pressures import DIFFERENCE
+from ...control.laws.pressures import DIFFERENCE, AngleAndStiffness, AntagonisticInverse
 from ...core import with_prefix
 from ...engine.loop import ControlLaw
 from . import designed_controllers as designed
