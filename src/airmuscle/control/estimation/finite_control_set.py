@@ -1,7 +1,6 @@
 """FiniteControlSet: model predictive control that chooses among the modes of on/off valves."""
 
 import dataclasses
-import itertools
 from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, NamedTuple
 
@@ -79,8 +78,7 @@ class FiniteControlSet(ShortRepr, Controller):
     def __post_init__(self) -> None:
         check_field_types(self)
         owner, known = "FiniteControlSet", compile_system(self.estimator.plant).description
-        columns = self.estimator.plant_columns
-        check_numbers(owner, "permitted", self.permitted, columns, ())
+        check_numbers(owner, "permitted", self.permitted, self.estimator.plant_columns, ())
         if not self.permitted or not self.modes:
             raise ParameterError(f"{owner}: give one mode or more, and the permitted deviation of one column or more.")
         for mode in self.modes:
@@ -152,9 +150,7 @@ class FiniteControlSet(ShortRepr, Controller):
         columns = filter_.plant_columns
         functions = augmented_rates(ready, [columns.index(name) for name in self.permitted], *filter_.places)
         table, n = self._mode_table, ready.sizes.states
-        changes = np.zeros((len(table), len(table)))
-        for i, j in itertools.product(range(len(table)), repeat=2):
-            changes[i, j] = self.switching_cost * np.count_nonzero(table[i] != table[j])
+        changes = self.switching_cost * np.count_nonzero(table[:, None] != table, axis=2)
         weights = np.array([1.0 / deviation**2 for deviation in self.permitted.values()])
         states, wanted = np.zeros((self.horizon + 1, total)), np.zeros(p)
         sequence, count = np.zeros(self.horizon + 1, dtype=np.int64), np.zeros(2, dtype=np.int64)

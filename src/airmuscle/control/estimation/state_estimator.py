@@ -177,15 +177,12 @@ class StateEstimator(ShortRepr, abc.ABC):
         self._run(bound.correct, bound)
         innovation = Innovation(bound.difference[here], bound.difference_covariance[np.ix_(here, here)])
         corrected = self._taken(bound)
-        return (estimate if self._is_outlier(innovation) else corrected), innovation
+        if self.gate < 1.0 and here.any():
+            from scipy.special import chdtri
 
-    def _is_outlier(self, innovation: Innovation) -> bool:
-        """Whether an innovation is beyond the gate."""
-        if self.gate == 1.0 or not innovation.difference.size:
-            return False
-        from scipy.special import chdtri
-
-        return innovation.normalised_square > float(chdtri(innovation.difference.size, 1.0 - self.gate))
+            if innovation.normalised_square > float(chdtri(here.sum(), 1.0 - self.gate)):
+                return estimate, innovation
+        return corrected, innovation
 
     def columns(self, estimate: StateEstimate, inputs: Sequence[float]) -> dict[str, float]:
         """All states and outputs of the plant at an estimate, such as contraction and force."""

@@ -93,7 +93,10 @@ def linearise_law(
     _check_sides(sample, point, sizes)
     slopes, n, p = sample(point)[1], sample.count, len(law.measured_columns)
     by_memory, by_measured, by_setpoint = slopes[:, :n], slopes[:, n : n + p], slopes[:, n + p :]
-    kept = _observed(by_memory, n)
+    seen = np.any(by_memory[n:] != 0, axis=0)  # on which commands depend, also over later samples
+    for _ in range(n):
+        seen = seen | np.any(by_memory[:n][seen] != 0, axis=0)
+    kept = np.flatnonzero(seen).tolist()
     names = tuple(law.initial_memory)
     return LinearLaw(
         by_memory[np.ix_(kept, kept)], by_measured[kept], by_setpoint[kept],
@@ -139,11 +142,3 @@ def _check_sides(sample: _Sample, point: Point, sizes: Sequence[float]) -> None:
             "differ on both sides of this working point (a closed valve in split range, a limit, a dead zone). "
             "Choose one on a side: give inputs that are open by a little, such as {'fill': 0.01}."
         )
-
-
-def _observed(by_memory: Array, n: int) -> list[int]:
-    """The values of the memory on which commands depend, also over later samples."""
-    reached = np.any(by_memory[n:] != 0, axis=0)
-    for _ in range(n):
-        reached = reached | np.any(by_memory[:n][reached] != 0, axis=0)
-    return np.flatnonzero(reached).tolist()

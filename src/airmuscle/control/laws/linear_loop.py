@@ -2,7 +2,7 @@
 
 import dataclasses
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -255,25 +255,16 @@ def linearise_loop(
     given = {**dict(zip((i.name for i in plant.input_variables), present, strict=False)), **(inputs or {})}
     model = linearise(plant, state, given)
     loop.check_columns(model.outputs, model.inputs)
-    measured = [model.output_values[name] for name in law.measured_columns]
+    columns = model.output_values
+    measured = [columns[name] for name in law.measured_columns]
+    nominal = {each.name: abs(each.nominal) for each in plant.states}
+    sizes = [max(abs(columns[name]), nominal.get(name, 1e-3)) for name in law.measured_columns]
     limits = np.array(list(loop.command_ranges(plant).values()))
     memory = law.initial_memory if control_state is None else control_state.controller
     values = np.array(list(memory.values() if isinstance(memory, Mapping) else memory), dtype=float)
-    setpoints = _setpoints(loop, law, model.output_values, control_state)
-    point = Point(np.array(measured), setpoints, values, limits[:, 0], limits[:, 1])
-    sizes = _sizes(plant, law.measured_columns, measured)
+    time = control_state.time if control_state else 0.0
+    signal = loop.setpoint.segments(law.setpoints, time, loop.sample_time).values[0]
+    setpoints = [columns.get(name, value) for name, value in zip(law.setpoints, signal.tolist(), strict=True)]
+    point = Point(np.array(measured), np.array(setpoints), values, limits[:, 0], limits[:, 1])
     linear = linearise_law(law, loop.sample_time, point, model.input_values, sizes, control_state is not None)
     return LinearLoop(model.select(law.inputs, law.measured_columns).with_delay(delay), linear, loop.sample_time)
-
-
-def _setpoints(loop: ControlLoop, law: ControlLaw, columns: Mapping[str, float], at: ControlLoopState | None) -> Array:
-    """The set points of a working point: the values of measured columns, others from the signal of the loop."""
-    time = at.time if at else 0.0
-    signal = loop.setpoint.segments(law.setpoints, time, loop.sample_time).values[0]
-    return np.array([columns.get(name, value) for name, value in zip(law.setpoints, signal.tolist(), strict=True)])
-
-
-def _sizes(plant: System, names: Sequence[str], values: Sequence[float]) -> list[float]:
-    """The sizes of some columns: their values, at least the nominal values of states."""
-    nominal = {state.name: abs(state.nominal) for state in plant.states}
-    return [max(abs(value), nominal.get(name, 1e-3)) for name, value in zip(names, values, strict=True)]

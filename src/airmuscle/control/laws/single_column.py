@@ -11,12 +11,13 @@ SLIDING_MEMORY: Memory = {"started": 0.0, "error": 0.0, "error_rate": 0.0}
 
 
 def sliding_variable(
-    memory: Memory, error: Value, sliding_time: Value, filter_time: Value, dt: Value
+    law: SisoController, memory: Memory, measurement: Measurement, sliding_time: Value, filter_time: Value, dt: Value
 ) -> tuple[Value, dict[str, Value]]:
-    """s = e + T_s e' and the memory for the next sample; e' is 0 at the first sample.
+    """s = e + T_s e', e = r - y, of a law and the memory for the next sample; e' is 0 at the first sample.
 
     The derivative is filtered by a first-order lag of time constant T_f [s], by backward differences.
     """
+    error = measurement.setpoints[law.measured] - measurement.columns[law.measured]
     change = (error - memory["error"] + filter_time * memory["error_rate"]) / (filter_time + dt)
     rate = ops.where(memory["started"] > 0, change, 0.0)
     return error + sliding_time * rate, {"started": 1.0, "error": error, "error_rate": rate}
@@ -44,8 +45,7 @@ class SlidingMode(SisoController):
     """Whether it has started (0 or 1), the last error [y] and its filtered derivative [y/s]."""
 
     def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
-        error = measurement.setpoints[self.measured] - measurement.columns[self.measured]
-        s, later = sliding_variable(memory, error, self.sliding_time, self.filter_time, dt)
+        s, later = sliding_variable(self, memory, measurement, self.sliding_time, self.filter_time, dt)
         layer = ops.where(self.boundary_layer > 0, self.boundary_layer, 1.0)
         switched = ops.where(s > 0.0, 1.0, ops.where(s < 0.0, -1.0, 0.0))
         saturated = ops.where(self.boundary_layer > 0, ops.clip(s / layer, -1.0, 1.0), switched)
@@ -77,8 +77,7 @@ class SuperTwisting(SisoController):
     """Whether it has started (0 or 1), the last error, its filtered derivative, and the integral w [u]."""
 
     def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
-        error = measurement.setpoints[self.measured] - measurement.columns[self.measured]
-        s, later = sliding_variable(memory, error, self.sliding_time, self.filter_time, dt)
+        s, later = sliding_variable(self, memory, measurement, self.sliding_time, self.filter_time, dt)
         sign = ops.where(s > 0.0, 1.0, ops.where(s < 0.0, -1.0, 0.0))
         integral = ops.where(memory["started"] > 0, memory["integral"], self.initial_output)
         low, high = range_of(self.commanded, measurement.ranges)
@@ -216,8 +215,7 @@ class DeadZoneController(SisoController):
     """The position (-1, 0 or 1), whether it has started, the last error and its filtered derivative."""
 
     def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
-        error = measurement.setpoints[self.measured] - measurement.columns[self.measured]
-        s, later = sliding_variable(memory, error, self.lead_time, self.filter_time, dt)
+        s, later = sliding_variable(self, memory, measurement, self.lead_time, self.filter_time, dt)
         inner = self.release * self.zone
         held = memory["position"]
         remains = ops.where(held > 0.0, s >= inner, ops.where(held < 0.0, s <= -inner, 0.0 > 1.0))

@@ -4,6 +4,7 @@ A table is an object of a dataclass, its keys are the fields. Numbers are in the
 (`"300 mm"`), tuples are lists, objects inside are tables. `model = "Braid"` names the class; it may be omitted where
 only one is possible, and a model without parameters is its name alone (`gas = "Isothermal"`). A list of numbers may
 also be a column of a data file, relative to the folder of the TOML file: `{ file = "data/map.csv", column = "force" }`.
+The metadata of a field may state another `key`, and none if it is empty.
 """
 
 import dataclasses

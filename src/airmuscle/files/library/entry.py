@@ -19,7 +19,6 @@ from ...physics.plant.plant import Plant
 from ...physics.pneumatics import REFERENCE_DENSITY, REFERENCE_TEMPERATURE, Orifice
 from ...report.chapter import Table
 from .entry_display import EntryDisplay
-from .fields import under
 from .files import entries_of_product
 from .uncertainty import ParameterUncertainty, StatedBand
 
@@ -112,8 +111,8 @@ class Entry(EntryDisplay):
     creep: CreepElements | None = None
     validity_range: ValidityRange | None = None
     ratings: Ratings | None = None
-    checks: tuple[Check, ...] = dataclasses.field(default=(), metadata=under("check"))
-    references: tuple[Reference, ...] = dataclasses.field(default=(), metadata=under("reference"))
+    checks: tuple[Check, ...] = dataclasses.field(default=(), metadata={"key": "check"})
+    references: tuple[Reference, ...] = dataclasses.field(default=(), metadata={"key": "reference"})
     uncertainty: ParameterUncertainty | None = None
     error_band: StatedBand | None = None
 
@@ -149,8 +148,8 @@ class ValveEntry(EntryDisplay):
     valve: Orifice
     exhaust: Orifice | None = None
     switching_times: SwitchingTimes | None = None
-    checks: tuple[Check, ...] = dataclasses.field(default=(), metadata=under("check"))
-    references: tuple[Reference, ...] = dataclasses.field(default=(), metadata=under("reference"))
+    checks: tuple[Check, ...] = dataclasses.field(default=(), metadata={"key": "check"})
+    references: tuple[Reference, ...] = dataclasses.field(default=(), metadata={"key": "reference"})
 
     def orifice(self, path: str) -> Orifice:
         """Orifice of a flow path, "valve" or "exhaust". Raises UnknownNameError if the entry has no such path."""
@@ -175,7 +174,7 @@ class ProductEntry(EntryDisplay):
     """
 
     ratings: Ratings
-    references: tuple[Reference, ...] = dataclasses.field(default=(), metadata=under("reference"))
+    references: tuple[Reference, ...] = dataclasses.field(default=(), metadata={"key": "reference"})
 
     def _tables(self) -> Iterator[Table]:
         """The permitted ranges, and the muscles and laws that were measured on the product."""
@@ -200,7 +199,7 @@ class PlantEntry(EntryDisplay):
 
     plant: Plant
     sources: tuple[tuple[str, str], ...] = ()
-    references: tuple[Reference, ...] = dataclasses.field(default=(), metadata=under("reference"))
+    references: tuple[Reference, ...] = dataclasses.field(default=(), metadata={"key": "reference"})
 
     def _chart(self) -> Any:
         return self.plant._card().draw

@@ -14,7 +14,6 @@ from ...physics.muscle import Ratings
 from ...physics.muscle.isobars import plot_isobars
 from ...report.chapter import BY_ROW, Chapter, NamedValue, Plot, Table, TableColumn
 from ...report.shown import leaf_table
-from .fields import under
 
 PROVENANCES = (
     "printed", "corrected", "converted", "measured", "data sheet", "secondary source", "fitted", "chosen", "example",
@@ -44,7 +43,7 @@ class EntryDisplay(Reported, abc.ABC):
     which is issued when the entry is loaded.
     """
 
-    name: str = dataclasses.field(metadata=under(""))
+    name: str = dataclasses.field(metadata={"key": ""})
     title: str
     provenance: str
     _: dataclasses.KW_ONLY

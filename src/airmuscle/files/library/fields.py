@@ -125,11 +125,6 @@ _ITEMS = {str: ' of texts, such as ["pressure", "force"]', float: " of numbers"}
 _PLAIN = (int, float, str, bool, tuple, types.NoneType)
 
 
-def under(key: str) -> dict[str, str]:
-    """Metadata of a dataclass field that has another key in a file, or none if `key` is empty."""
-    return {"key": key}
-
-
 def custom_field(read: Reader, meaning: str, **field: Any) -> Any:
     """Declare a dataclass field that `read` reads from a file, instead of a parameter with a fixed unit."""
     return dataclasses.field(metadata={"read": read, "meaning": meaning}, **field)

@@ -196,14 +196,6 @@ class SignalTable:
     columns: Mapping[str, str] | None = custom_field(_read_names, "columns of the file by input", default=None)
     drivers: Mapping[str, Chain] = custom_field(read_drivers, "drivers by input", default_factory=dict)
 
-    def signal_class(self, location: Location) -> type[Schedule] | type[SampledSignal]:
-        """The class of the signal. Raises UnknownNameError or ParameterError."""
-        name = self.model or ("SampledSignal" if self.file is not None else "Schedule")
-        cls = model_class(name, f"{location}, model", kind=Schedule | SampledSignal)
-        if not issubclass(cls, Schedule | SampledSignal):
-            raise ParameterError(f"{location}: {cls.__name__} is no input signal; there are Schedule, SampledSignal.")
-        return cls
-
 
 RESERVED_KEYS = tuple(field.name for field in dataclasses.fields(SignalTable))
 """Keys of the table that are not inputs."""
@@ -231,8 +223,12 @@ def build_input_signal(
         if key in points:
             raise ParameterError(f"{location}: '{key}' is given both by the file and by rows; remove one of them.")
         points[key] = tuple(_read_rows(value, units[key], location.at(key)))
+    name = keys.model or ("SampledSignal" if keys.file is not None else "Schedule")
     with located_errors(location):
-        signal: InputSignal = keys.signal_class(location)(points)
+        cls = model_class(name, f"{location}, model", kind=Schedule | SampledSignal)
+        if not issubclass(cls, Schedule | SampledSignal):
+            raise ParameterError(f"{location}: {cls.__name__} is no input signal; there are Schedule, SampledSignal.")
+        signal: InputSignal = cls(points)
         signal = signal if keys.period is None else Periodic(signal, keys.period)
     return WithDrivers(signal, keys.drivers) if keys.drivers else signal
 
