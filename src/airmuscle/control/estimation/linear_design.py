@@ -49,8 +49,7 @@ def checked_scale(
     check_numbers(owner, "permitted", permitted, (*model.states, *model.inputs), model.inputs)
     check_numbers(owner, "process_noise", noise[0], names, names[len(model.states) :])
     check_numbers(owner, "measurement_noise", noise[1], columns["measured"], columns["measured"])
-    sizes = [permitted.get(i, noise[0].get(i, max(abs(model.state[i]), 1.0))) for i in model.states]
-    return names, np.array(sizes)
+    return names, np.array([permitted.get(i, noise[0].get(i, max(abs(model.state[i]), 1.0))) for i in model.states])
 
 
 def check_sample_time(owner: str, sample_time: float, of_estimator: float) -> None:

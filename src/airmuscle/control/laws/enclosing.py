@@ -31,7 +31,7 @@ class WithSetpointDelay(EnclosingLaw):
     def initial_memory(self) -> dict[str, float]:
         """Whether it has started (0 or 1), the waiting set points, the oldest first, and the values of the law."""
         waiting = {f"{name}.delayed{i}": 0.0 for name in self.setpoints for i in range(self.samples)}
-        return {"started": 0.0, **waiting, **with_prefix("law.", dict(self.law.initial_memory))}
+        return {"started": 0.0, **waiting, **with_prefix("law.", self.law.initial_memory)}
 
     def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
         delayed: dict[str, Value] = {}
@@ -65,7 +65,7 @@ class Multirate(EnclosingLaw):
     def initial_memory(self) -> dict[str, float]:
         """The samples since that of the law, the held commands, and the values of the law."""
         held = dict.fromkeys(self.inputs, 0.0)
-        return {"phase": 0.0, **with_prefix("held.", held), **with_prefix("law.", dict(self.law.initial_memory))}
+        return {"phase": 0.0, **with_prefix("held.", held), **with_prefix("law.", self.law.initial_memory)}
 
     def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
         before, due = select_prefix("law.", memory), memory["phase"] < 0.5
@@ -109,7 +109,7 @@ class WithCommandDelay(EnclosingLaw):
         late = {f"late.{name}.{age}": 0.0 for name in self.inputs for age in ages}
         own = {"started": 0.0, **late, **with_prefix("applied.", dict.fromkeys(self.inputs, 0.0))}
         random = with_prefix("random.", dict.fromkeys(STATE, 0.0))
-        return {**own, **random, **with_prefix("law.", dict(self.law.initial_memory))}
+        return {**own, **random, **with_prefix("law.", self.law.initial_memory)}
 
     def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
         wanted, law = self.law.step(select_prefix("law.", memory), measurement, dt)
@@ -156,7 +156,7 @@ class WithRateLimit(EnclosingLaw):
     def initial_memory(self) -> dict[str, float]:
         """Whether it has started, the last commands, and the values of the law."""
         last = with_prefix("last.", dict.fromkeys(self.inputs, 0.0))
-        return {"started": 0.0, **last, **with_prefix("law.", dict(self.law.initial_memory))}
+        return {"started": 0.0, **last, **with_prefix("law.", self.law.initial_memory)}
 
     def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
         ranges = dict(measurement.ranges)
@@ -198,7 +198,7 @@ class WithManual(EnclosingLaw):
     def initial_memory(self) -> dict[str, float]:
         """Whether the last sample was by hand, last commands, offsets b, and the values of the law."""
         own = {f"{kind}.{name}": 0.0 for kind in ("last", "offset") for name in self.inputs}
-        return {"by_hand": 0.0, **own, **with_prefix("law.", dict(self.law.initial_memory))}
+        return {"by_hand": 0.0, **own, **with_prefix("law.", self.law.initial_memory)}
 
     def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
         wanted, by_hand = measurement.setpoints, measurement.setpoints["manual"] >= 0.5

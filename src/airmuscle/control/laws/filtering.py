@@ -64,8 +64,7 @@ class WithFilter(EnclosingLaw):
     @property
     def initial_memory(self) -> dict[str, float]:
         """Whether it has started, two values of the filter, and the values of the law."""
-        own = {"started": 0.0, "first": 0.0, "second": 0.0}
-        return {**own, **with_prefix("law.", dict(self.law.initial_memory))}
+        return {"started": 0.0, "first": 0.0, "second": 0.0, **with_prefix("law.", self.law.initial_memory)}
 
     def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
         x, f = measurement.columns[self.column], self.exact_frequency
@@ -125,7 +124,7 @@ class SmithPredictor(EnclosingLaw):
     def initial_memory(self) -> dict[str, float]:
         """The response of the model now and up to n samples ago (the newest first), and the values of the law."""
         response = {f"response{age}": 0.0 for age in range(self.samples + 1)}
-        return {**response, **with_prefix("law.", dict(self.law.initial_memory))}
+        return {**response, **with_prefix("law.", self.law.initial_memory)}
 
     def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
         now, before = memory["response0"], memory[f"response{self.samples}"]
@@ -174,7 +173,7 @@ class RepetitiveControl(EnclosingLaw):
     def initial_memory(self) -> dict[str, float]:
         """Signal and error up to N + 1 samples ago (the newest first), and the values of the law."""
         past = {f"{kind}{age}": 0.0 for kind in ("signal", "error") for age in range(1, self.period_samples + 2)}
-        return {**past, **with_prefix("law.", dict(self.law.initial_memory))}
+        return {**past, **with_prefix("law.", self.law.initial_memory)}
 
     def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
         wanted = measurement.setpoints[self.column]

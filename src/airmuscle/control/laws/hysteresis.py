@@ -180,5 +180,5 @@ class HysteresisCompensation(EnclosingLaw):
     def step(self, memory: Memory, measurement: Measurement, dt: Value) -> Sampled:
         commands, kept = self.law.step(select_prefix("law.", memory), measurement, dt)
         value, plays = self.inverse.step(select_prefix("hysteresis.", memory), commands[self.commanded])
-        later = {**with_prefix("hysteresis.", plays), **with_prefix("law.", kept)}
-        return {**commands, self.commanded: value}, later
+        commands = {**commands, self.commanded: value}
+        return commands, {**with_prefix("hysteresis.", plays), **with_prefix("law.", kept)}

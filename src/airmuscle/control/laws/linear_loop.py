@@ -207,8 +207,7 @@ class LinearLoop:
         time = self.sample_time * np.arange(max(round(duration / self.sample_time), 1) + 1)
         steps = np.zeros((time.size, len(known)))
         steps[:, known.index(setpoint)] = size
-        columns = self.closed.response(steps)
-        return {"time": time, **dict(zip(self.law.measured, columns.T, strict=True))}
+        return {"time": time, **dict(zip(self.law.measured, self.closed.response(steps).T, strict=True))}
 
     def _model(self, opened: int | None) -> SampledModel:
         """From the set points to the columns, or from the received value of a column to minus its own."""

@@ -150,8 +150,7 @@ class ComputedTorque(ControlLaw):
             + 2.0 * self.damping_ratio * self.frequency * (wanted[self._speed] - speed)
             + self.frequency**2 * (wanted[name] - angle)
         )
-        torque = self.torque(angle, speed, acceleration)
-        pressures = self.inverse.pressures(angle, torque, wanted["stiffness"])
+        pressures = self.inverse.pressures(angle, self.torque(angle, speed, acceleration), wanted["stiffness"])
         return dict(zip(self.commanded, pressures, strict=True)), {}
 
     def torque(self, angle: Value, speed: Value, acceleration: Value) -> Value:

@@ -155,8 +155,7 @@ def _sine(frequency: float, amplitude: float) -> ControlTask:
 
 def _pulse(begin: float, width: float, height: float) -> tuple[tuple[float, float], ...]:
     """A half sine as nine points."""
-    points = [(begin + width * i / 8, height * math.sin(math.pi * i / 8)) for i in range(9)]
-    return ((0.0, 0.0), *points)
+    return ((0.0, 0.0), *((begin + width * i / 8, height * math.sin(math.pi * i / 8)) for i in range(9)))
 
 
 _HOLD = MinimumJerkMotion(10.0 * DEGREE, 0.0, 0.6)

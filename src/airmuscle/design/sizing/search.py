@@ -162,8 +162,7 @@ def choose(entry: Entry, requirement: Requirement, conditions: SizingConditions,
     check_whole("choose", "count", count, 1)
     kind = LiftSearch if isinstance(requirement, LiftRequirement) else JointSearch
     search: Search = kind(requirement, conditions, count)  # type: ignore[arg-type]
-    lengths = length_range(entry, conditions.max_length)
-    length = _shortest_length(entry, search, lengths)
+    length = _shortest_length(entry, search, length_range(entry, conditions.max_length))
     muscle = static_muscle(at_length(entry, length), conditions)
     design = search.design(muscle, length)
     if design is None:

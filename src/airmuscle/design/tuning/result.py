@@ -97,8 +97,7 @@ class TuningHistory(ShortRepr):
 
     def means(self, metric: str) -> Array:
         """The mean (E,) of a metric over the cases: `index`, `air` or `travel`."""
-        names = ("index", "air", "travel")
-        check_known("history: no metric", metric, names, error=ColumnError)
+        check_known("history: no metric", metric, ("index", "air", "travel"), error=ColumnError)
         return np.asarray(getattr(self.metrics, metric).mean(axis=1))
 
     def pareto(self, metric: str) -> npt.NDArray[np.intp]:

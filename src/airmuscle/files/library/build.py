@@ -14,6 +14,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from ...core import ParameterError, abridged, check_field, parameters
+from ...core.annotation import conforms
 from . import fields
 from .fields import allows, model_class, model_names
 from .files import Location, check_keys, located_errors
@@ -113,7 +114,7 @@ class TableReader:
         if isinstance(value, list) and item is not None:
             places = [f"{key}[{i}]" if first is None else f"{key} {i + first}" for i in range(len(value))]
             return tuple(self.value(v, item, location, p) for v, p in zip(value, places, strict=True))
-        if fields.accepts(hint, value) and not isinstance(value, Mapping):
+        if conforms(value, hint) and not isinstance(value, Mapping):
             return value
         if fields.describes_tables(hint) or (fields.is_table(hint) and isinstance(value, Mapping | str)):
             return self.build(value, location.inside(key), kind=hint)

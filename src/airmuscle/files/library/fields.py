@@ -189,8 +189,7 @@ def _read_column(value: Mapping[str, Any], where: Location) -> tuple[float, ...]
             f'{where} is {abridged(value)}; write a column of a file as {{ file = "data/map.csv", column = "force" }}.'
         )
     with located_errors(where):
-        recording = read_csv(where.folder / value["file"])
-        return tuple(float(v) for v in recording[value["column"]])
+        return tuple(float(v) for v in read_csv(where.folder / value["file"])[value["column"]])
 
 
 def options(hint: Any) -> tuple[Any, ...]:
@@ -212,18 +211,6 @@ def describes_tables(hint: Any) -> bool:
     """Whether an annotation allows only objects that tables describe, one or a list."""
     return is_table(hint) and all(origin(o) not in _PLAIN or o in (tuple, types.NoneType) or origin(o) is tuple
                                   for o in options(hint))  # fmt: skip
-
-
-def accepts(hint: Any, value: Any) -> bool:
-    """Whether a value matches the outermost type of an annotation."""
-    if hint is Any:
-        return True
-    if len(options(hint)) > 1:
-        return any(accepts(option, value) for option in options(hint))
-    cls = origin(hint)
-    if cls in (int, float) and isinstance(value, bool):
-        return False
-    return isinstance(value, (int, float) if cls is float else cls)
 
 
 def item_type(hint: Any) -> Any:

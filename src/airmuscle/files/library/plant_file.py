@@ -1,20 +1,9 @@
 """Plants from TOML tables: the table [plant] of a scenario, and the plants of the library; entries of any kind by name.
 
-A plant of the library is a file of the same form as a scenario, with its provenance and the source of each number:
-
-    title = "..."                   what it is
-    provenance = "chosen"           origin of the numbers
-    [plant]                         muscles, circuits, mechanism and gas, as in a scenario
-    [input]                         the input signal of the example run, as in a scenario
-    [run]                           duration and initial state of the example run
-    [sources]                       source of each number of the tables, by its path or the beginning of its path
-    [[reference]]                   references
-
-Parts of a plant may be named: a muscle and a plant of the library or of a file, and an orifice or a driver with the
-values of a valve, `{ library = "matrix-821" }`; of a muscle and of a plant the other keys replace parts.
-
-`load("dmsp-20-300")`, `load("matrix-821")`, `load("joint-dmsp-20-matrix")` and `load("my/muscle.toml")` return an
-Entry, a ValveEntry or a PlantEntry; a unique beginning of a name is sufficient.
+A plant of the library is a file of the same form as a scenario, with its provenance, and in [sources] the source of
+each number of the tables, by its path or the beginning of its path. Parts of a plant may be named: a muscle and a plant
+of the library or of a file, and an orifice or a driver with the values of a valve, `{ library = "matrix-821" }`; of a
+muscle and of a plant the other keys replace parts.
 """
 
 import dataclasses
