@@ -1,4 +1,4 @@
-"""Control benchmark: controllers of an antagonistic joint, tuned alike and judged on plants that are not their model."""
+"""Control benchmark: controllers of an antagonistic joint, tuned alike and judged on plants other than their model."""
 
 from ...core.stubs import attach_stub
 
