@@ -78,7 +78,7 @@ def test_the_plan_is_the_best_under_the_equations_of_the_plant():
     state = np.array([*(REST[name] for name in STATES), 0.0])
     wanted = np.array([REST["position"] + 3e-3])
     plan, variables = LAW.plan(state, wanted, np.zeros(1), np.ones(1))
-    program = LAW._programs[0]
+    program = LAW._idle[0]
     aim = variables[:4]
     step = program.step_function()
 
@@ -163,5 +163,5 @@ def test_a_controller_can_be_sent_to_another_process():
     wanted, low, high = np.array([REST["position"] + 1e-3]), np.zeros(1), np.ones(1)
     first, _ = LAW.plan(FIRST.mean, wanted, low, high)
     again = pickle.loads(pickle.dumps(LAW))
-    assert again._programs == []
+    assert again._idle == []
     assert np.array_equal(again.plan(FIRST.mean, wanted, low, high)[0], first)

@@ -1,6 +1,5 @@
 from .estimates import Innovation as Innovation
 from .estimates import StateEstimate as StateEstimate
-from .finite_control_set import FiniteControlSet as FiniteControlSet
 from .kalman_filters import ExtendedKalmanFilter as ExtendedKalmanFilter
 from .kalman_filters import UnscentedKalmanFilter as UnscentedKalmanFilter
 from .kalman_filters import consistency_band as consistency_band
@@ -8,7 +7,8 @@ from .kalman_filters import normalised_error_squared as normalised_error_squared
 from .linear_design import design_adrc as design_adrc
 from .linear_design import design_lqg as design_lqg
 from .moving_horizon import MovingHorizonEstimator as MovingHorizonEstimator
-from .nonlinear_model_predictive import NonlinearModelPredictive as NonlinearModelPredictive
+from .nonlinear_predictive import FiniteControlSet as FiniteControlSet
+from .nonlinear_predictive import NonlinearModelPredictive as NonlinearModelPredictive
 from .predictive_design import PredictiveControl as PredictiveControl
 from .predictive_design import design_predictive as design_predictive
 from .state_estimator import StateEstimator as StateEstimator

@@ -8,13 +8,15 @@ from typing import Any
 import numpy as np
 
 from ...core import Array, ParameterError, ShortRepr, SolveError, Status, System, check_field_types, check_known, tree
+from ...core.declaration import forwarded
 from ...core.system import check_system, state_vector
 from ...engine.compile.function import AugmentedRates, augmented_rates, states_and_outputs
 from ...engine.compile.program import CompiledSystem, compile_system
 from ...engine.loop.control_loop import COMMAND
+from ...engine.loop.controller import Controller, Measurement
 from ...recording.recording import Recording
 from .estimates import BoundFilter, Innovation, MeasuredRows, Pass, StateEstimate
-from .linear_design import DISTURBANCE, check_numbers
+from .linear_design import DISTURBANCE, check_numbers, check_sample_time
 
 UNKNOWN = 1e30
 """Factor of the variance of a missing measurement."""
@@ -265,3 +267,29 @@ def _input(recording: Recording, name: str) -> Array:
         if column in recording:
             return np.asarray(recording[column], dtype=float)
     return np.zeros(len(recording["time"]))
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class EstimatingController(ShortRepr, Controller):
+    """A controller that estimates the state of its plant, with programs that one thread uses at a time."""
+
+    estimator: StateEstimator
+    first: StateEstimate = dataclasses.field(repr=False)
+    _idle: list[Any] = dataclasses.field(init=False, repr=False, default_factory=list)
+
+    measured_columns = forwarded("estimator.measured")
+
+    def __getstate__(self) -> dict[str, Any]:
+        """The fields without programs, which belong to one process."""
+        return {**self.__dict__, "_idle": []}
+
+    def estimate(self, before: StateEstimate, measurement: Measurement, inputs: Any, dt: float) -> StateEstimate:
+        """The estimate with a measurement. Raises ParameterError where the loop has another sample time."""
+        check_sample_time(type(self).__name__, dt, self.estimator.sample_time)
+        values = [float(measurement.columns[name]) for name in self.measured_columns]
+        return self.estimator.correct(before, values, inputs)[0]
+
+    def ordered(self, inputs: Mapping[str, float]) -> list[float]:
+        """The inputs of the plant in its order; 0 where none is given."""
+        names = compile_system(self.estimator.plant).description.input_names
+        return [float(inputs.get(name, 0.0)) for name in names]

@@ -1,21 +1,38 @@
-"""NonlinearModelPredictive: model predictive control with the equations of the plant, solved by CasADi."""
+"""Model predictive control with the equations of the plant: of continuous inputs, and of the modes of on/off valves."""
 
 import dataclasses
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from ...core import Array, ParameterError, Reference, ShortRepr, check_field_types, check_known, within
+from ...core import (
+    Array,
+    ParameterError,
+    Reference,
+    SolveError,
+    Status,
+    check_field_types,
+    published,
+    within,
+)
+from ...core.declaration import forwarded
+from ...core.errors import check_known
+from ...engine.compile.cache.kernel import Kernel
+from ...engine.compile.function import augmented_rates
 from ...engine.compile.program import compile_system
 from ...engine.loop.controller import Measurement, MultivariableController, failure_notes
 from ...physics.analysis.linear_model import linearise
 from ...physics.analysis.sampled_model import held
 from ..laws.linear_model_predictive import RAWLINGS2017
 from .estimates import StateEstimate
-from .linear_design import check_numbers, check_sample_time, regulator
+from .linear_design import check_numbers, regulator
 from .predictive_program import MAX_HORIZON, PredictiveProgram, check_limits
-from .state_estimator import StateEstimator
+from .state_estimator import EstimatingController
+
+MAX_SEQUENCES = 1_000_000
+"""Maximum number of sequences of modes (chosen)."""
+_choose = Kernel("choose_mode", "best_mode_sequence")
 
 
 class NonlinearMemory(NamedTuple):
@@ -31,7 +48,7 @@ class NonlinearMemory(NamedTuple):
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class NonlinearModelPredictive(ShortRepr, MultivariableController):
+class NonlinearModelPredictive(EstimatingController, MultivariableController):
     """Nonlinear model predictive control: the first input of the best plan under the equations of the plant.
 
         f(x_s, u_s, d) = 0,   min |z(x_s) - r|^2 w + |u_s - u_0|_R^2                       target
@@ -65,8 +82,6 @@ class NonlinearModelPredictive(ShortRepr, MultivariableController):
 
     references: ClassVar[tuple[Reference, ...]] = (RAWLINGS2017,)
 
-    estimator: StateEstimator
-    first: StateEstimate = dataclasses.field(repr=False)
     operating_inputs: Mapping[str, float]
     controlled: tuple[str, ...]
     commanded: tuple[str, ...]
@@ -75,7 +90,6 @@ class NonlinearModelPredictive(ShortRepr, MultivariableController):
     slack_weight: float = 1e4
     horizon: int = within(1, MAX_HORIZON, default=20)
     substeps: int = within(1, MAX_HORIZON, default=2)
-    _programs: list[PredictiveProgram] = dataclasses.field(init=False, repr=False, default_factory=list)
 
     def __post_init__(self) -> None:
         check_field_types(self)
@@ -92,14 +106,7 @@ class NonlinearModelPredictive(ShortRepr, MultivariableController):
             raise ParameterError(f"{owner}: the estimator has the parameters {estimated}; give one without parameters.")
         check_limits(owner, self.limits, self.slack_weight)
 
-    def __getstate__(self) -> dict[str, Any]:
-        """The fields without the programs of the solver, which belong to one process."""
-        return {**self.__dict__, "_programs": []}
-
-    @property
-    def measured(self) -> tuple[str, ...]:  # type: ignore[override]
-        """The columns that the estimator receives."""
-        return self.estimator.measured
+    measured = forwarded("estimator.measured")
 
     def init(self) -> NonlinearMemory:
         start = np.array([float(self.operating_inputs.get(name, 0.0)) for name in self.commanded])
@@ -111,9 +118,7 @@ class NonlinearModelPredictive(ShortRepr, MultivariableController):
     def step(
         self, memory: NonlinearMemory, measurement: Measurement, dt: float
     ) -> tuple[Mapping[str, float], NonlinearMemory]:
-        check_sample_time("NonlinearModelPredictive", dt, self.estimator.sample_time)
-        values = [float(measurement.columns[name]) for name in self.measured_columns]
-        estimate, _ = self.estimator.correct(memory.estimate, values, self._all_inputs(memory.applied))
+        estimate = self.estimate(memory.estimate, measurement, self._all_inputs(memory.applied), dt)
         wanted = np.array([float(measurement.setpoints[name]) for name in self.controlled])
         low, high = np.array([measurement.ranges[name] for name in self.commanded], dtype=float).T
         plan, variables = self.plan(estimate.mean, wanted, low, high, memory.variables)
@@ -136,16 +141,15 @@ class NonlinearModelPredictive(ShortRepr, MultivariableController):
         wanted     set points (q,), `low` and `high` limits of the commanded inputs (m,) [SI]
         variables  those of the last solution, from which the search starts
         """
-        programs = self._programs.pop() if self._programs else self._built()
+        programs = self._idle.pop() if self._idle else self._built()
         solution = programs.solve(state, wanted, low, high, variables)
-        self._programs.append(programs)
+        self._idle.append(programs)
         return solution
 
     def _all_inputs(self, commanded: Array) -> list[float]:
         """The inputs of the plant in its order."""
-        names = compile_system(self.estimator.plant).description.input_names
-        values = {**self.operating_inputs, **dict(zip(self.commanded, commanded.tolist(), strict=True))}
-        return [float(values.get(name, 0.0)) for name in names]
+        commands = dict(zip(self.commanded, commanded.tolist(), strict=True))
+        return self.ordered({**self.operating_inputs, **commands})
 
     def _built(self) -> PredictiveProgram:
         estimator, ready = self.estimator, compile_system(self.estimator.plant)
@@ -163,3 +167,115 @@ class NonlinearModelPredictive(ShortRepr, MultivariableController):
             estimator.plant, estimator.places[1], inputs, self.controlled, self.commanded, scale, sizes, weights,
             terminal, dict(self.limits), float(self.slack_weight), self.horizon, self.substeps, estimator.sample_time,
         )  # fmt: skip
+
+
+class FiniteSetMemory(NamedTuple):
+    """Memory of the controller: the predicted estimate and the mode of the last sample."""
+
+    estimate: StateEstimate
+    mode: int
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class FiniteControlSet(EstimatingController):
+    """Finite control set model predictive control: the mode of the valves from the best of all short sequences.
+
+        min over m_1 ... m_N   sum_k  sum_i ((y_i(k) - r_i)/d_i)^2  +  c s(m_(k-1), m_k)
+
+    m modes, each a value of every commanded input; y predicted columns, r their set points, d `permitted` deviations, s
+    number of inputs that change, c `switching_cost`. The plant is predicted from the state of an estimator, a filter
+    with its own model of the plant, by the compiled exponential Euler step of a sample. The estimator's columns are
+    measured, and its parameters and disturbances are included in the prediction. All sequences are enumerated; one
+    whose cost exceeds the best so far is left. The first mode of the best sequence is applied, and of equal sequences
+    the first in the order of `modes`. Set points are held over the horizon, delays of valves are not predicted.
+
+    estimator       ExtendedKalmanFilter or UnscentedKalmanFilter, with the sample time of the loop
+    first           estimate before the first sample, as `estimator.start` gives
+    modes           inputs by name, such as ({"fill": 0, "discharge": 0}, {"fill": 1, "discharge": 0}, ...)
+    permitted       permitted deviation of every controlled column, which is the set point's name
+    switching_cost  cost of the change of one input relative to one sample with the permitted deviation (chosen)
+    horizon         number N of samples
+
+    Raises ParameterError for unknown names, modes without a common set of inputs, or too many sequences.
+    Reference: Qi, Bone and Zhang (2019).
+    """
+
+    references: ClassVar[tuple[Reference, ...]] = (published("qi-2019"),)
+
+    modes: tuple[Mapping[str, float], ...]
+    permitted: Mapping[str, float]
+    switching_cost: float = 0.1
+    horizon: int = 4
+
+    def __post_init__(self) -> None:
+        check_field_types(self)
+        owner, known = "FiniteControlSet", compile_system(self.estimator.plant).description
+        check_numbers(owner, "permitted", self.permitted, self.estimator.plant_columns, ())
+        if not self.permitted or not self.modes:
+            raise ParameterError(f"{owner}: give one mode or more, and the permitted deviation of one column or more.")
+        for mode in self.modes:
+            check_known(f"{owner}: modes names", mode, known.input_names)
+            if set(mode) != set(self.modes[0]) or not np.isfinite(list(mode.values())).all():
+                raise ParameterError(
+                    f"{owner}: the mode {dict(mode)} must have a finite number for each of {', '.join(self.modes[0])}."
+                )
+        if not 0.0 <= self.switching_cost < float("inf"):
+            raise ParameterError(f"{owner}: switching_cost is {self.switching_cost!r}; allowed range: 0 and above.")
+        if not (self.horizon >= 1 and len(self.modes) ** self.horizon <= MAX_SEQUENCES):
+            raise ParameterError(
+                f"{owner}: {len(self.modes)} modes over a horizon of {self.horizon} samples; the horizon must be 1 or "
+                f"more and the number of sequences at most {MAX_SEQUENCES}. Shorten the horizon."
+            )
+
+    @property
+    def setpoints(self) -> tuple[str, ...]:
+        return tuple(self.permitted)
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        return tuple(self.modes[0])
+
+    def init(self) -> FiniteSetMemory:
+        return FiniteSetMemory(self.first, 0)
+
+    def step(
+        self, memory: FiniteSetMemory, measurement: Measurement, dt: float
+    ) -> tuple[Mapping[str, float], FiniteSetMemory]:
+        estimate = self.estimate(memory.estimate, measurement, self.ordered(self.modes[memory.mode]), dt)
+        wanted = [float(measurement.setpoints[name]) for name in self.setpoints]
+        mode = self.best_sequence(estimate.mean, wanted, memory.mode)[0]
+        applied = self.modes[mode]
+        return dict(applied), FiniteSetMemory(self.estimator.predict(estimate, self.ordered(applied)), mode)
+
+    def best_sequence(self, state: Array, wanted: Sequence[float], mode: int) -> tuple[int, ...]:
+        """The modes (N,) with the least cost from an estimated state, for set points and the mode before.
+
+        Raises SolveError where no prediction is finite.
+        """
+        search = self._idle.pop() if self._idle else self._bound()
+        _, run, states, aims, modes, best = search
+        states[0], aims[:], modes[0] = state, wanted, mode
+        status = Status(run())
+        sequence = tuple(int(k) for k in best[1:])
+        self._idle.append(search)
+        if status is not Status.DONE:
+            raise SolveError(f"FiniteControlSet: all predictions fail, because {status.message}. Check the estimate.")
+        return sequence
+
+    def _bound(self) -> tuple[Any, ...]:
+        """The functions, which must live as long as the search, the search, and the arrays that it reads and writes."""
+        filter_, ready = self.estimator, compile_system(self.estimator.plant)
+        total, p, length = len(filter_.states), len(self.permitted), self.horizon + 1
+        seen = [filter_.plant_columns.index(name) for name in self.permitted]
+        functions = augmented_rates(ready, seen, *filter_.places)
+        table, n = np.array([self.ordered(mode) for mode in self.modes]), ready.sizes.states
+        changes = self.switching_cost * np.count_nonzero(table[:, None] != table, axis=2)
+        weights = np.array([1.0 / deviation**2 for deviation in self.permitted.values()])
+        states, wanted, best = np.zeros((length, total)), np.zeros(p), np.zeros(length)
+        sequence = np.zeros(length, dtype=np.int64)
+        run = _choose.bind(
+            functions.rates, functions.measured, functions.constants, filter_.magnitudes, float(filter_.sample_time),
+            table, changes, wanted, weights, states, np.zeros(length), sequence, best, np.zeros(2, dtype=np.int64),
+            np.zeros(n), np.zeros((n, total)), np.zeros((5, n, total + 1)), np.zeros(p), np.zeros((p, total)),
+        )  # fmt: skip
+        return functions, run, states, wanted, sequence, best
