@@ -5,7 +5,7 @@ import dataclasses
 import enum
 import math
 from collections.abc import Callable, Iterable, Mapping
-from typing import Any
+from typing import Any, ClassVar
 
 from .formula import to_plain
 
@@ -50,6 +50,8 @@ class PublishedValue(abc.ABC):
     tolerance: float = 0.0
     chosen: bool = False
     derived: bool = False
+    relation: ClassVar[str] = ""
+    """Sign before the value."""
 
     @property
     def published(self) -> bool:
@@ -71,12 +73,16 @@ class Equal(PublishedValue):
 class AtLeast(PublishedValue):
     """Criterion: the reproduced number is not below the printed one minus the tolerance."""
 
+    relation = "≥ "
+
     def agrees(self, reproduced: float) -> bool:
         return reproduced >= self.value - self.tolerance
 
 
 class AtMost(PublishedValue):
     """Criterion: the reproduced number is not above the printed one plus the tolerance."""
+
+    relation = "≤ "
 
     def agrees(self, reproduced: float) -> bool:
         return reproduced <= self.value + self.tolerance

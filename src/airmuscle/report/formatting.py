@@ -9,19 +9,7 @@ from typing import Any
 import numpy as np
 
 from .chapter import DIGITS
-from .claims import (
-    DEPENDS,
-    DIFFERS,
-    HOLDS,
-    NOT_PRINTED,
-    NOT_TESTABLE,
-    AtLeast,
-    AtMost,
-    Claim,
-    Kind,
-    Statement,
-    statements,
-)
+from .claims import DEPENDS, DIFFERS, HOLDS, NOT_PRINTED, NOT_TESTABLE, Claim, Kind, Statement, statements
 
 MARKS = {HOLDS: "✓", DIFFERS: "✗", DEPENDS: "±", NOT_TESTABLE: "?", NOT_PRINTED: "–"}
 """A sign next to each verdict, so that it does not depend on colour."""
@@ -40,7 +28,6 @@ P_VALUE = "p-value"
 """Header of a column of p-values."""
 SMALLEST_P = 1e-3
 """Below it a p-value is shown as a bound."""
-_RELATIONS = {AtLeast: "≥ ", AtMost: "≤ "}
 _NUMBER = re.compile(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?")
 _EXPONENT = re.compile(r"(?:\b1|(\d(?:\.\d+)?))e([-+]?)0*(\d+)\b")
 _NUMBERS = re.compile(rf"{_NUMBER.pattern}((, | to ){_NUMBER.pattern})*")
@@ -126,10 +113,9 @@ def format_published(claim: Claim, *, with_tolerance: bool = True) -> str:
     """Return the published value with its relation and tolerance: `≥ 4`, `20 ± 0.5`; an en dash if there is none."""
     if claim.printed is None:
         return MISSING
-    relation = _RELATIONS.get(type(claim.printed), "")
     tolerance = f" ± {format_number(claim.printed.tolerance)}" if claim.printed.tolerance and with_tolerance else ""
     origin = " (chosen)" if claim.printed.chosen else " (derived)" if claim.printed.derived else ""
-    return f"{relation}{format_number(claim.printed.value)}{tolerance}{origin}"
+    return f"{claim.printed.relation}{format_number(claim.printed.value)}{tolerance}{origin}"
 
 
 def count_verdicts(claims: Iterable[Claim], kind: Kind = Kind.CLAIM) -> dict[str, int]:

@@ -4,7 +4,7 @@ import dataclasses
 import itertools
 import math
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any, Protocol
+from typing import Any
 
 from ..core import Leaf, chosen_scale, conversion, heading_scale, known_factor, leaves, scaled_numbers
 from .chapter import BY_ROW, NamedValue, Table, TableColumn
@@ -124,11 +124,6 @@ def _times(value: Any, factor: float) -> Any:
     return scaled_numbers(value, factor) if isinstance(value, str) else value * factor
 
 
-def rows_of(shown: list[ShownColumn]) -> list[tuple[Any, ...]]:
-    """The rows of shown columns."""
-    return list(zip(*(each.cells for each in shown), strict=True))
-
-
 def value_table(name: str, title: str, values: tuple[NamedValue, ...]) -> Table:
     """The named values of a chapter as a table."""
     columns: Mapping[str, Any] = {
@@ -141,25 +136,6 @@ def value_table(name: str, title: str, values: tuple[NamedValue, ...]) -> Table:
 
 MAX_VALUES = 30
 """Longest list of values that the brief view shows completely (chosen)."""
-
-
-class Estimated(Protocol):
-    """An estimated parameter of a fit."""
-
-    @property
-    def name(self) -> str: ...
-    @property
-    def label(self) -> str: ...
-    @property
-    def value(self) -> float: ...
-    @property
-    def stderr(self) -> float: ...
-    @property
-    def unit(self) -> str: ...
-    @property
-    def meaning(self) -> str: ...
-    @property
-    def on_bound(self) -> bool: ...
 
 
 def parameter_table(model: Any, name: str, title: str, *, brief: bool = False) -> Table:
@@ -183,13 +159,18 @@ def leaf_table(
         "meaning": [leaf.declared.meaning for _, leaf in listed],
     }
     if bounds:
-        columns["bounds"] = TableColumn([_finite(leaf.declared.bounds) for _, leaf in listed], BY_ROW, digits=6)
+        bounds_of = [leaf.declared.bounds for _, leaf in listed]
+        finite = [each if any(map(math.isfinite, each)) else None for each in bounds_of]
+        columns["bounds"] = TableColumn(finite, BY_ROW, digits=6)
         columns["fitted"] = TableColumn([leaf.declared.fitted for _, leaf in listed], brief=False)
     return Table(name, title, columns, brief=_ends_of_lists(columns["parameter"]) if brief else 0)
 
 
-def estimate_table(estimates: Sequence[Estimated], name: str, title: str, *, brief: int = 0) -> Table:
-    """Return a table of the estimates of a fit with their standard errors; a parameter on a bound has none."""
+def estimate_table(estimates: Sequence[Any], name: str, title: str, *, brief: int = 0) -> Table:
+    """Return a table of the estimates of a fit with their standard errors; a parameter on a bound has none.
+
+    Each estimate has `name`, `label`, `value`, `stderr`, `unit`, `meaning` and `on_bound`.
+    """
     bound = ["on bound" if each.on_bound else "" for each in estimates]
     errors = [None if each.on_bound or not math.isfinite(each.stderr) else each.stderr for each in estimates]
     columns = {
@@ -202,10 +183,6 @@ def estimate_table(estimates: Sequence[Estimated], name: str, title: str, *, bri
         "meaning": TableColumn([each.meaning for each in estimates], brief=False),
     }
     return Table(name, title, columns, brief=brief)
-
-
-def _finite(bounds: tuple[float, float]) -> tuple[float, float] | None:
-    return bounds if any(map(math.isfinite, bounds)) else None
 
 
 def _ends_of_lists(paths: Sequence[str]) -> list[int]:

@@ -12,23 +12,12 @@ from pathlib import Path
 from typing import Any
 
 from ..core import FileError, atomic_folder, plotting
+from . import formatting
 from .chapter import Chapter, Plot, Table
 from .claims import Kind, statements
 from .data import as_json, csv_text
-from .formatting import (
-    MARKS,
-    MEANINGS,
-    count_readings,
-    count_verdicts,
-    format_cell,
-    format_published,
-    format_reproduced,
-    format_unit,
-    format_verdicts,
-    typographic,
-)
 from .formula import symbol_formula, to_display_mathml, to_mathml, to_plain
-from .shown import SYMBOL, ShownColumn, rows_of, shown_columns, value_table
+from .shown import SYMBOL, ShownColumn, shown_columns, value_table
 
 MAX_SVG_BYTES = 600_000
 """Figures with a larger SVG are embedded as PNG: a dense chart would make the page slow."""
@@ -110,9 +99,9 @@ def render_page(chapters: Sequence[Chapter], figures: Path, *, title: str, date:
         claims=[claim for chapter in chapters for claim in chapter.claims],
         kinds=list(Kind),
         statements=statements,
-        count_verdicts=count_verdicts,
-        marks=MARKS,
-        meanings=MEANINGS,
+        count_verdicts=formatting.count_verdicts,
+        marks=formatting.MARKS,
+        meanings=formatting.MEANINGS,
         versions=versions(),
         zip=zip,
         image=lambda plot: image_data_uri(figures / plot.name),
@@ -134,14 +123,14 @@ def _template() -> Any:
         formulas=lambda text: Markup(to_mathml(text)),
         equation=lambda latex: Markup(to_display_mathml(latex)),
         plain=to_plain,
-        published=lambda claim: typographic(format_published(claim)),
-        reproduced=lambda statement: typographic(format_reproduced(statement)),
-        unit=format_unit,
+        published=lambda claim: formatting.typographic(formatting.format_published(claim)),
+        reproduced=lambda statement: formatting.typographic(formatting.format_reproduced(statement)),
+        unit=formatting.format_unit,
         anchor=anchor,
-        readings=count_readings,
-        verdicts=format_verdicts,
+        readings=formatting.count_readings,
+        verdicts=formatting.format_verdicts,
         shown=shown_columns,
-        rows=rows_of,
+        rows=lambda shown: list(zip(*(each.cells for each in shown), strict=True)),
         sentence=as_sentence,
         results=lambda chapter: value_table(f"{chapter.name}-results", "Results", chapter.values),
         is_short=is_short,
@@ -153,7 +142,7 @@ def _template() -> Any:
 def render_cell(value: Any, column: ShownColumn | None = None) -> str:
     """Return the HTML of a cell; the heading of its column decides on the format of symbols, units and p-values."""
     if column is None:
-        return to_mathml(format_cell(value))
+        return to_mathml(formatting.format_cell(value))
     if column.heading == SYMBOL and isinstance(value, str):
         return to_mathml(symbol_formula(value))
     return to_mathml(column.cell_text(value))
@@ -164,7 +153,7 @@ def render_header(header: str) -> str:
     unit = _BRACKETS.search(header)
     if unit is None:
         return to_mathml(header)
-    name, shown = header[: unit.start()], format_unit(unit[1])
+    name, shown = header[: unit.start()], formatting.format_unit(unit[1])
     return to_mathml(f"{name} [{shown}]" if shown else name)
 
 

@@ -47,6 +47,10 @@ class RawTable:
         columns = tuple(taken(cells, kept) for cells in self.columns)
         return dataclasses.replace(self, columns=columns, rows=self.rows[kept], **changes)
 
+    def noted(self, *notes: str) -> "RawTable":
+        """The table with further notes."""
+        return dataclasses.replace(self, notes=(*self.notes, *notes))
+
     def location(self, row: int) -> str:
         """The location of a row in the file, for messages: `bench.csv, line 41`."""
         return f"{self.origin}, {self.row_label} {self.rows[row]}"
@@ -91,11 +95,21 @@ def merge_channels(
     channels = [c for c in channels if np.ndim(c.values) == 1 and len(c.values)]
     if not channels:
         raise ColumnError(f"{origin}: no channel contains a vector of numbers.")
-    times = [c.time for c in channels if c.time is not None]
-    if len({len(c.values) for c in channels}) == 1 and all(np.array_equal(each, times[0]) for each in times):
-        return _make_table(origin, channels, next(iter(times), None), (), constants, row_label)
-    _check_times(origin, channels)
-    return _resample(origin, channels, constants, row_label)
+    times, notes = [c.time for c in channels if c.time is not None], tuple[str, ...]()
+    time = times[0] if times else None
+    if len({len(c.values) for c in channels}) > 1 or not all(np.array_equal(each, times[0]) for each in times):
+        _check_times(origin, channels)
+        channels, time, notes = _resampled(origin, channels)
+    has_time = any(find_quantity_name(c.name.partition(" ")[0].partition("_")[0]) == "time" for c in channels)
+    if time is not None and not has_time:
+        channels = [Channel("time", time - time[0], unit="s"), *channels]
+    dated = [np.asarray(c.values).dtype.kind in "Mm" for c in channels]  # `to_cells` makes seconds of them
+    headings = tuple(split_unit(c.name)[0] if d else c.name for c, d in zip(channels, dated, strict=True))
+    units = tuple("s" if d else c.unit for c, d in zip(channels, dated, strict=True))
+    columns = tuple(to_cells(c.values) for c in channels)
+    rows = np.arange(1, len(channels[0].values) + 1)
+    fields = frozenset(c.name for c in channels if not c.is_quantity)
+    return RawTable(origin, headings, units if any(units) else None, columns, rows, row_label, constants, notes, fields)
 
 
 def _check_times(origin: str, channels: Sequence[Channel]) -> None:
@@ -115,9 +129,8 @@ def _check_times(origin: str, channels: Sequence[Channel]) -> None:
             )
 
 
-def _resample(
-    origin: str, channels: Sequence[Channel], constants: Mapping[str, float | str], row_label: str
-) -> RawTable:
+def _resampled(origin: str, channels: Sequence[Channel]) -> tuple[list[Channel], Array, tuple[str, ...]]:
+    """The channels at the times of the longest one, these times, and a note on each that is interpolated."""
     leader, times = max(channels, key=lambda c: len(c.values)), [c.time for c in channels if c.time is not None]
     assert leader.time is not None
     low, high, rounding = max(each[0] for each in times), min(each[-1] for each in times), _rounding(leader.time)
@@ -125,12 +138,12 @@ def _resample(
     if not len(time):
         raise ColumnError(f"{origin}: the time ranges of the channels do not overlap. Select one group of channels.")
     resampled, notes = [], []
-    for channel in channels:
+    for channel, own_time in zip(channels, times, strict=True):
         resampled.append(dataclasses.replace(channel, values=_interpolate(channel, time), time=time))
-        if channel.time is None or not np.array_equal(channel.time, leader.time):
+        if not np.array_equal(own_time, leader.time):
             rows = f"its {len(channel.values)} rows are interpolated to the {len(time)} rows of '{leader.name}'"
             notes.append(f"Channel '{channel.name}' has its own time vector: {rows}.")
-    return _make_table(origin, resampled, time, tuple(notes), constants, row_label)
+    return resampled, time, tuple(notes)
 
 
 def _interpolate(channel: Channel, time: Array) -> Any:
@@ -148,30 +161,13 @@ def _rounding(time: Array) -> float:
     return float(1e-9 * np.ptp(time) + 8.0 * np.spacing(np.max(np.abs(time))))
 
 
-def _make_table(
-    origin: str, channels: Sequence[Channel], time: Array | None, notes: tuple[str, ...],
-    constants: Mapping[str, float | str], row_label: str,
-) -> RawTable:  # fmt: skip
-    has_time = any(find_quantity_name(c.name.partition(" ")[0].partition("_")[0]) == "time" for c in channels)
-    if time is not None and not has_time:
-        channels = [Channel("time", time - time[0], unit="s"), *channels]
-    dated = [np.asarray(c.values).dtype.kind in "Mm" for c in channels]  # `to_cells` makes seconds of them
-    headings = tuple(split_unit(c.name)[0] if d else c.name for c, d in zip(channels, dated, strict=True))
-    units = tuple("s" if d else c.unit for c, d in zip(channels, dated, strict=True))
-    columns = tuple(to_cells(c.values) for c in channels)
-    rows = np.arange(1, len(channels[0].values) + 1)
-    fields = frozenset(c.name for c in channels if not c.is_quantity)
-    return RawTable(origin, headings, units if any(units) else None, columns, rows, row_label, constants, notes, fields)
-
-
 def to_cells(values: Any) -> Cells:
     """Values as cells of a RawTable: numbers as floats, dates as seconds from the first, durations in seconds, anything
     else as text."""
     array = np.asarray(values)
     if array.dtype.kind in "Mm":
-        return np.asarray(
-            (array - array[0] if array.dtype.kind == "M" else array) / np.timedelta64(1, "s"), dtype=float
-        )
+        durations = array - array[0] if array.dtype.kind == "M" else array
+        return np.asarray(durations / np.timedelta64(1, "s"), dtype=float)
     if array.dtype.kind in "biuf":
         return np.ascontiguousarray(array, dtype=float)
     return [v.decode("utf-8", errors="replace") if isinstance(v, bytes) else str(v) for v in array.tolist()]

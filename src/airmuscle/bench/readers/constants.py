@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core import Array, ColumnError, UnitError, conversion, quantity
-from ...core.units import AMBIENT_PRESSURE, STANDARD_GRAVITY
-from ...recording.columns import Heading, parse_heading
+from ...core.units import AMBIENT_PRESSURE, STANDARD_GRAVITY, UnitConversion
+from ...recording.columns import UNIT_SPELLINGS, Heading, parse_heading
 from .channels import Cells, RawTable
 
 SPECIMEN = "specimen"
@@ -117,6 +117,24 @@ def check_stated(origin: str, stated: Mapping[str, float | str]) -> None:
             held_value(heading, value, AMBIENT_PRESSURE, f"{origin}: {name}")
 
 
+def file_conversion(unit: str, target: str, *, ambient: float = AMBIENT_PRESSURE, where: str = "") -> UnitConversion:
+    """The conversion of a unit in a file to SI; a load in g or kg becomes a force with standard gravity.
+
+    Raises UnitError.
+    """
+    if target == "N" and is_mass(unit):
+        return UnitConversion(conversion(unit, "kg").factor * STANDARD_GRAVITY)
+    return conversion(unit, target, ambient=ambient, where=where)
+
+
+def is_mass(unit: str) -> bool:
+    """Whether a unit of a load is one of mass."""
+    try:
+        return unit not in UNIT_SPELLINGS["N"] and bool(conversion(unit, "kg"))
+    except UnitError:
+        return False
+
+
 def held_value(heading: Heading, stated: float | str, ambient: float, where: str) -> float:
     """The value of a held quantity in SI; a force may be stated as a load in g or kg, as in a column."""
     target = heading.target or "1"
@@ -136,12 +154,12 @@ def constant_from_column(table: RawTable, heading: str, unit: str | None, values
     if parsed is None:
         return None
     name, own_unit = parsed
-    change = conversion(
-        unit or own_unit or CONSTANT_UNITS[name], CONSTANT_UNITS[name], ambient=0.0, where=f"{table.origin}: {heading}"
-    )
+    stated, target = unit or own_unit or CONSTANT_UNITS[name], CONSTANT_UNITS[name]
+    change = conversion(stated, target, ambient=0.0, where=f"{table.origin}: {heading}")
     first = float(values[0])
-    if not np.allclose(values, first, rtol=1e-9, atol=0.0):
-        row = int(np.argmax(~np.isclose(values, first, rtol=1e-9, atol=0.0)))
+    changed = ~np.isclose(values, first, rtol=1e-9, atol=0.0)
+    if changed.any():
+        row = int(np.argmax(changed))
         raise ColumnError(
             f"{table.location(row)}: {heading} changes from {first:g} to {values[row]:g}, but must be constant "
             "within a run. Write each specimen to a separate file."

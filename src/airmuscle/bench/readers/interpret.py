@@ -11,25 +11,12 @@ import numpy as np
 
 from ...core import Array, ColumnError, Hint, HintedText, UnitError, listed, suggestion
 from ...core.units import AMBIENT_PRESSURE, STANDARD_GRAVITY, UnitConversion, conversion
-from ...recording.columns import (
-    QUANTITIES,
-    UNIT_SPELLINGS,
-    Heading,
-    displacement_columns,
-    find_quantity_name,
-    parse_heading,
-    proposal,
-)
+from ...recording import columns as headed
+from ...recording.columns import QUANTITIES, UNIT_SPELLINGS, Heading, find_quantity_name, parse_heading
 from ...recording.recording import Recording
+from . import constants as fixed
 from .channels import Cells, RawTable
-from .constants import (
-    check_constants,
-    collect_constants,
-    constant_from_column,
-    held_value,
-    label_texts,
-    parse_constant_name,
-)
+from .constants import constant_from_column, parse_constant_name
 from .mapping import ColumnMapping
 from .plausibility import check_plausible, check_unique, check_width, without_repeated_columns
 from .time_base import TimeBase, seconds_from_clock
@@ -54,7 +41,7 @@ def interpret(table: RawTable, mapping: ColumnMapping, constants: Mapping[str, f
     check_width(table)
     table = without_repeated_columns(table)
     held = {n: value for n, value in constants.items() if parse_constant_name(n) is None and parse_heading(n).known}
-    run_constants = collect_constants(
+    run_constants = fixed.collect_constants(
         table.origin, {**table.constants, **{n: value for n, value in constants.items() if n not in held}}
     )
     headings = resolve_headings(table, mapping.units)
@@ -63,7 +50,7 @@ def interpret(table: RawTable, mapping: ColumnMapping, constants: Mapping[str, f
         if not heading.known and not isinstance(cells, list):
             constant = constant_from_column(table, heading.text, heading.unit, cells)
             run_constants = {constant[0]: constant[1], **run_constants} if constant else run_constants
-    check_constants(table.origin, run_constants)
+    fixed.check_constants(table.origin, run_constants)
     ambient = float(run_constants.get("ambient", AMBIENT_PRESSURE))
     columns: dict[str, Array] = {}
     notes, unknown = [*table.notes, *_override_notes(table, headings)], list[str]()
@@ -79,7 +66,7 @@ def interpret(table: RawTable, mapping: ColumnMapping, constants: Mapping[str, f
         notes.append(f"{what.format(listed(unknown))} kept without conversion.")
     notes += _standard_atmosphere(table, headings) if "ambient" not in run_constants else []
     notes += _add_held(table, columns, held, ambient)
-    columns, displaced = displacement_columns(columns, run_constants)
+    columns, displaced = headed.displacement_columns(columns, run_constants)
     notes += displaced
     notes += _apply_time_base(table, columns, mapping.time)
     check_plausible(table, columns, run_constants.get("resting_length"), ambient, ordered=mapping.time.ordered)
@@ -105,7 +92,7 @@ def _add_held(table: RawTable, columns: dict[str, Array], held: Mapping[str, flo
         where = f"{table.origin}: {heading.name}"
         if heading.name in columns:
             raise ColumnError(f"{where} is stated as a constant, but a column contains it. Omit one of them.")
-        si = held_value(heading, value, ambient, where)
+        si = fixed.held_value(heading, value, ambient, where)
         columns[heading.name] = np.full(len(table.rows), si)
         unit = "" if heading.target == "1" else f" {heading.target}"
         notes.append(f"The {heading.name} is {si:.6g}{unit} in every row, as specified by the user.")
@@ -167,11 +154,10 @@ def _check_unit_row(table: RawTable, heading: Heading, below: str) -> None:
 def _override_notes(table: RawTable, headings: list[Heading]) -> list[str]:
     """One note for each column whose unit in the file was overridden by the user."""
     row = [*(table.units or ()), *[""] * len(headings)]
-    own = [below or parse_heading(h.text).unit for h, below in zip(headings, row, strict=False)]
     return [
         f"The {h.name} is read in {h.unit}, as specified by the user; the file states {unit}."
-        for h, unit in zip(headings, own, strict=True)
-        if unit and h.unit and unit != h.unit
+        for h, below in zip(headings, row, strict=False)
+        if (unit := below or parse_heading(h.text).unit) and h.unit and unit != h.unit
     ]
 
 
@@ -199,7 +185,7 @@ def _convert_column(table: RawTable, heading: Heading, cells: Cells, ambient: fl
         return change(values), f"The {heading.name} is read as gauge: {reason}"
     if heading.unit is None:
         return values, f"The {heading.name} has no unit and is read as a ratio."
-    if heading.target == "N" and _is_mass(heading.unit):
+    if heading.target == "N" and fixed.is_mass(heading.unit):
         assumption = f"stated in {heading.unit} and converted with standard gravity, {STANDARD_GRAVITY} m/s2."
         return change(values), f"The {heading.name} is {assumption}"
     return change(values), ""
@@ -219,23 +205,12 @@ def unit_conversion(table: RawTable, heading: Heading, ambient: float) -> UnitCo
             hint=Hint("To state the unit", "units", {heading.name: ...}, "ColumnMapping"),
         )
     try:
-        if target == "N" and _is_mass(heading.unit):
-            return UnitConversion(conversion(heading.unit, "kg").factor * STANDARD_GRAVITY)
-        return conversion(heading.unit, target, ambient=ambient, where=where)
+        return fixed.file_conversion(heading.unit, target, ambient=ambient, where=where)
     except UnitError as reason:
         cases = {spelling.lower(): spelling for spelling in UNIT_SPELLINGS[target]}
         near = difflib.get_close_matches(heading.unit.lower(), cases, n=1)
         hint = f" Did you mean '{cases[near[0]]}'?" if near else f" Usual units of the {heading.name} are {usual}."
         raise UnitError(HintedText(reason.message, hint)) from None
-
-
-def _is_mass(unit: str) -> bool:
-    if unit in UNIT_SPELLINGS["N"]:
-        return False
-    try:
-        return bool(conversion(unit, "kg"))
-    except UnitError:
-        return False
 
 
 def _keep_unknown_column(
@@ -252,25 +227,20 @@ def _keep_unknown_column(
         return f"Column '{heading.text}' is constant and states the {constant[0]}: {constant[1]:.4g} (SI)."
     columns[heading.text or "unnamed"] = cells
     if heading.text in table.fields:
-        return _field_note(heading)
+        quantity = next((name for name, each in QUANTITIES.items() if each.unit == heading.unit), "")
+        mapped = f"'{heading.text}' = '{quantity or 'force'} [{heading.unit if quantity else 'N'}]'"
+        unit = f" in {heading.unit}" if heading.unit else ""
+        return f"Column '{heading.text}'{unit} is a field of a message and kept as it is; [columns] {mapped} maps it."
     near = difflib.get_close_matches(heading.text.partition(" ")[0].lower(), QUANTITIES, n=1)
-    hint = proposal(heading.text) or (f" Did you mean '{near[0]}'?" if near else "")
+    hint = headed.proposal(heading.text) or (f" Did you mean '{near[0]}'?" if near else "")
     if not hint:
         unknown.append(f"'{heading.text}'")
     return hint and f"Column '{heading.text}' is not a known quantity and is kept without conversion.{hint}"
 
 
-def _field_note(heading: Heading) -> str:
-    """The note on a field of a message, with the mapping that makes it a quantity."""
-    fits = [name for name, quantity in QUANTITIES.items() if quantity.unit == heading.unit]
-    mapped = f"'{heading.text}' = '{fits[0] if fits else 'force'} [{heading.unit if fits else 'N'}]'"
-    unit = f" in {heading.unit}" if heading.unit else ""
-    return f"Column '{heading.text}'{unit} is a field of a message and kept as it is; [columns] {mapped} maps it."
-
-
 def _keep_labels(heading: Heading, cells: list[str], columns: dict[str, Array]) -> str:
     """Keep a column with a few different texts as their numbers, and return the note on a column of text."""
-    values, numbers, counts = np.unique(label_texts(cells), return_inverse=True, return_counts=True)
+    values, numbers, counts = np.unique(fixed.label_texts(cells), return_inverse=True, return_counts=True)
     if not 2 <= values.size <= MAX_LABELS or counts.min() < MIN_LABEL_ROWS:
         return f"Column '{heading.text}' contains text and is ignored."
     columns[heading.text] = (numbers.ravel() + 1).astype(np.float64)

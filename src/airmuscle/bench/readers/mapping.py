@@ -147,16 +147,7 @@ def mapping_of_tables(content: Mapping[str, Any], where: str, base: ColumnMappin
     """
     given = {key: value for key, value in content.items() if value is not None}
     for key, value in given.items():
-        check_known(f"{where}: unknown key", key, _KEYS, "allowed are")
-        if key in (*_TEXTS, *_WORDS) and not isinstance(value, str):
-            raise ParameterError(f"{where}: {key} = {abridged(value)}; it must be a quoted text.")
-        if key in _WORDS and value not in _WORDS[key]:
-            raise ColumnError(f"{where}: {key} is {abridged(value)}; allowed range: {', '.join(_WORDS[key])}.")
-        if key in _TABLES and not isinstance(value, Mapping):
-            raise ParameterError(
-                f"{where}: {key} must be a table: [{key}], followed by one line per {key.removesuffix('s')}."
-            )
-    _check_numbers(given, where)
+        _check_entry(key, value, where)
     columns = {name: _parse_entry(where, name, value) for name, value in given.pop("columns", {}).items()}
     codes = tuple(parse_code(each) for each in given.pop("missing_codes", base.missing.codes))
     treatment = MISSING_VALUES.get(given.pop("missing", ""))
@@ -177,14 +168,24 @@ def mapping_of_tables(content: Mapping[str, Any], where: str, base: ColumnMappin
     return mapping
 
 
-def _check_numbers(content: Mapping[str, Any], where: str) -> None:
-    """Check `skip_rows` and `missing_codes`. Raises ParameterError."""
-    skip, codes = content.get("skip_rows", 0), content.get("missing_codes", ())
-    if not isinstance(skip, int) or isinstance(skip, bool):
-        raise ParameterError(f"{where}: skip_rows = {abridged(skip)}; it must be a number of lines, such as 7.")
-    allowed = (float, int, str)
-    if not isinstance(codes, list | tuple) or any(not isinstance(c, allowed) or isinstance(c, bool) for c in codes):
-        raise ParameterError(f'{where}: missing_codes = {abridged(codes)}; it must be a list, such as [-999, "OL"].')
+def _check_entry(key: str, value: Any, where: str) -> None:
+    """Raise ParameterError or ColumnError for an unknown key of a mapping file, or a value of the wrong kind."""
+    check_known(f"{where}: unknown key", key, _KEYS, "allowed are")
+    required = ""
+    if key in (*_TEXTS, *_WORDS) and not isinstance(value, str):
+        required = "a quoted text"
+    if key == "skip_rows" and (not isinstance(value, int) or isinstance(value, bool)):
+        required = "a number of lines, such as 7"
+    codes = value if isinstance(value, list | tuple) else [None]
+    if key == "missing_codes" and not all(isinstance(c, float | int | str) and not isinstance(c, bool) for c in codes):
+        required = 'a list, such as [-999, "OL"]'
+    if required:
+        raise ParameterError(f"{where}: {key} = {abridged(value)}; it must be {required}.")
+    if key in _WORDS and value not in _WORDS[key]:
+        raise ColumnError(f"{where}: {key} is {abridged(value)}; allowed range: {', '.join(_WORDS[key])}.")
+    if key in _TABLES and not isinstance(value, Mapping):
+        line = key.removesuffix("s")
+        raise ParameterError(f"{where}: {key} must be a table: [{key}], followed by one line per {line}.")
 
 
 def _parse_entry(where: str, column: str, value: Any) -> str:

@@ -156,7 +156,7 @@ def _reduced(
 ) -> dict[str, Any]:  # fmt: skip
     """The fields of a struct with reduced arrays; `reductions` receives that of each struct."""
     arrays = {key: value for key, value in fields.items() if _is_column(value)}
-    reduction = Reduction.of([longest, *map(_row_count, arrays.values())], downsampling)
+    reduction = Reduction(downsampling, max([longest, *map(_row_count, arrays.values())]))
     if arrays:
         reductions[name] = reduction
     result: dict[str, Any] = {}

@@ -169,10 +169,7 @@ class InterpolateMissing(MissingValues):
                 filled, left = filled | done, left | (each.missing & ~done)
         table = dataclasses.replace(table, columns=tuple(columns))
         if (filled & ~left).any():
-            rows = list_rows(table.row_label, table.rows[filled & ~left], MAX_LISTED)
-            count = np.count_nonzero(filled & ~left)
-            note = f"{table.origin}: rows with values interpolated in time: {count} of {len(filled)} ({rows})."
-            table = dataclasses.replace(table, notes=(*table.notes, RowNote(note)))
+            table = table.noted(_row_note(table, "with values interpolated in time", filled & ~left))
         return _without_rows(table, left)
 
 
@@ -218,11 +215,13 @@ def _without_rows(table: RawTable, left_out: Mask) -> RawTable:
         return table
     if left_out.all():
         raise ColumnError(f"{table.origin}: every row contains a missing value; no row is left.")
-    note = (
-        f"{table.origin}: rows left out, because a value is missing: {np.count_nonzero(left_out)} of {len(left_out)} "
-        f"({list_rows(table.row_label, table.rows[left_out], MAX_LISTED)})."
-    )
-    return table.of_rows(np.flatnonzero(~left_out), notes=(*table.notes, RowNote(note)))
+    note = _row_note(table, "left out, because a value is missing", left_out)
+    return table.of_rows(np.flatnonzero(~left_out)).noted(note)
+
+
+def _row_note(table: RawTable, what: str, rows: Mask) -> RowNote:
+    listed = list_rows(table.row_label, table.rows[rows], MAX_LISTED)
+    return RowNote(f"{table.origin}: rows {what}: {np.count_nonzero(rows)} of {len(rows)} ({listed}).")
 
 
 def _with_time(
@@ -231,9 +230,8 @@ def _with_time(
     """The rows whose time is known, and their times [in the unit of the file]."""
     kept = np.flatnonzero(~timed.missing)
     table = _without_rows(table, timed.missing)
-    cells = [
-        dataclasses.replace(c, cells=taken(c.cells, kept), missing=c.missing[kept], bad=c.bad[kept]) for c in cells
-    ]
+    cells = [dataclasses.replace(c, cells=taken(c.cells, kept), missing=c.missing[kept], bad=c.bad[kept])
+             for c in cells]  # fmt: skip
     time = taken(timed.cells, kept)
     if isinstance(time, list):
         clock = seconds_from_clock(time)

@@ -5,15 +5,16 @@ Two files with similar numbers under different units contradict each other: at l
 
 import itertools
 import warnings
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ...core import STANDARD_GRAVITY, AirmuscleWarning, Array, ColumnError, Hint, HintedText, UnitError, conversion
+from ...core import AirmuscleWarning, Array, ColumnError, Hint, HintedText, UnitError, conversion
 from ...recording.columns import Heading, quantity_of
 from ...recording.recording import Recording
 from ..checks.contractions import code_of
 from .channels import Cells, RawTable
+from .constants import file_conversion
 from .missing_values import DropMissing, Mask
 from .time_base import AS_RECORDED, UNIFORM, WITHOUT_TIME
 
@@ -100,30 +101,25 @@ def check_unit_consistency(recordings: Sequence[Recording]) -> None:
     units are merely suspicious. Each message names both files and the column.
     """
     for name in dict.fromkeys(name for recording in recordings for name in recording.units):
-        candidates = [r for r in recordings if name in r.units and len(r) and quantity_of(name)]
-        for first, second in _pairs_to_compare(name, candidates):
-            _compare(name, first, second)
+        quantity = quantity_of(name)
+        candidates = [r for r in recordings if name in r.units and len(r) and quantity]
+        sizes = {id(each): _magnitude(each, name) for each in candidates}
+        by_unit: dict[str, list[Recording]] = {}
+        for each in candidates:
+            by_unit.setdefault(each.units[name], []).append(each)
+        groups = [sorted(group, key=lambda r: sizes[id(r)]) for group in by_unit.values()]
+        largest = [max(group, key=lambda r: sizes[id(r)]) for group in by_unit.values()]
+        ends = ((group[0], group[-1]) for group in groups if len(group) > 1)
+        for first, second in (*itertools.combinations(largest, 2), *ends):
+            if quantity and sizes[id(first)] > 0 and sizes[id(second)] > 0:
+                _compare(name, quantity.unit, (first, sizes[id(first)]), (second, sizes[id(second)]))
 
 
-def _pairs_to_compare(name: str, recordings: Sequence[Recording]) -> Iterator[tuple[Recording, Recording]]:
-    """The largest recordings of every two units, then the smallest and the largest recording of each unit."""
-    by_unit: dict[str, list[Recording]] = {}
-    for recording in recordings:
-        by_unit.setdefault(recording.units[name], []).append(recording)
-    for group, other_group in itertools.combinations(by_unit.values(), 2):
-        yield max(group, key=lambda r: _magnitude(r, name)), max(other_group, key=lambda r: _magnitude(r, name))
-    for group in by_unit.values():
-        ordered = sorted(group, key=lambda r: _magnitude(r, name))
-        if len(ordered) > 1:
-            yield ordered[0], ordered[-1]
-
-
-def _compare(name: str, first: Recording, second: Recording) -> None:
+def _compare(name: str, target: str, one: tuple[Recording, float], two: tuple[Recording, float]) -> None:
+    """Compare the units of a column in two recordings, each with its magnitude [SI]."""
+    (first, size), (second, other_size) = one, two
     unit, other_unit = first.units[name], second.units[name]
-    size, other_size = _magnitude(first, name), _magnitude(second, name)
-    if not (size > 0 and other_size > 0):
-        return
-    factor, other_factor = _unit_factor(name, unit), _unit_factor(name, other_unit)
+    factor, other_factor = (file_conversion(each, target).factor for each in (unit, other_unit))
     written, other_written = size / factor, other_size / other_factor
     if _ratio(factor, other_factor) >= DIFFERENT_UNIT and _ratio(written, other_written) <= SAME_MAGNITUDE:
         raise UnitError(
@@ -136,10 +132,9 @@ def _compare(name: str, first: Recording, second: Recording) -> None:
     comparable = name.rpartition(".")[2] in ("pressure", "length")
     if unit == other_unit and comparable and _ratio(size, other_size) >= SUSPICIOUS_RATIO:
         _warn(f"the {name} of {both} differs by a factor of {_ratio(size, other_size):.0f}. Check the units.")
-    quantity = quantity_of(name)
-    is_pressure = quantity is not None and quantity.unit == "Pa"
-    references = {_pressure_reference(each) for each in (unit, other_unit) if is_pressure}
-    if len(references) > 1 and "unspecified" in references:
+    changes = [conversion(each, "Pa") for each in (unit, other_unit) if target == "Pa"]
+    stated = {"none" if each.assumed_gauge else "absolute" if each.offset else "gauge" for each in changes}
+    if len(stated) > 1 and "none" in stated:
         _warn(f"of {both}, only one states whether its {name} is gauge or absolute; the other is read as gauge.")
 
 
@@ -149,23 +144,8 @@ def _warn(message: str) -> None:
 
 def _magnitude(recording: Recording, name: str) -> float:
     """The 95th percentile of the absolute values of a column [SI]; absolute pressures are compared as written."""
-    is_pressure = quantity_of(name) is not None and name.rpartition(".")[2] == "pressure"
-    offset = conversion(recording.units[name], "Pa").offset if is_pressure else 0.0
+    offset = conversion(recording.units[name], "Pa").offset if name.rpartition(".")[2] == "pressure" else 0.0
     return float(np.quantile(np.abs(recording.columns[name] - offset), 0.95))
-
-
-def _unit_factor(name: str, unit: str) -> float:
-    quantity = quantity_of(name)
-    try:
-        return conversion(unit, quantity.unit if quantity else "1").factor
-    except UnitError:
-        return conversion(unit, "kg").factor * STANDARD_GRAVITY  # a load stated as a mass
-
-
-def _pressure_reference(unit: str) -> str:
-    """Whether a unit of pressure is gauge, absolute or unspecified."""
-    change = conversion(unit, "Pa")
-    return "unspecified" if change.assumed_gauge else "absolute" if change.offset else "gauge"
 
 
 def _ratio(first: float, second: float) -> float:
@@ -181,9 +161,15 @@ def without_repeated_columns(table: RawTable) -> RawTable:
     units = table.units or ("",) * len(table.headings)
     kept, repeated = list[int](), list[str]()
     same: dict[tuple[str, str], list[int]] = {}
+
+    def equal(one: Cells, other: Cells) -> bool:
+        if isinstance(one, list) or isinstance(other, list):
+            return isinstance(one, list) and isinstance(other, list) and one == other
+        return bool(np.array_equal(one, other, equal_nan=True))
+
     for i, pair in enumerate(zip(table.headings, units, strict=True)):
         before = same.setdefault(pair, [])
-        if pair[0] and any(_equal(table.columns[k], table.columns[i]) for k in before):
+        if pair[0] and any(equal(table.columns[k], table.columns[i]) for k in before):
             repeated.append(pair[0])
         else:
             kept.append(i)
@@ -192,7 +178,7 @@ def without_repeated_columns(table: RawTable) -> RawTable:
         return table
     names = ", ".join(f"'{name}'" for name in dict.fromkeys(repeated))
     note = f"Columns that repeat the values of an equally named column are read once: {names}."
-    return table.of_columns(kept, notes=(*table.notes, note))
+    return table.of_columns(kept).noted(note)
 
 
 def check_width(table: RawTable) -> None:
@@ -202,12 +188,6 @@ def check_width(table: RawTable) -> None:
             f"{table.origin}: the table has {len(table.headings)} columns; at most {MAX_COLUMNS} are read. Export the "
             "needed columns alone."
         )
-
-
-def _equal(one: Cells, other: Cells) -> bool:
-    if isinstance(one, list) or isinstance(other, list):
-        return isinstance(one, list) and isinstance(other, list) and one == other
-    return bool(np.array_equal(one, other, equal_nan=True))
 
 
 def check_unique(table: RawTable, headings: Sequence[Heading]) -> None:

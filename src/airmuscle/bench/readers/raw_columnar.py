@@ -112,13 +112,13 @@ def _groups(
         elif item.size and item.ndim:
             (vectors if _is_vector(item) else tables).append(item)
     constants, numeric = {**outer, **_constants(group.attrs)}, [d for d in vectors if d.dtype.kind in "biuf"]
-    reduction = Reduction.of((d.size for d in numeric), downsampling)
+    reduction = Reduction(downsampling, max((d.size for d in numeric), default=0))
     channels = [Channel(d.name.rpartition("/")[2], _values(d, reduction), unit=_unit(d.attrs)) for d in numeric]
     place = f"{origin}, group '{group.name}'"
     check_reduced_lengths(place, (d.size for d in numeric), (len(c.values) for c in channels))
     yield StoredTable(group.name, channels, constants, reduction)
     for dataset in tables:
-        reduction = Reduction.of([dataset.shape[0]], downsampling)
+        reduction = Reduction(downsampling, dataset.shape[0])
         own = {**constants, **_constants(dataset.attrs)}
         yield StoredTable(dataset.name, _columns(dataset, reduction), own, reduction)
     for inner in groups:

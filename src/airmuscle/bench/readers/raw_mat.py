@@ -6,7 +6,6 @@ Also supported: a matrix next to a list of column names (`importdata` writes `da
 structure with time that Simulink saves; tables and timetables with the package mat-io.
 """
 
-import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -61,12 +60,10 @@ def read_mat_tables_here(
         )
     constants = _scalar_fields(variables)
     notes = (*(f"Not read: {each}. {_remedy([each])}" for each in unread), *contents.notes)
-    made = []
-    for name, fields in selected.items():
-        table = _make_table(path, name, fields, constants, len(groups) > 1, columns)
-        table = contents.reductions.get(name, Reduction(downsampling)).noted(table)
-        made.append(dataclasses.replace(table, notes=(*table.notes, *notes)))
-    return tuple(made)
+    origins = {name: f"{path.name}, {name or 'variables'}" if len(groups) > 1 else path.name for name in groups}
+    made = {name: _make_table(origins[name], fields, constants, columns) for name, fields in selected.items()}
+    whole = Reduction(downsampling)
+    return tuple(contents.reductions.get(name, whole).noted(table).noted(*notes) for name, table in made.items())
 
 
 def _remedy(unread: Sequence[MatlabObject]) -> str:
@@ -144,16 +141,14 @@ def _scalar_fields(fields: Mapping[str, Any]) -> dict[str, float | str]:
 
 
 def _make_table(
-    path: Path, name: str, fields: Mapping[str, Any], constants: Mapping[str, float | str], several: bool,
-    columns: Sequence[str],
-) -> RawTable:  # fmt: skip
-    origin = f"{path.name}, {name or 'variables'}" if several else path.name
+    origin: str, fields: Mapping[str, Any], constants: Mapping[str, float | str], columns: Sequence[str]
+) -> RawTable:
     channels, notes = _of_one_length(origin, list(_channels(origin, fields)), columns)
     table = merge_channels(origin, channels, {**constants, **_scalar_fields(fields)})
     left_out = [f"{key} ({what})" for key, value in fields.items() if (what := _no_numbers(value, len(table.rows)))]
     if left_out:
         notes = (*notes, f"Not read, because it contains no real numbers: {', '.join(left_out)}.")
-    return dataclasses.replace(table, notes=(*table.notes, *notes))
+    return table.noted(*notes)
 
 
 def _no_numbers(value: Any, rows: int) -> str:

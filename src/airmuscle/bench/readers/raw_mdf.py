@@ -1,6 +1,5 @@
 """Readers of MDF 3 and 4 (ASAM) and of TDMS (LabVIEW): one table for each group of channels."""
 
-import dataclasses
 import functools
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -34,7 +33,7 @@ def read_mdf_tables_here(
         }  # fmt: skip
         table = merge_channels(path.name, list(_channels(file, reductions)), {})
         notes = [f"Channel group '{names[i]}': {each.note}" for i, each in reductions.items() if each.note]
-        return (dataclasses.replace(table, notes=(*table.notes, *notes)),)
+        return (table.noted(*notes),)
 
 
 read_mdf_tables = in_separate_process("asammdf", read_mdf_tables_here)
@@ -96,7 +95,11 @@ def _make_table(path: Path, group: Any, properties: dict[str, Any], several: boo
     channels = []
     for channel, start in zip(group.channels(), _start_times(group.channels()), strict=True):
         unit = str(channel.properties.get("unit_string") or channel.properties.get("NI_UnitDescription") or "")
-        channels.append(Channel(channel.name, channel[:], _waveform_time(channel, start), unit))
+        time, step = None, _step(channel)
+        if step > 0.0:
+            offset = float(channel.properties.get("wf_start_offset", 0.0))
+            time = np.asarray(start + offset + step * np.arange(len(channel)))
+        channels.append(Channel(channel.name, channel[:], time, unit))
     return merge_channels(origin, channels, constants)
 
 
@@ -111,14 +114,5 @@ def _start_times(channels: list[Any]) -> list[float]:
 
 
 def _step(channel: Any) -> float:
-    """The sample time of a waveform [s]; 0 for other channels."""
+    """The sample time of a waveform [s]; 0 for other channels, for which LabVIEW writes none or one of zero."""
     return float(channel.properties.get("wf_increment", 0.0))
-
-
-def _waveform_time(channel: Any, start: float) -> Array | None:
-    """The times of a waveform [s]; None for other channels, for which LabVIEW writes a step of zero."""
-    step = _step(channel)
-    if not step > 0.0:
-        return None
-    offset = float(channel.properties.get("wf_start_offset", 0.0))
-    return np.asarray(start + offset + step * np.arange(len(channel)))

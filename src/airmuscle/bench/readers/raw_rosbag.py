@@ -116,9 +116,7 @@ def _channels(topic: str, messages: list[tuple[float, dict[_Field, float]]]) -> 
     channels = []
     for field in fields:
         rows = [(time, numbers[field]) for time, numbers in messages if field in numbers]
-        time, values = map(
-            np.array, zip(*rows, strict=True)
-        )  # integers remain integers, which are held between messages
+        time, values = map(np.array, zip(*rows, strict=True))  # integers remain integers: held between messages
         first = np.concatenate([[True], np.diff(time) > 0])
         name = topic if field.name == "data" else f"{topic}.{field.name}"
         channels.append(Channel(name, values[first], time[first], field.unit, field.is_quantity))

@@ -32,7 +32,10 @@ def read_workbook_tables_here(
     with reading(path, "a workbook"), calamine.CalamineWorkbook.from_path(str(path)) as book:
         names = [each.name for each in book.sheets_metadata if each.typ == calamine.SheetTypeEnum.WorkSheet]
         check_known(f"{path.name}: no sheet", [] if sheet is None else sheet, names, "the sheets are", FileError)
-        found = {name: _nonempty_rows(book.get_sheet_by_name(name)) for name in names if sheet in (None, name)}
+        cells = {name: book.get_sheet_by_name(name).to_python(skip_empty_area=False)
+                 for name in names if sheet in (None, name)}  # fmt: skip
+    found = {name: [(i, row) for i, row in enumerate(rows, 1) if header.count_cells(row)]
+             for name, rows in cells.items()}  # fmt: skip
     sheets = {name: rows for name, rows in found.items() if any(_is_numeric(row) for _, row in rows)}
     if not sheets:
         raise FileError(
@@ -43,12 +46,6 @@ def read_workbook_tables_here(
 
 
 read_workbook_tables = in_separate_process("python_calamine", read_workbook_tables_here)
-
-
-def _nonempty_rows(sheet: Any) -> Rows:
-    """The rows with content, with their numbers, counted from 1."""
-    rows = enumerate(sheet.to_python(skip_empty_area=False), 1)
-    return [(i, row) for i, row in rows if any(cell not in (None, "") for cell in row)]
 
 
 def _parse_table(origin: str, rows: Rows, text_format: TextFormat) -> RawTable:
@@ -71,7 +68,13 @@ def _parse_table(origin: str, rows: Rows, text_format: TextFormat) -> RawTable:
     body = body[1:] if units else body
     if not body:
         raise FileError(f"{origin}: no rows of numbers below the headings ({listed(headings)}).")
-    _check_headings_cover(origin, headings, used, body)
+    for i, row in body:
+        outside = next((cell for j, cell in enumerate(row) if cell not in (None, "") and j not in used), None)
+        if outside is not None:
+            raise ColumnError(
+                f"{origin}, row {i}: the cell '{_text(outside)}' has no heading (the headings are {listed(headings)}). "
+                "Add a heading to its column, or move the cell outside the rows of the table."
+            )
     columns = tuple(_column([row[j] for _, row in body]) for j in used)
     return RawTable(origin, tuple(headings), units, columns, np.array([i for i, _ in body]), "row", constants)
 
@@ -94,16 +97,6 @@ def _is_numeric(row: list[Any]) -> bool:
     texts = [c for c in cells if isinstance(c, str)]
     numbers = sum(header.is_number(c) or seconds_from_clock((c,)) is not None for c in texts)
     return 2 * (numbers + sum(isinstance(c, _NUMBERS) for c in cells)) > len(cells)
-
-
-def _check_headings_cover(origin: str, headings: list[str], used: list[int], body: Rows) -> None:
-    for i, row in body:
-        outside = [j for j, cell in enumerate(row) if cell not in (None, "") and j not in used]
-        if outside:
-            raise ColumnError(
-                f"{origin}, row {i}: the cell '{_text(row[outside[0]])}' has no heading (the headings are "
-                f"{listed(headings)}). Add a heading to its column, or move the cell outside the rows of the table."
-            )
 
 
 def _text(cell: Any) -> str:

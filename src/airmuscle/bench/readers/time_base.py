@@ -109,17 +109,14 @@ class UniformTime(TimeBase):
         allowed = float(steps[steps > 0].min()) + MAX_DEVIATION * sample_time
         deviation = np.abs(time - uniform)
         if deviation.max() > allowed:
-            row = int(np.argmax(deviation))
-            message = (
-                f"{table.location(row)}: time deviates from uniform sampling by {deviation.max():.4g} s; allowed "
-                f"range: 0 to {allowed:.4g} s. The file has gaps."
-            )
+            place = f"{table.location(int(np.argmax(deviation)))}: time deviates from uniform sampling"
+            limit = f"allowed range: 0 to {allowed:.4g} s. The file has gaps."
+            message = f"{place} by {deviation.max():.4g} s; {limit}"
             raise ColumnError(HintedText(message, AS_RECORDED, WITHOUT_TIME))
-        note = (
+        return uniform, (
             f"Time is uniform by the number of rows, {1 / sample_time:.4g} rows per second; the recorded stamps "
             f"deviate by at most {deviation.max():.2g} s."
         )
-        return uniform, note
 
 
 @dataclasses.dataclass(frozen=True)
@@ -196,12 +193,9 @@ def downsample(table: RawTable, downsampling: Downsampling) -> RawTable:
     step = downsampling.step(len(table.rows))
     if step == 1:
         return table
-    return dataclasses.replace(
-        table,
-        columns=tuple(downsampling.reduce(cells, step) for cells in table.columns),
-        rows=table.rows[::step],
-        notes=(*table.notes, downsampling.note(len(table.rows), step)),
-    )
+    columns = tuple(downsampling.reduce(cells, step) for cells in table.columns)
+    reduced = dataclasses.replace(table, columns=columns, rows=table.rows[::step])
+    return reduced.noted(downsampling.note(len(table.rows), step))
 
 
 PIECE_ROWS = 500_000
@@ -214,11 +208,6 @@ class Reduction:
 
     downsampling: Downsampling
     rows: int = 0
-
-    @classmethod
-    def of(cls, sizes: Iterable[int], downsampling: Downsampling) -> "Reduction":
-        """That of columns of these sizes, by the longest one."""
-        return cls(downsampling, max(sizes, default=0))
 
     @property
     def step(self) -> int:
@@ -249,9 +238,7 @@ class Reduction:
         """The table of reduced columns with its row numbers in the file and a note on the reduction."""
         if self.step == 1:
             return table
-        return dataclasses.replace(
-            table, rows=1 + self.step * np.arange(len(table.rows)), notes=(*table.notes, self.note)
-        )
+        return dataclasses.replace(table, rows=1 + self.step * np.arange(len(table.rows))).noted(self.note)
 
 
 def check_reduced_lengths(origin: str, full: Iterable[int], reduced: Iterable[int]) -> None:

@@ -9,22 +9,8 @@ from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 from ...core import Leaf, ShortRepr, leaves
-from .expression import (
-    ADD,
-    COMPARISONS,
-    NEGATIVE,
-    PRODUCT,
-    QUOTIENT,
-    WHERE,
-    Expressions,
-    Node,
-    assemble,
-    coefficients_by_monomial,
-    depends_on,
-    expand,
-    in_order,
-    summands,
-)
+from . import expression
+from .expression import Expressions, Node, assemble, depends_on, expand, fold, in_order, summands
 from .intervals import Bounds, traced_expression, within
 
 MAX_OPERATIONS = 600
@@ -129,19 +115,13 @@ def _trace(law: Any, quantity: str, arguments: Sequence[str], ranges: Mapping[st
         return None
     known = {node: ranges[name] for node, name in zip(points, arguments, strict=True)}
     values = {node: (float(leaf.value), float(leaf.value)) for node, leaf in own.items()}
-    return _Traced(new, points, own, _complete(within(value, new, known | values), new))
 
+    def complete(old: Node, arguments: list[Node]) -> Node:
+        if old.kind == "if":  # a branch that has one side only is a choice between it and zero
+            return new.apply(expression.WHERE, *arguments, new.number(0.0))
+        return new.apply(old.kind, *arguments) if arguments else old
 
-def _complete(root: Node, new: Expressions) -> Node:
-    """The expression with every branch that has only one side made a choice between it and zero."""
-    nodes: dict[Node, Node] = {}
-    for old in in_order(root):
-        arguments = [nodes[each] for each in old.arguments]
-        if old.kind == "if":
-            nodes[old] = new.apply(WHERE, *arguments, new.number(0.0))
-        else:
-            nodes[old] = new.apply(old.kind, *arguments) if arguments else old
-    return nodes[root]
+    return _Traced(new, points, own, fold(within(value, new, known | values), complete))
 
 
 def _with_monomials(traced: _Traced) -> tuple[Node, dict[Node, tuple[int, ...]]]:
@@ -155,9 +135,9 @@ def _with_monomials(traced: _Traced) -> tuple[Node, dict[Node, tuple[int, ...]]]
     def rewritten(node: Node) -> Node:
         if node in atoms or not node.arguments:
             return node
-        if node.kind in (ADD, NEGATIVE, PRODUCT, QUOTIENT):
+        if node.kind in (expression.ADD, expression.NEGATIVE, expression.PRODUCT, expression.QUOTIENT):
             polynomial = expand(node, {*atoms, *traced.parameters})
-            terms = None if polynomial is None else coefficients_by_monomial(polynomial, traced.parameters)
+            terms = None if polynomial is None else expression.coefficients_by_monomial(polynomial, traced.parameters)
             if terms is not None:
                 used = [atom for atom in atoms if any(atom in dict(monomial) for monomial in terms)]
                 powers.update({c: tuple(dict(m).get(atom, 0) for atom in used) for m, c in terms.items()})
@@ -177,18 +157,30 @@ def _shared(root: Node) -> set[Node]:
     shared: set[Node] = set()
     cost: dict[Node, int] = {}
     for node in in_order(root):
-        own = bool(node.arguments) and node.kind != NEGATIVE
+        own = bool(node.arguments) and node.kind != expression.NEGATIVE
         cost[node] = own + sum(0 if each in shared else cost[each] for each in set(node.arguments))
         enough = MIN_SHARED_OPERATIONS if uses[node] == 2 else MIN_SHARED_OPERATIONS - 1
-        if uses[node] > 1 and cost[node] >= enough and node.kind not in COMPARISONS:
+        if uses[node] > 1 and cost[node] >= enough and node.kind not in expression.COMPARISONS:
             shared.add(node)
     return shared
 
 
 def _long_sums(root: Node) -> set[Node]:
     """The sums inside an expression that have too many terms to stand inside a function or product."""
-    inner = {each for node in in_order(root) if node.kind != ADD for each in node.arguments if each.kind == ADD}
-    terms = {each for node in in_order(root) if node.kind == ADD for each in node.arguments[1:] if each.kind == ADD}
+    inner = {
+        each
+        for node in in_order(root)
+        if node.kind != expression.ADD
+        for each in node.arguments
+        if each.kind == expression.ADD
+    }
+    terms = {
+        each
+        for node in in_order(root)
+        if node.kind == expression.ADD
+        for each in node.arguments[1:]
+        if each.kind == expression.ADD
+    }
     return {node for node in inner | terms if len(summands(node)) > MAX_INNER_TERMS}
 
 
@@ -225,11 +217,11 @@ def _named(
 ) -> LawEquation:
     """The equation with its parameters and shared parts under their names."""
     new = traced.new
-    renamed: dict[Node, Node] = {}
-    for node in in_order(value):
-        inner = [renamed[each] for each in node.arguments]
-        renamed[node] = new.apply(node.kind, *inner) if inner else new.symbol(labels[node]) if node in labels else node
-    root = renamed[value]
+
+    def renamed(node: Node, inner: list[Node]) -> Node:
+        return new.apply(node.kind, *inner) if inner else new.symbol(labels[node]) if node in labels else node
+
+    root = fold(value, renamed)
     shared = _shared(root) | _long_sums(root)
     present = set(in_order(root))
     parameters = tuple(
@@ -255,16 +247,16 @@ def _part_names(parts: Sequence[Node], arguments: Sequence[Node], taken: Collect
 
 def _physical(traced: _Traced, result: Symbol, arguments: Sequence[Symbol]) -> LawEquation | None:
     """The polynomials with numbers, in the physical arguments, pressures in bar; None if there is none."""
-    new, numbers = traced.new, dict[Node, Node]()
+    new = traced.new
     bar = new.symbol(PRESSURE_IN_BAR.name)
-    for node in in_order(traced.value):
+
+    def in_numbers(node: Node, inner: list[Node]) -> Node:
         if node in traced.parameters:
-            numbers[node] = new.number(float(traced.parameters[node].value))
-        elif node in traced.arguments and node.name == ARGUMENTS["pressure"].name:
-            numbers[node] = new.product(new.number(BAR), bar)
-        else:  # without rounding: products and quotients of numbers are not evaluated
-            inner = (numbers[each] for each in node.arguments)
-            numbers[node] = new.node(node.kind, *inner) if node.arguments else node
+            return new.number(float(traced.parameters[node].value))
+        if node in traced.arguments and node.name == ARGUMENTS["pressure"].name:
+            return new.product(new.number(BAR), bar)
+        return new.node(node.kind, *inner) if inner else node  # products and quotients of numbers are not evaluated
+
     points = [bar if node.name == "p" else node for node in traced.arguments][::-1]
     count = 0
 
@@ -276,7 +268,7 @@ def _physical(traced: _Traced, result: Symbol, arguments: Sequence[Symbol]) -> L
             return assemble({m: new.number(float(c)) for m, c in polynomial.items()}, points, new)
         return new.apply(node.kind, *(rewritten(each) for each in node.arguments)) if node.arguments else node
 
-    value = rewritten(numbers[traced.value])
+    value = rewritten(fold(traced.value, in_numbers))
     if not count:
         return None
     symbols = tuple(PRESSURE_IN_BAR if each.unit == "Pa" else each for each in arguments)

@@ -1,9 +1,13 @@
 """Expressions: nodes of a formula, shared where they are equal, with the elementary simplifications."""
 
 import math
+import operator
 from collections import Counter, defaultdict
 from collections.abc import Callable, Collection, Iterator, Mapping
 from fractions import Fraction
+from typing import TypeVar
+
+Result = TypeVar("Result")
 
 NUMBER, SYMBOL, ADD, NEGATIVE, PRODUCT, QUOTIENT, POWER = "number", "symbol", "add", "neg", "mul", "div", "pow"
 MAXIMUM, MINIMUM, WHERE = "max", "min", "where"
@@ -49,6 +53,14 @@ def in_order(root: Node) -> Iterator[Node]:
             seen.add(node)
             stack.append((node, True))
             stack += [(each, False) for each in reversed(node.arguments) if each not in seen]
+
+
+def fold(root: Node, combine: Callable[[Node, list[Result]], Result]) -> Result:
+    """The result of an expression: `combine` gives that of each node from those of its arguments, and once only."""
+    results: dict[Node, Result] = {}
+    for node in in_order(root):
+        results[node] = combine(node, [results[each] for each in node.arguments])
+    return results[root]
 
 
 class Expressions:
@@ -156,12 +168,9 @@ class Expressions:
             return simplified[kind](*arguments)
         if kind == "if" and is_number(arguments[0]):
             return arguments[1] if arguments[0].number != 0.0 else self.number(0.0)
-        if kind in COMPARISONS and all(is_number(each) for each in arguments):
-            return self.number(float(_COMPARE[kind](arguments[0].number, arguments[1].number)))
+        if kind in COMPARISONS and all(map(is_number, arguments)):
+            return self.number(float(getattr(operator, kind)(*(each.number for each in arguments))))
         return self.node(kind, *arguments)
-
-
-_COMPARE = {"lt": float.__lt__, "le": float.__le__, "eq": float.__eq__, "ne": float.__ne__}
 
 
 def _as_power(node: Node) -> tuple[Node, float]:
@@ -180,50 +189,37 @@ Polynomial = dict[Monomial, Fraction]
 
 def expand(root: Node, atoms: Collection[Node]) -> Polynomial | None:
     """An expression as a polynomial in these atoms with exact coefficients; None if it is none, or is too long."""
-    expanded: dict[Node, Polynomial | None] = {}
-    for node in in_order(root):
-        expanded[node] = _expand_one(node, atoms, expanded)
-    return expanded[root]
+    return fold(root, lambda node, inner: _expand_one(node, atoms, inner))
 
 
-def _expand_one(node: Node, atoms: Collection[Node], expanded: Mapping[Node, Polynomial | None]) -> Polynomial | None:
+def _expand_one(node: Node, atoms: Collection[Node], inner: list[Polynomial | None]) -> Polynomial | None:
     if node in atoms:
         return {((node, 1),): Fraction(1)}
     if is_number(node):
         return {(): Fraction(node.number)} if node.number else {}
     if node.kind not in ("add", "neg", "mul", "div", "pow"):
         return None
-    first, last = expanded[node.arguments[0]], expanded[node.arguments[-1]]
+    first, last = inner[0], inner[-1]
     if first is None or last is None:
         return None
     if node.kind == "add":
-        return _sum(first, last)
+        return _checked({monomial: first.get(monomial, Fraction()) + last.get(monomial, Fraction())
+                         for monomial in {**first, **last}})  # fmt: skip
     if node.kind == "neg":
         return {monomial: -c for monomial, c in first.items()}
     if node.kind == "mul":
         return _product(first, last)
     if set(last) != {()}:
         return None
-    divisor = last[()]
+    number = last[()]
     if node.kind == "div":
-        return {monomial: c / divisor for monomial, c in first.items()}
-    return _power(first, divisor)
-
-
-def _power(base: Polynomial, exponent: Fraction) -> Polynomial | None:
-    if exponent.denominator != 1 or not 0 < exponent <= 20:
+        return {monomial: c / number for monomial, c in first.items()}
+    if number.denominator != 1 or not 0 < number <= 20:
         return None
     result: Polynomial | None = {(): Fraction(1)}
-    for _ in range(int(exponent)):
-        result = None if result is None else _product(result, base)
+    for _ in range(int(number)):
+        result = None if result is None else _product(result, first)
     return result
-
-
-def _sum(a: Polynomial, b: Polynomial) -> Polynomial | None:
-    total = defaultdict(Fraction, a)
-    for monomial, c in b.items():
-        total[monomial] += c
-    return _checked(total)
 
 
 def _product(a: Polynomial, b: Polynomial) -> Polynomial | None:

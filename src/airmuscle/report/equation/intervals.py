@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from ...core import autodiff, instructions_of
-from .expression import FUNCTIONS, MAXIMUM, MINIMUM, POWER, Expressions, Node, in_order, is_number
+from .expression import FUNCTIONS, MAXIMUM, MINIMUM, POWER, Expressions, Node, fold, in_order, is_number
 
 Bounds = tuple[float, float]
 UNKNOWN: Bounds = (-math.inf, math.inf)
@@ -17,8 +17,9 @@ _INCREASING: dict[str, Callable[[float], float]] = {
 }  # fmt: skip
 
 
-def traced_expression(law: Any, method: str, expressions: Expressions, arguments: Sequence[Node],
-                      parameters: Sequence[Node]) -> Node | None:  # fmt: skip
+def traced_expression(
+    law: Any, method: str, new: Expressions, arguments: Sequence[Node], parameters: Sequence[Node]
+) -> Node | None:
     """A method of a law at these arguments, with these nodes in place of its parameters, in the order of the leaves.
 
     None if the law cannot be traced, or contains an operation without a notation.
@@ -32,13 +33,6 @@ def traced_expression(law: Any, method: str, expressions: Expressions, arguments
     value = casadi.SX(getattr(model, method)(*symbols))
     autodiff.check_finite(value, f"{type(law).__name__}.{method}")
     function = casadi.Function("law", [*symbols, vector], casadi.cse([value]))
-    return _read(function, expressions, arguments, parameters)
-
-
-def _read(function: Any, new: Expressions, arguments: Sequence[Node], parameters: Sequence[Node]) -> Node | None:
-    """The output of a CasADi function from its list of instructions."""
-    import casadi
-
     kinds, current, result = _kinds(), dict[int, Node](), new.number(0.0)
     for k, (code, target, source) in enumerate(instructions_of(function)):
         if code == casadi.OP_OUTPUT:
@@ -85,15 +79,16 @@ def _kinds() -> dict[int, str]:
 
 def within(root: Node, new: Expressions, ranges: Mapping[Node, Bounds]) -> Node:
     """The expression for symbols within these ranges; a parameter has the range of its value."""
-    nodes: dict[Node, Node] = {}
     bounds: dict[Node, Bounds] = {}
-    for old in in_order(root):
-        node = old if not old.arguments else new.apply(old.kind, *(nodes[each] for each in old.arguments))
+
+    def rebuild(old: Node, arguments: list[Node]) -> Node:
+        node = new.apply(old.kind, *arguments) if arguments else old
         for each in in_order(node):
             if each not in bounds:
                 bounds[each] = _bounds_of(each, bounds, ranges)
-        nodes[old] = _reduced(node, new, bounds)
-    return nodes[root]
+        return _reduced(node, new, bounds)
+
+    return fold(root, rebuild)
 
 
 def _reduced(node: Node, new: Expressions, bounds: Mapping[Node, Bounds]) -> Node:

@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping
 from typing import ClassVar
 
 from ..formula import symbol_formula
-from .expression import ADD, NEGATIVE, NUMBER, POWER, PRODUCT, QUOTIENT, SYMBOL, WHERE, Node, in_order, is_number
+from .expression import ADD, NEGATIVE, NUMBER, POWER, PRODUCT, QUOTIENT, SYMBOL, WHERE, Node, fold, in_order, is_number
 
 SUM, TERM, BASE, ATOM = 1, 2, 3, 4
 """Binding strengths of a sum, a product, a power and what needs no parentheses."""
@@ -19,6 +19,10 @@ class Notation(abc.ABC):
     relations: ClassVar[Mapping[str, str]] = _RELATIONS
     logical: ClassVar[Mapping[str, str]] = {"and": "&&", "or": "||", "not": "!"}
     functions: ClassVar[Mapping[str, str]] = {}
+    """Names of functions that differ from the kinds of their nodes; with `pow`, a power is a call of a function."""
+    parentheses: ClassVar[str] = "({})"
+    choice: ClassVar[str]
+    """Form of a choice, from the condition, the value where it holds, and the other value."""
 
     def __init__(self, names: Mapping[Node, str], arguments: Collection[Node] = ()) -> None:
         self._names, self._arguments = names, set(arguments)
@@ -32,13 +36,12 @@ class Notation(abc.ABC):
         """The expression; with `definition`, that of a part itself and not its name."""
         if not definition and root in self._names:
             return self._names[root]
-        written: dict[Node, tuple[str, int]] = {}
-        for node in in_order(root):
-            if node in self._names and not (definition and node is root):
-                written[node] = self._names[node], ATOM
-            else:
-                written[node] = self._write(node, [written[each] for each in node.arguments])
-        return written[root][0]
+
+        def write(node: Node, inner: list[tuple[str, int]]) -> tuple[str, int]:
+            is_named = node in self._names and not (definition and node is root)
+            return (self._names[node], ATOM) if is_named else self._write(node, inner)
+
+        return fold(root, write)[0]
 
     def _write(self, node: Node, inner: list[tuple[str, int]]) -> tuple[str, int]:
         texts = [text for text, _ in inner]
@@ -48,7 +51,8 @@ class Notation(abc.ABC):
             case _ if node.kind == SYMBOL:
                 return self._names.get(node, node.name), ATOM
             case _ if node.kind == ADD:
-                return self._sum(node, inner), SUM
+                left, right = texts
+                return f"{left} - {right[1:]}" if right.startswith("-") else f"{left} + {right}", SUM
             case _ if node.kind == NEGATIVE:
                 return f"-{self._bound(inner[0], TERM)}", SUM
             case _ if node.kind == PRODUCT:
@@ -56,70 +60,49 @@ class Notation(abc.ABC):
                 return self._product(node, self._bound(inner[0], TERM), self._bound(inner[1], strength)), TERM
             case _ if node.kind == QUOTIENT:
                 return self._quotient(node, inner)
-            case _ if node.kind == POWER:
+            case _ if node.kind == POWER and POWER not in self.functions:
                 return self._power(node, inner)
             case _ if node.kind == WHERE:
-                return self._where(node, texts), ATOM
+                return self.choice.format(*texts), ATOM
         if node.kind in self.relations:
             return f"({texts[0]} {self.relations[node.kind]} {texts[1]})", ATOM
         if node.kind in self.logical:
-            return self._logic(node.kind, texts), ATOM
+            sign = self.logical[node.kind]
+            return f"({sign}{texts[0]})" if node.kind == "not" else f"({texts[0]} {sign} {texts[1]})", ATOM
         return self._call(self.functions.get(node.kind, node.kind), texts), ATOM
 
-    def _sum(self, node: Node, inner: list[tuple[str, int]]) -> str:
-        left, right = inner[0][0], inner[1][0]
-        separator = self._sum_separator(node)
-        if right.startswith("-"):
-            return f"{left} {separator}- {right[1:]}"
-        return f"{left} {separator}+ {right}"
-
-    def _sum_separator(self, node: Node) -> str:
-        return ""
-
     def _bound(self, inner: tuple[str, int], strength: int) -> str:
-        return inner[0] if inner[1] >= strength else f"({inner[0]})"
+        return inner[0] if inner[1] >= strength else self.parentheses.format(inner[0])
 
     def _product(self, node: Node, left: str, right: str) -> str:
-        return f"{left}*{right}"
+        return f"{left}{self._dot(*node.arguments)}*{right}"
 
     def _quotient(self, node: Node, inner: list[tuple[str, int]]) -> tuple[str, int]:
-        return f"{self._bound(inner[0], TERM)}/{self._bound(inner[1], BASE)}", TERM
+        return f"{self._bound(inner[0], TERM)}{self._dot(node.arguments[1])}/{self._bound(inner[1], BASE)}", TERM
 
     def _power(self, node: Node, inner: list[tuple[str, int]]) -> tuple[str, int]:
-        return f"{self._bound(inner[0], ATOM)}^{self._bound(inner[1], ATOM)}", BASE
+        return f"{self._bound(inner[0], ATOM)}{self._dot(node)}^{self._bound(inner[1], ATOM)}", BASE
 
-    def _logic(self, kind: str, texts: list[str]) -> str:
-        sign = self.logical[kind]
-        return f"({sign}{texts[0]})" if kind == "not" else f"({texts[0]} {sign} {texts[1]})"
+    def _dot(self, *operands: Node) -> str:
+        """The sign of an operation on each element of arrays; empty where one of the operands is a scalar."""
+        return ""
 
     def _call(self, function: str, texts: list[str]) -> str:
-        return f"{function}({', '.join(texts)})"
+        return f"{function}{self.parentheses.format(', '.join(texts))}"
 
     @abc.abstractmethod
     def number(self, value: float) -> str:
         """A number with all its digits."""
 
-    @abc.abstractmethod
-    def _where(self, node: Node, texts: list[str]) -> str: ...
-
-
-def _is_scalar(node: Node, arguments: Collection[Node]) -> bool:
-    return not any(each in arguments for each in in_order(node))
-
 
 class C(Notation):
     """The C language, with math.h."""
 
-    functions: ClassVar[Mapping[str, str]] = {"max": "fmax", "min": "fmin", "abs": "fabs"}
+    functions: ClassVar[Mapping[str, str]] = {"max": "fmax", "min": "fmin", "abs": "fabs", POWER: "pow"}
+    choice = "({} ? {} : {})"
 
     def number(self, value: float) -> str:
         return repr(value)
-
-    def _power(self, node: Node, inner: list[tuple[str, int]]) -> tuple[str, int]:
-        return f"pow({inner[0][0]}, {inner[1][0]})", ATOM
-
-    def _where(self, node: Node, texts: list[str]) -> str:
-        return f"({texts[0]} ? {texts[1]} : {texts[2]})"
 
 
 class Matlab(Notation):
@@ -127,24 +110,13 @@ class Matlab(Notation):
 
     relations: ClassVar[Mapping[str, str]] = {**_RELATIONS, "ne": "~="}
     logical: ClassVar[Mapping[str, str]] = {"and": "&", "or": "|", "not": "~"}
+    choice = "({0}.*({1}) + (~{0}).*({2}))"
 
     def number(self, value: float) -> str:
         return "pi" if value == math.pi else repr(value).removesuffix(".0")
 
-    def _product(self, node: Node, left: str, right: str) -> str:
-        scalar = any(_is_scalar(each, self._arguments) for each in node.arguments)
-        return f"{left}*{right}" if scalar else f"{left}.*{right}"
-
-    def _quotient(self, node: Node, inner: list[tuple[str, int]]) -> tuple[str, int]:
-        sign = "/" if _is_scalar(node.arguments[1], self._arguments) else "./"
-        return f"{self._bound(inner[0], TERM)}{sign}{self._bound(inner[1], BASE)}", TERM
-
-    def _power(self, node: Node, inner: list[tuple[str, int]]) -> tuple[str, int]:
-        sign = "^" if _is_scalar(node, self._arguments) else ".^"
-        return f"{self._bound(inner[0], ATOM)}{sign}{self._bound(inner[1], ATOM)}", BASE
-
-    def _where(self, node: Node, texts: list[str]) -> str:
-        return f"({texts[0]}.*({texts[1]}) + (~{texts[0]}).*({texts[2]}))"
+    def _dot(self, *operands: Node) -> str:
+        return "." if all(self._arguments.intersection(in_order(each)) for each in operands) else ""
 
 
 class Excel(Notation):
@@ -154,20 +126,12 @@ class Excel(Notation):
     """
 
     relations: ClassVar[Mapping[str, str]] = {**_RELATIONS, "eq": "=", "ne": "<>"}
-    logical: ClassVar[Mapping[str, str]] = {"and": "AND", "or": "OR", "not": "NOT"}
-    functions: ClassVar[Mapping[str, str]] = {"log": "LN"}
+    logical: ClassVar[Mapping[str, str]] = {}
+    functions: ClassVar[Mapping[str, str]] = {"log": "ln", POWER: "power"}
+    choice = "IF({},{},{})"
 
     def number(self, value: float) -> str:
         return "PI()" if value == math.pi else f"{value:.15G}"
-
-    def _power(self, node: Node, inner: list[tuple[str, int]]) -> tuple[str, int]:
-        return f"POWER({inner[0][0]},{inner[1][0]})", ATOM
-
-    def _where(self, node: Node, texts: list[str]) -> str:
-        return f"IF({texts[0]},{texts[1]},{texts[2]})"
-
-    def _logic(self, kind: str, texts: list[str]) -> str:
-        return self._call(kind, texts)
 
     def _call(self, function: str, texts: list[str]) -> str:
         return f"{function.upper()}({','.join(texts)})"
@@ -186,6 +150,8 @@ class Latex(Notation):
     relations: ClassVar[Mapping[str, str]] = {"lt": "<", "le": r"\le", "eq": "=", "ne": r"\ne"}
     logical: ClassVar[Mapping[str, str]] = {"and": r"\land", "or": r"\lor", "not": r"\lnot "}
     functions: ClassVar[Mapping[str, str]] = _LATEX_FUNCTIONS
+    parentheses = r"\left({}\right)"
+    choice = r"\begin{{cases}} {1} & {0} \\ {2} & \text{{otherwise}} \end{{cases}}"
 
     def __init__(self, names: Mapping[Node, str], digits: int | None = None) -> None:
         super().__init__({node: latex_symbol(name) for node, name in names.items()})
@@ -213,9 +179,6 @@ class Latex(Notation):
             return rf"\left|{inner[0][0]}\right|", ATOM
         return super()._write(node, inner)
 
-    def _bound(self, inner: tuple[str, int], strength: int) -> str:
-        return inner[0] if inner[1] >= strength else rf"\left({inner[0]}\right)"
-
     def _product(self, node: Node, left: str, right: str) -> str:
         return rf"{left} \cdot {right}" if right[:1].isdigit() or "cdot" in right else rf"{left}\,{right}"
 
@@ -226,12 +189,6 @@ class Latex(Notation):
         if is_number(node.arguments[1], 0.5):
             return rf"\sqrt{{{inner[0][0]}}}", ATOM
         return f"{self._bound(inner[0], ATOM)}^{{{inner[1][0]}}}", BASE
-
-    def _where(self, node: Node, texts: list[str]) -> str:
-        return rf"\begin{{cases}} {texts[1]} & {texts[0]} \\ {texts[2]} & \text{{otherwise}} \end{{cases}}"
-
-    def _call(self, function: str, texts: list[str]) -> str:
-        return rf"{function}\left({', '.join(texts)}\right)"
 
 
 def latex_symbol(name: str) -> str:
