@@ -6,9 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import STANDARD_GRAVITY, Array, ColumnError, Hint, HintedText, UnitError, conversion
+from ...core import Array, ColumnError, Hint, HintedText, counted
 from ...recording.columns import quantity_of
 from ...recording.recording import Recording
+from ..readers.constants import file_conversion
 from ..readers.missing_values import DropMissing
 from ..segment.sensor import estimate_noise
 from .bench_rows import BenchRows, bench_rows, file_list, limits, recordings_with
@@ -28,12 +29,11 @@ MAX_CONTRACTION = 0.55
 at most 1 - 1/(sqrt(3) cos(angle)), 42 % (Chou and Hannaford 1996)."""
 PULLING = 0.05
 """Force of a row that pulls, as a fraction of the maximum force (chosen)."""
-PRESSURE_LEVELS = 6
-"""Number of intervals of pressure in which the slope of the force over the contraction is judged (chosen)."""
-MIN_LEVEL_ROWS, MIN_RISING = 6, 0.8
-"""Minimum number of rows of an interval, and minimum share of intervals in which the force rises (chosen)."""
-MIN_RANGE = 0.02
-"""Minimum range of the contraction in an interval (chosen)."""
+PRESSURE_LEVELS, MIN_RISING = 6, 0.8
+"""Number of intervals of pressure in which the slope of the force over the contraction is judged, and minimum share of
+those in which the force rises (chosen)."""
+MIN_LEVEL_ROWS, MIN_RANGE = 6, 0.02
+"""Minimum number of rows and minimum range of the contraction of such an interval (chosen)."""
 
 
 def check_contraction_signs(recordings: Sequence[Recording]) -> Iterator[str]:
@@ -156,10 +156,9 @@ def check_missing_codes(recordings: Sequence[Recording]) -> Iterator[HintedText]
             if code is not None:
                 found.setdefault((name, code.value), []).append((each.origin, int(np.count_nonzero(code.rows))))
     for (name, value), places in found.items():
-        rows = sum(count for _, count in places)
-        count = f"{rows} row{'' if rows == 1 else 's'}"
+        rows = counted(sum(count for _, count in places), "row")
         yield HintedText(
-            f"{file_list([origin for origin, _ in places])}: the {name} is {value:g} in {count}, far from all "
+            f"{file_list([origin for origin, _ in places])}: the {name} is {value:g} in {rows}, far from all "
             "other readings: this is a code for a missing value, which is read as a number.",
             Hint("To leave these rows out", "missing", DropMissing((value,)), "ColumnMapping"),
         )
@@ -167,11 +166,9 @@ def check_missing_codes(recordings: Sequence[Recording]) -> Iterator[HintedText]
 
 def without_missing_codes(recordings: Sequence[Recording]) -> list[Recording]:
     """The recordings without the rows in which a value is missing."""
-    kept = []
-    for each in recordings:
-        codes = [code.rows for name in each.columns if (code := find_missing_code(each, name)) is not None]
-        kept.append(each.rows(~np.any(codes, axis=0)) if codes else each)
-    return kept
+    codes = [[code.rows for name in each.columns if (code := find_missing_code(each, name)) is not None]
+             for each in recordings]  # fmt: skip
+    return [each.rows(~np.any(own, axis=0)) if own else each for each, own in zip(recordings, codes, strict=True)]
 
 
 def find_missing_code(recording: Recording, name: str) -> MissingCode | None:
@@ -195,8 +192,5 @@ def _as_written(recording: Recording, name: str, value: float) -> float:
     unit, quantity = recording.units.get(name), quantity_of(name)
     if unit is None or quantity is None:
         return value
-    try:
-        change = conversion(unit, quantity.unit)
-    except UnitError:
-        return value / (conversion(unit, "kg").factor * STANDARD_GRAVITY)  # a load stated as a mass
+    change = file_conversion(unit, quantity.unit)
     return float((value - change.offset) / change.factor)

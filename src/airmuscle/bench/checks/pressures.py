@@ -1,21 +1,14 @@
 """Checks of pressure and force: absolute pressure in place of gauge, limits, sign and zero of the force."""
 
+import contextlib
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from ...core import AMBIENT_PRESSURE, Hint, HintedText, UnitError, conversion
 from ...recording.recording import Recording
-from .bench_rows import (
-    MIN_RANGE,
-    BenchRows,
-    bench_rows,
-    file_list,
-    limits,
-    pressure_lines,
-    recordings_with,
-    slack_plateaus,
-)
+from . import bench_rows as of_bench
+from .bench_rows import BenchRows, bench_rows, file_list, limits, pressure_lines, recordings_with
 
 ATMOSPHERE = (95e3, 106e3)
 """Range of the lowest pressure that may be the atmosphere [Pa] (chosen)."""
@@ -99,7 +92,7 @@ def check_pressure_zero(recordings: Sequence[Recording]) -> Iterator[HintedText]
     """A lowest pressure, but for two glitches, below that of the atmosphere, by less than the vacuum of a rig."""
     given = [each for each in recordings_with(recordings, "pressure") if len(each) > 2]
     lowest, origin = min(((float(np.sort(each["pressure"])[2]), each.origin) for each in given), default=(0.0, ""))
-    if MAX_ZERO_ERROR < lowest < -MAX_ZERO * max((float(np.nanmax(each["pressure"])) for each in given), default=0.0):
+    if MAX_ZERO_ERROR < lowest < -MAX_ZERO * _highest_pressure(given)[0]:
         yield HintedText(
             f"{origin}: the gauge pressure is down to {lowest / 1e3:.3g} kPa. Unless the rig draws a vacuum, the zero "
             "of the pressure sensor is wrong, and all pressures by the same amount, or the ambient pressure of "
@@ -110,14 +103,19 @@ def check_pressure_zero(recordings: Sequence[Recording]) -> Iterator[HintedText]
 
 def check_pressure_limit(recordings: Sequence[Recording]) -> Iterator[str]:
     """A pressure above that of pneumatic muscles."""
-    pressures = [(float(np.nanmax(each["pressure"])), each.origin) for each in recordings_with(recordings, "pressure")]
-    highest, origin = max(pressures, default=(0.0, ""))
+    highest, origin = _highest_pressure(recordings)
     if highest > MAX_PRESSURE:
         yield (
             f"{origin}: the pressure is up to {highest / 1e3:.4g} kPa, above {MAX_PRESSURE / 1e3:g} kPa, the "
             "highest of pneumatic muscles. Check its unit, and that the columns of pressure and force are not "
             "exchanged."
         )
+
+
+def _highest_pressure(recordings: Sequence[Recording]) -> tuple[float, str]:
+    """The highest pressure [Pa] of all recordings and its file; 0 without any."""
+    pressures = [(float(np.nanmax(each["pressure"])), each.origin) for each in recordings_with(recordings, "pressure")]
+    return max(pressures, default=(0.0, ""))
 
 
 def _greatest_force(recordings: Sequence[Recording]) -> float:
@@ -145,10 +143,9 @@ def _begins_at_ambient(recording: Recording, greatest: float) -> bool:
 def _is_unstated(recording: Recording) -> bool:
     """Whether the file does not state gauge or absolute pressure."""
     unit = recording.units.get("pressure")
-    try:
+    with contextlib.suppress(UnitError):
         return unit is not None and conversion(unit, "Pa").assumed_gauge
-    except UnitError:
-        return False
+    return False
 
 
 def _states_reference(recording: Recording) -> bool:
@@ -191,8 +188,7 @@ def check_force_signs(recordings: Sequence[Recording]) -> Iterator[str]:
 def check_force_area(recordings: Sequence[Recording]) -> Iterator[str]:
     """A maximum force that is too great or too small for the highest pressure."""
     given = recordings_with(recordings, "pressure", "force")
-    greatest = _greatest_force(given)
-    highest = max((float(np.nanmax(each["pressure"])) for each in recordings_with(recordings, "pressure")), default=0.0)
+    greatest, (highest, _) = _greatest_force(given), _highest_pressure(recordings)
     varied = any(float(np.ptp(each["pressure"])) > 0.1 * highest for each in given)
     if greatest <= 0 or highest <= 0 or (highest < 1e3 and not varied):
         return
@@ -225,7 +221,7 @@ def check_force_zero(recordings: Sequence[Recording]) -> Iterator[str]:
         return
     places = (
         ("at zero pressure and shortened length", rows.slack),
-        ("over a range of contractions at constant pressure", slack_plateaus(given)),
+        ("over a range of contractions at constant pressure", of_bench.slack_plateaus(given)),
     )
     for place, slack in places:
         reading = float(np.median(slack.force)) if slack.force.size >= MIN_ROWS else 0.0
@@ -252,4 +248,4 @@ def _is_constant(slack: BenchRows) -> bool:
     """Whether a slack muscle reads the same negative force at several lengths, and not the limit of the sensor."""
     low, high = limits(slack.force)
     at_limit = float(np.mean(slack.force == np.min(slack.force))) > 0.5
-    return not at_limit and high - low < COMPRESSED * -low and float(np.ptp(slack.contraction)) > MIN_RANGE
+    return not at_limit and high - low < COMPRESSED * -low and float(np.ptp(slack.contraction)) > of_bench.MIN_RANGE

@@ -10,6 +10,7 @@ from .inspection import check_contents as check_contents
 from .inspection import inspect as inspect
 from .inspection import inspect_all as inspect_all
 from .interval import Interval as Interval
+from .interval import find_static_points as find_static_points
 from .outliers import Outlier as Outlier
 from .outliers import find_outliers as find_outliers
 from .outliers import without_outliers as without_outliers
@@ -32,7 +33,6 @@ from .sensor import analyse_sampling as analyse_sampling
 from .sensor import estimate_noise as estimate_noise
 from .sensor import estimate_resolution as estimate_resolution
 from .sensor import estimate_sensors as estimate_sensors
-from .static_points import find_static_points as find_static_points
 
 # isort: split
 # For the other rooms, not in __all__

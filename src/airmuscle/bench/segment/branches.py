@@ -69,7 +69,7 @@ def find_branches(
     runs = find_runs(recording) if runs is None else runs
     column = moved_column(recording)
     isobaric = [run.interval for run in runs if run.kind == ISOBARIC and column in run.swept_columns]
-    if 2 * sum(len(interval) for interval in isobaric) > len(recording):
+    if column and 2 * sum(len(interval) for interval in isobaric) > len(recording):
         return tuple(b for each in isobaric for b in _motion_branches(recording, column, each, reversal))
     if sensor is None and any(run.kind == AT_REST for run in runs):
         sensor = Sensor("pressure", 0.0, estimate_noise(recording["pressure"]))
@@ -91,27 +91,31 @@ def _split_at_runs(recording: Recording, runs: tuple[Run, ...]) -> list[Interval
 def _pressure_branches(
     recording: Recording, parts: list[Interval], sensor: Sensor | None, reversal: float
 ) -> Iterator[Branch]:
-    time, pressure = recording.columns.get("time"), recording["pressure"]
-    smooth = [_remove_spikes(pressure[part.rows], None if time is None else time[part.rows]) for part in parts]
+    smooth = [_smooth(recording, "pressure", part) for part in parts]
     threshold = max(reversal * float(np.ptp(np.concatenate(smooth))), 10.0 * (sensor.std if sensor else 0.0))
     for part, values in zip(parts, smooth, strict=True):
-        for each, direction in _monotonic_intervals(values, threshold):
-            ends = float(values[each.start]), float(values[each.stop - 1])
-            yield Branch(Interval(part.start + each.start, part.start + each.stop), direction, *ends)
+        yield from _branches("pressure", part, values, threshold, values)
 
 
-def _motion_branches(recording: Recording, column: str | None, run: Interval, reversal: float) -> Iterator[Branch]:
-    """The branches of the motion in one isobaric run; none if the motion is not measured."""
-    if column is None:
-        return
+def _motion_branches(recording: Recording, column: str, run: Interval, reversal: float) -> Iterator[Branch]:
+    """The branches of the motion in one isobaric run."""
+    smooth = _smooth(recording, column, run)
+    noise = estimate_noise(smooth) if "time" in recording.columns else 0.0
+    threshold = max(reversal * float(np.ptp(smooth)), 10.0 * noise)
+    return _branches(column, run, smooth, threshold, recording["pressure"][run.rows])
+
+
+def _branches(column: str, part: Interval, smooth: Array, threshold: float, pressure: Array) -> Iterator[Branch]:
+    """The branches of a column in a part of the recording, with the pressures at their ends."""
     shortening = -1 if column == "length" else 1
-    time, pressure = recording.columns.get("time"), recording["pressure"]
-    smooth = _remove_spikes(recording[column][run.rows], None if time is None else time[run.rows])
-    noise = estimate_noise(smooth) if time is not None else 0.0
-    for part, direction in _monotonic_intervals(smooth, max(reversal * float(np.ptp(smooth)), 10.0 * noise)):
-        interval = Interval(run.start + part.start, run.start + part.stop)
-        ends = float(pressure[interval.start]), float(pressure[interval.stop - 1])
-        yield Branch(interval, shortening * direction, *ends, column)
+    for each, direction in _monotonic_intervals(smooth, threshold):
+        ends = float(pressure[each.start]), float(pressure[each.stop - 1])
+        yield Branch(Interval(part.start + each.start, part.start + each.stop), shortening * direction, *ends, column)
+
+
+def _smooth(recording: Recording, column: str, part: Interval) -> Array:
+    time = recording.columns.get("time")
+    return _remove_spikes(recording[column][part.rows], None if time is None else time[part.rows])
 
 
 def motion_direction(values: Array, time: Array | None = None, *, reversal: float = REVERSAL_FRACTION) -> Array:

@@ -5,14 +5,14 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from ...core import Array, ColumnError, Hint, HintedText, counted
+from ...core import ColumnError, Hint, HintedText, counted
 from ...recording.columns import ZERO_NOT_STATED, quantity_of
 from ...recording.recording import Recording
 from ..readers.time_base import UNIFORM, WITHOUT_TIME
+from .interval import find_static_points
 from .plateaus import quasi_static_rows
 from .runs import AT_REST, FREE, KINDS, Run, moved_column
 from .sensor import Sampling, Sensor
-from .static_points import find_static_points
 
 MAX_SATURATED_FRACTION = 0.5
 """Fraction of saturated rows above which too few rows remain for a fit (chosen)."""
@@ -124,16 +124,13 @@ def _motion_findings(recording: Recording) -> Iterator[Finding]:
     if "pressure" not in recording or "force" not in recording:
         return
     if moved is None:
-        yield Finding(
-            HintedText(
-                "no length or contraction was recorded, so the kind of the run is open and no characteristic can be "
-                "identified.",
-                Hint(
-                    "To state the held length of an isometric run", "constants", {"length": "73.2 mm"}, "ColumnMapping"
-                ),
-                Hint("To state its place in the names of the files", "file_name", "held{length [mm]}", "ColumnMapping"),
-            )
+        held = {"length": "73.2 mm"}
+        text = "no length or contraction was recorded, so the kind of the run is open and no characteristic can be "
+        hints = (
+            Hint("To state the held length of an isometric run", "constants", held, "ColumnMapping"),
+            Hint("To state its place in the names of the files", "file_name", "held{length [mm]}", "ColumnMapping"),
         )
+        yield Finding(HintedText(f"{text}identified.", *hints))
     elif "contraction" not in recording:
         converted = Hint(f"To convert the {moved}", "resting_length", "300 mm", "ColumnMapping")
         remedy = (" ", ZERO_NOT_STATED) if moved == "position" else (converted,)
@@ -161,11 +158,13 @@ def _duration_findings(
     last = pressure[-max(len(pressure) // 10, 3) :]
     quasi_static = quasi_static_rows(recording, sensors)
     if span > 0 and not quasi_static[-1] and abs(last[-1] - last[0]) > MAX_FINAL_CHANGE * span:
-        change = f"{abs(last[-1] - last[0]) / 1e3:.4g} kPa"
+        changes = np.abs(np.diff(pressure[:: -len(last)]))
+        usual = np.median(changes)
         yield Finding(
-            f"the record ends before the pressure has settled (it changes by {change} in the last tenth) and may be "
-            "shorter than the dynamics. Record until the pressure has settled.",
-            serious=not _is_ramp(pressure, len(last)),
+            "the record ends before the pressure has settled (it changes by "
+            f"{abs(last[-1] - last[0]) / 1e3:.4g} kPa in the last tenth) and may be shorter than the dynamics. Record "
+            "until the pressure has settled.",
+            serious=not abs(changes[0] - usual) <= RAMP_TOLERANCE * usual,  # in a sweep, it changes as it usually does
         )
     max_step = float(np.max(np.abs(np.diff(pressure)))) if len(pressure) > 1 else 0.0
     if max_step > 0.5 * span > 0:
@@ -173,9 +172,3 @@ def _duration_findings(
             f"the pressure changes by {max_step / 1e3:.4g} kPa between two rows, more than half of its range: the step "
             f"is undersampled at {sampling.rate:.4g} rows per second."
         )
-
-
-def _is_ramp(pressure: Array, rows: int) -> bool:
-    """Whether the pressure changes in the last rows as much as it usually does in as many, as in a sweep."""
-    changes = np.abs(np.diff(pressure[::-rows]))
-    return bool(abs(changes[0] - np.median(changes)) <= RAMP_TOLERANCE * np.median(changes))

@@ -11,11 +11,11 @@ from ...recording.columns import display_scale
 from ...recording.recording import Recording
 from .branches import Branch, branch_column_agreement, find_branches
 from .findings import Finding, check_swept, collect_findings
+from .interval import StaticPoints, find_static_points
 from .outliers import Outlier, find_outliers
 from .plateaus import Plateau, find_plateaus, quasi_static_rows
 from .runs import AT_REST, Run, find_runs
 from .sensor import Sampling, Sensor, analyse_sampling, estimate_sensors
-from .static_points import StaticPoints, find_static_points
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)

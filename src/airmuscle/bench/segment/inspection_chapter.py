@@ -71,12 +71,17 @@ def _values(inspection: Inspection) -> Iterator[NamedValue]:
 
 def _units(name: str, value: Any) -> tuple[str, str]:
     """The SI unit and the displayed unit of a constant; empty for one that is no known quantity."""
-    quantity = quantity_of(CONSTANT_QUANTITIES.get(name, name))
-    return (
-        (quantity.unit, display_scale(CONSTANT_QUANTITIES.get(name, name))[1])
-        if quantity and isinstance(value, float)
-        else ("", "")
-    )
+    name = CONSTANT_QUANTITIES.get(name, name)
+    quantity = quantity_of(name)
+    return (quantity.unit, display_scale(name)[1]) if quantity and isinstance(value, float) else ("", "")
+
+
+def _rows(parts: Sequence[Any]) -> dict[str, list[int]]:
+    """The columns of a table with the first and the last row of each part, counted from 1."""
+    return {
+        "first row": [each.interval.start + 1 for each in parts],
+        "last row": [each.interval.stop for each in parts],
+    }
 
 
 def _column_table(inspection: Inspection) -> Table:
@@ -93,11 +98,9 @@ def _column_table(inspection: Inspection) -> Table:
         "resolution": TableColumn([(s and s.resolution) or None for s in sensors], BY_ROW, digits=3),
         "noise": TableColumn([(s and s.noise) or None for s in sensors], BY_ROW, digits=2),
         "deviation": TableColumn([(s and s.std) or None for s in sensors], BY_ROW, digits=2, brief=False),
-        **{
-            f"{end} limit": TableColumn(values, BY_ROW, brief=any(v is not None for v in values))
-            for end, values in limits.items()
-        },
-    }
+        **{f"{end} limit": TableColumn(values, BY_ROW, brief=any(v is not None for v in values))
+           for end, values in limits.items()},
+    }  # fmt: skip
     return Table("columns", "Columns", columns, "Limits: where the sensor saturates.", brief=len(names))
 
 
@@ -109,8 +112,7 @@ def _run_table(runs: Sequence[Run]) -> Table:
         "level": TableColumn([run.constant_value for run in runs], BY_ROW),
         "unit": unit_column(names),
         "swept": [", ".join(run.swept_columns) for run in runs],
-        "first row": [run.interval.start + 1 for run in runs],
-        "last row": [run.interval.stop for run in runs],
+        **_rows(runs),
     }
     return Table("runs", "Runs", columns, brief=MAX_RUNS)
 
@@ -120,8 +122,7 @@ def _branch_table(inspection: Inspection) -> Table | None:
     columns: dict[str, Any] = {
         "branch": [each.name for each in branches],
         "column": TableColumn([each.column for each in branches], brief=False),
-        "first row": [each.interval.start + 1 for each in branches],
-        "last row": [each.interval.stop for each in branches],
+        **_rows(branches),
         "pressure": TableColumn([(each.start_pressure, each.end_pressure) for each in branches], "Pa", "kPa"),
     }
     title = "Branches" if inspection.sampling else "Branches, if the rows are in order of time"
@@ -132,10 +133,7 @@ def _plateau_table(inspection: Inspection) -> Table | None:
     plateaus = inspection.plateaus
     if not plateaus:
         return None
-    columns: dict[str, Any] = {
-        "first row": [each.interval.start + 1 for each in plateaus],
-        "last row": [each.interval.stop for each in plateaus],
-    }
+    columns: dict[str, Any] = {**_rows(plateaus)}
     for name in plateaus[0].values:
         unit, shown = unit_column([name]).values[0], display_scale(name)[1].removesuffix("-")
         columns[name] = TableColumn([each.values.get(name) for each in plateaus], unit, shown)

@@ -115,10 +115,8 @@ def _neighbour_medians(values: Array) -> tuple[Array, Array]:
     """The medians of the rows before and after each row; the row itself near the ends, where there are too few rows."""
     medians = np.median(np.lib.stride_tricks.sliding_window_view(values, WINDOW), axis=1)
     before, after = values.copy(), values.copy()
-    before[WINDOW:] = medians[:-1]
-    after[:-WINDOW] = medians[1:]
-    before[-WINDOW:] = values[-WINDOW:]
-    after[:WINDOW] = values[:WINDOW]
+    inner = slice(WINDOW, -WINDOW)
+    before[inner], after[inner] = medians[: -WINDOW - 1], medians[WINDOW + 1 :]
     return before, after
 
 

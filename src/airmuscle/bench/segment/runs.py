@@ -15,27 +15,22 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from ...core import Array
 from ...recording.columns import MOVED
 from ...recording.recording import Recording
-from .interval import Interval, level_intervals, remembered, spread
+from .interval import Interval, StaticPoints, find_static_points, level_intervals, remembered, spread
 from .sensor import Sensor, estimate_sensors
-from .static_points import StaticPoints, find_static_points
 
 RELATIVE_BAND = 0.02
 """Band of a constant quantity, as a fraction of its maximum (chosen)."""
-RIPPLE_BAND = 0.06
-"""Band of a pressure that oscillates while the muscle is moved, as a fraction of its maximum (chosen)."""
-MIN_RIPPLE_REVERSALS = 3
-"""Number of crossings of the mean that makes a fluctuation a ripple, not a step between two levels (chosen)."""
+RIPPLE_BAND, MIN_RIPPLE_REVERSALS = 0.06, 3
+"""Band of a pressure that oscillates while the muscle is moved, as a fraction of its maximum, and number of crossings
+of the mean that makes a fluctuation a ripple, not a step between two levels (chosen)."""
 MOVED_BANDS = 4.0
 """A muscle is moved if its length changes by more than this number of constant bands (chosen)."""
 CONTRACTION_BAND = 0.005
 """Band of a constant contraction, and of a constant length as a fraction of its maximum (chosen)."""
-SWEEP_FRACTION = 0.1
-"""Minimum change of a swept quantity, as a fraction of its range in the recording (chosen)."""
-MIN_ROWS = 3
-"""Minimum number of rows of a run (chosen)."""
+SWEEP_FRACTION, MIN_ROWS = 0.1, 3
+"""Minimum change of a swept quantity, as a fraction of its range in the recording; minimum rows of a run (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -163,16 +158,12 @@ def _has_ripple(recording: Recording, interval: Interval, bands: dict[str, float
     moved, pressure = moved_column(recording), recording["pressure"][interval.rows]
     if moved is None or spread(pressure) > RIPPLE_BAND * float(np.max(np.abs(recording["pressure"]))):
         return False
-    is_moved = spread(recording[moved][interval.rows]) > MOVED_BANDS * bands[moved]
-    return is_moved and _count_crossings(pressure) >= MIN_RIPPLE_REVERSALS
-
-
-def _count_crossings(values: Array) -> int:
-    """The number of crossings of the middle of the range, with a dead band of a fifth of the range."""
-    low, high = np.quantile(values, [0.01, 0.99])
-    distance = values - 0.5 * (low + high)
-    side = np.sign(distance[np.abs(distance) > 0.1 * (high - low)])
-    return int(np.count_nonzero(np.diff(side)))
+    if not spread(recording[moved][interval.rows]) > MOVED_BANDS * bands[moved]:
+        return False
+    low, high = np.quantile(pressure, [0.01, 0.99])
+    distance = pressure - 0.5 * (low + high)
+    side = np.sign(distance[np.abs(distance) > 0.1 * (high - low)])  # crossings of the middle have a dead band
+    return bool(np.count_nonzero(np.diff(side)) >= MIN_RIPPLE_REVERSALS)
 
 
 def _join_ripple(recording: Recording, intervals: list[Interval], bands: dict[str, float]) -> Iterator[Interval]:

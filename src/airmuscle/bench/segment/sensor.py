@@ -5,13 +5,11 @@ import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from ...core import Array, ParameterError
 from ...recording.columns import quantity_of
 from ...recording.recording import Recording
-from .interval import Mask, remembered, true_intervals
-from .static_points import find_static_points
+from .interval import Mask, find_static_points, remembered, true_intervals
 
 GAP_FACTOR = 5.0
 """A time step longer than this multiple of the sample time is a gap (chosen)."""
@@ -19,10 +17,9 @@ GAP_FACTOR = 5.0
 
 @dataclasses.dataclass(frozen=True)
 class Gap:
-    """A gap between row `row` and the next row, from `start` [s], of length `duration` [s]."""
+    """A gap between row `row` and the next row, of length `duration` [s]."""
 
     row: int
-    start: float
     duration: float
 
 
@@ -63,11 +60,10 @@ def analyse_sampling(recording: Recording) -> Sampling | None:
     forward = steps[steps > 0]
     step = float(np.median(forward)) if forward.size else 0.0
     jitter = 1.4826 * float(np.median(np.abs(forward - step))) / step if step else 0.0
-    gaps = tuple(Gap(int(i), float(time[i]), float(steps[i])) for i in np.flatnonzero(steps > GAP_FACTOR * step))
-    return Sampling(
-        len(recording), float(time.max() - time.min()), _sample_time(steps), jitter, gaps if step else (),
-        _rows(steps == 0), _rows(steps < 0),
-    )  # fmt: skip
+    gaps = tuple(Gap(int(i), float(steps[i])) for i in np.flatnonzero(steps > GAP_FACTOR * step))
+    repeated, backward = (tuple((np.flatnonzero(wrong) + 1).tolist()) for wrong in (steps == 0, steps < 0))
+    sample_time, duration = _sample_time(steps), float(time.max() - time.min())
+    return Sampling(len(recording), duration, sample_time, jitter, gaps if step else (), repeated, backward)
 
 
 def _sample_time(steps: Array) -> float:
@@ -78,10 +74,6 @@ def _sample_time(steps: Array) -> float:
     if (steps > 0).all() or (steps < 0).any():
         return median
     return float(steps[steps <= GAP_FACTOR * median].mean())
-
-
-def _rows(irregular_steps: npt.NDArray[np.bool_]) -> tuple[int, ...]:
-    return tuple(int(i) + 1 for i in np.flatnonzero(irregular_steps))
 
 
 def count_rows(seconds: float, time: Array | None, min_rows: int) -> int:
@@ -113,8 +105,7 @@ _IGNORED = ("time", "branch", "fill", "discharge", "latched")
 class Sensor:
     """The sensor of a column: resolution (0 if not detectable), noise and saturation limits, in SI units.
 
-    `lower_limit` and `upper_limit` are the readings at which the sensor saturates, infinite if it does not;
-    `at_lower_limit` and `at_upper_limit` are the numbers of rows at these limits.
+    `lower_limit` and `upper_limit` are the readings at which the sensor saturates, infinite if it does not.
     """
 
     name: str
@@ -122,8 +113,6 @@ class Sensor:
     noise: float
     lower_limit: float = -math.inf
     upper_limit: float = math.inf
-    at_lower_limit: int = 0
-    at_upper_limit: int = 0
 
     @property
     def std(self) -> float:
@@ -162,9 +151,8 @@ def _estimate_sensor(name: str, all_runs: list[Array], runs: list[Array]) -> Sen
     resolution = float(np.median(steps or 0.0)) if together else estimate_resolution(np.concatenate(all_runs))
     if not runs:
         return Sensor(name, resolution, 0.0)
-    low, at_low = _upper_limit([-v for v in runs], resolution)
-    high, at_high = _upper_limit(runs, resolution)
-    sensor = Sensor(name, resolution, 0.0, -low, high, at_low, at_high)
+    low, high = -_upper_limit([-values for values in runs], resolution), _upper_limit(runs, resolution)
+    sensor = Sensor(name, resolution, 0.0, low, high)
     noise = float(np.median([estimate_noise(values[sensor.censoring(values) == 0.0]) for values in runs]))
     return dataclasses.replace(sensor, noise=noise)
 
@@ -214,8 +202,8 @@ def _are_multiples(steps: Array, step: float) -> bool:
     return bool(np.count_nonzero(multiples == 1) >= 3 and np.count_nonzero(multiples > 0) > 0.98 * count)
 
 
-def _upper_limit(runs: list[Array], resolution: float) -> tuple[float, int]:
-    """The upper limit at which readings saturate, and the number of rows at this limit; infinite without saturation.
+def _upper_limit(runs: list[Array], resolution: float) -> float:
+    """The upper limit at which readings saturate; infinite without saturation.
 
     The readings must stay constant at the limit for many more consecutive rows than at any other reading, and the
     sensor must have noise elsewhere.
@@ -226,12 +214,12 @@ def _upper_limit(runs: list[Array], resolution: float) -> tuple[float, int]:
     below = combined[combined < top - tolerance]
     rows_at_top = max(_longest_interval(mask) for mask in at_top)
     if not len(below) or rows_at_top < MIN_SATURATED_ROWS:
-        return math.inf, 0
+        return math.inf
     between = [values[(values < top - tolerance) & (values > combined.min() + tolerance)] for values in runs]
     rows_elsewhere = 1 + max(_longest_interval(np.abs(np.diff(values)) <= tolerance) for values in between)
     noise = max(estimate_noise(values) for values in between)
     is_noisy = noise > max(MIN_NOISE * resolution, 1e-6 * float(np.ptp(combined)))
-    return (top, len(combined) - len(below)) if is_noisy and rows_at_top > 2 * rows_elsewhere else (math.inf, 0)
+    return top if is_noisy and rows_at_top > 2 * rows_elsewhere else math.inf
 
 
 def _longest_interval(mask: Mask) -> int:
