@@ -33,13 +33,10 @@ def split_specimens(table: RawTable) -> tuple[RawTable, ...]:
     if not 0 < len(values) <= MAX_SPECIMENS:
         return (table,)
     others = table.of_columns([i for i in range(len(names)) if i != column])
+    origins = [table.origin if len(values) == 1 else f"{table.origin}, specimen {value}" for value in values]
     return tuple(
-        others.of_rows(
-            np.flatnonzero(labels == value),
-            origin=table.origin if len(values) == 1 else f"{table.origin}, specimen {value}",
-            constants={**table.constants, SPECIMEN: value},
-        )
-        for value in values
+        others.of_rows(np.flatnonzero(labels == value), origin=origin, constants={**table.constants, SPECIMEN: value})
+        for value, origin in zip(values, origins, strict=True)
     )
 
 

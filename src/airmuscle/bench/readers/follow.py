@@ -18,12 +18,9 @@ from .mapping import ColumnMapping
 from .plausibility import CONTRACTION_RANGE, MAX_MAGNITUDE
 from .text_format import TextFormat, TextHeader, has_content, is_comment, parse_header, split_cells
 
-MAX_UNREADABLE = 100
-"""Consecutive unreadable rows after which a stream is refused (chosen)."""
-MAX_HEADER_LINES = 1000
-"""Lines before the first row of numbers after which a stream is refused (chosen)."""
-MAX_LINE = 65536
-"""Characters of a line after which a stream is refused (chosen)."""
+MAX_UNREADABLE, MAX_HEADER_LINES, MAX_LINE = 100, 1000, 65536
+"""Consecutive unreadable rows, lines before the first row of numbers, and characters of a line, after which a stream is
+refused (chosen)."""
 
 
 class RowReader:
@@ -97,11 +94,8 @@ class RowReader:
         held = {find_quantity_name(name) for name in self.mapping.constants}
         self._held = {name: float(recording[name][0]) for name in recording if name in held}
         self._width = len(headings)
-        self._conversions = [
-            (i, heading.name, unit_conversion(table, heading, ambient))
-            for i, heading in enumerate(resolve_headings(table, self.mapping.units))
-            if heading.known
-        ]
+        known = ((i, each) for i, each in enumerate(resolve_headings(table, self.mapping.units)) if each.known)
+        self._conversions = [(i, each.name, unit_conversion(table, each, ambient)) for i, each in known]
 
     def _read_row(self, line: str) -> dict[str, float] | None:
         try:
@@ -111,8 +105,11 @@ class RowReader:
             values = [float(self._point(cell)) for cell in cells[: self._width]]
             assert self._conversions is not None
             row = {**self._held, **{name: float(convert(values[i])) for i, name, convert in self._conversions}}
-            if not all(self._is_possible(name, value) for name, value in row.items()):
-                raise ValueError
+            for name, value in row.items():  # a damaged number may still be a number
+                ranges = {"pressure": (-self._ambient, MAX_MAGNITUDE), "contraction": CONTRACTION_RANGE}
+                low, high = ranges.get(name.rpartition(".")[2], (-MAX_MAGNITUDE, MAX_MAGNITUDE))
+                if not low < value < high:
+                    raise ValueError
         except (ValueError, csv.Error):  # such as a carriage return within the line
             self.skipped, self._unreadable = self.skipped + 1, self._unreadable + 1
             if self._unreadable > MAX_UNREADABLE:
@@ -127,12 +124,6 @@ class RowReader:
         if "contraction" not in row and "length" in row and isinstance(length, float):
             row["contraction"] = (length - row["length"]) / length
         return row
-
-    def _is_possible(self, name: str, value: float) -> bool:
-        """Whether a value may be a measurement: a damaged number may still be a number."""
-        ranges = {"pressure": (-self._ambient, MAX_MAGNITUDE), "contraction": CONTRACTION_RANGE}
-        low, high = ranges.get(name.rpartition(".")[2], (-MAX_MAGNITUDE, MAX_MAGNITUDE))
-        return low < value < high
 
     def _point(self, cell: str) -> str:
         return cell.replace(",", ".") if self._comma else cell

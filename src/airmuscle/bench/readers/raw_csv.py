@@ -11,20 +11,12 @@ import numpy as np
 
 from ...core import ColumnError, FileError, Hint, abridged, listed
 from ...recording.recording import list_rows
+from . import text_format as form
 from .channels import Cells, RawTable, numbers_if_all
 from .file_kind import check_beginning, check_text_file, readable
 from .header import COMMA_NUMBER, POINT_NUMBER
 from .missing_values import MAX_LISTED
-from .text_format import (
-    NumberedLines,
-    TextFormat,
-    TextHeader,
-    detect_encoding,
-    has_content,
-    is_comment,
-    parse_header,
-    split_cells,
-)
+from .text_format import NumberedLines, TextFormat, TextHeader, has_content, is_comment, parse_header, split_cells
 from .time_base import Decimation, Downsampling, downsample
 
 _THOUSANDS = re.compile(r"[-+]?[1-9]\d{0,2}[.,]\d{3}")
@@ -41,10 +33,15 @@ def read_csv_table(path: str | Path, text_format: TextFormat = TextFormat()) -> 
 
 def parse_text(origin: str, text: str, text_format: TextFormat) -> RawTable:
     """The table in a text. Raises FileError or ColumnError."""
-    lines = [(i, line) for i, line in enumerate(re.split(r"\r\n|\n|\r", text), 1) if has_content(line)]
-    header = parse_header(origin, lines, text_format)
-    body = [(i, line) for i, line in lines if not is_comment(line)][header.header_lines :]
+    header, body = _header_and_body(origin, re.split(r"\r\n|\n|\r", text), text_format)
     return header.table(origin, parse_columns(origin, header, body, text_format), [i for i, _ in body])
+
+
+def _header_and_body(origin: str, lines: list[str], text_format: TextFormat) -> tuple[TextHeader, NumberedLines]:
+    """The header, and the lines below it that are no comments."""
+    numbered = [(i, line) for i, line in enumerate(lines, 1) if has_content(line)]
+    header = parse_header(origin, numbered, text_format)
+    return header, [(i, line) for i, line in numbered if not is_comment(line)][header.header_lines :]
 
 
 def read_text(path: Path) -> str:
@@ -52,7 +49,7 @@ def read_text(path: Path) -> str:
         content = path.read_bytes()
     if not content.strip():
         raise FileError(f"{path}: the file is empty.")
-    return content.decode(detect_encoding(content), errors="replace")
+    return content.decode(form.detect_encoding(content), errors="replace")
 
 
 def parse_columns(origin: str, header: TextHeader, body: NumberedLines, text_format: TextFormat) -> tuple[Cells, ...]:
@@ -157,7 +154,7 @@ def read_large_csv(
     """
     with path.open("rb") as file:
         beginning = file.read(_HEADER_BYTES)
-    encoding = detect_encoding(beginning)
+    encoding = form.detect_encoding(beginning)
     first, header = _read_header(path.name, beginning, encoding, text_format)
     total = _count_lines(path) - first + 1
     step = downsampling.step(total)
@@ -185,7 +182,7 @@ def read_text_stream(
     if not beginning.strip():
         raise FileError(f"{origin}: it contains nothing. Check the program that writes to it.")
     check_beginning(origin, beginning)
-    encoding = detect_encoding(beginning)
+    encoding = form.detect_encoding(beginning)
     if len(beginning) < _HEADER_BYTES:
         return downsample(parse_text(origin, beginning.decode(encoding, errors="replace"), text_format), downsampling)
     first, header = _read_header(origin, beginning, encoding, text_format)
@@ -216,11 +213,9 @@ def _split_lines(blocks: Iterable[str]) -> Iterator[str]:
 
 def _read_header(origin: str, beginning: bytes, encoding: str, text_format: TextFormat) -> tuple[int, TextHeader]:
     """The line number of the first row of numbers, and the header above it."""
-    text = beginning.decode(encoding, errors="replace").splitlines()[:-1]  # the last line may be incomplete
-    lines = [(i, line) for i, line in enumerate(text, 1) if has_content(line)]
-    header = parse_header(origin, lines, text_format)
-    body = [i for i, line in lines if not is_comment(line)]
-    return body[header.header_lines], header
+    lines = beginning.decode(encoding, errors="replace").splitlines()[:-1]  # the last line may be incomplete
+    header, body = _header_and_body(origin, lines, text_format)
+    return body[0][0], header
 
 
 def _count_lines(path: Path) -> int:

@@ -140,10 +140,8 @@ def parse_header(origin: str, lines: NumberedLines, text_format: TextFormat) -> 
     count += 1 if units else 0
     if len(body) <= count:
         raise FileError(f"{origin}: no rows of numbers below the headings ({listed(headings)}).")
-    constants = [
-        *(header.parse_constant_cells(split_cells(line, delimiter)) for _, line in preamble),
-        *(header.parse_constant_comment(line) for _, line in comments),
-    ]
+    constants = [header.parse_constant_cells(split_cells(line, delimiter)) for _, line in preamble]
+    constants += [header.parse_constant_comment(line) for _, line in comments]
     return TextHeader(tuple(headings), units, dict(filter(None, constants)), delimiter, above + count)
 
 
@@ -162,9 +160,8 @@ def _lines_above_headings(body: NumberedLines, text_format: TextFormat) -> int:
         delimiter = text_format.detect_delimiter(line)
         cells = split_cells(line, delimiter)
         if _is_numeric(cells):
-            if not rows or (
-                _is_numeric(rows[-1][1]) and header.is_number(cells[0]) and header.is_number(rows[-1][1][0])
-            ):
+            before = rows[-1][1] if rows else []
+            if not rows or (_is_numeric(before) and header.is_number(cells[0]) and header.is_number(before[0])):
                 return 0  # no heading is found above the first rows of numbers
             above = _heading_above(rows, delimiter, header.count_cells(cells))
             if above is not None:

@@ -122,11 +122,9 @@ def from_pandas(frame: Any, mapping: ColumnMapping = ColumnMapping(), *, origin:
     if not len(frame.columns) or not len(frame):
         raise ParameterError(f"from_pandas: {origin} has no columns or no rows.")
     series = [frame.iloc[:, i] for i in range(len(frame.columns))]
-    notes = tuple(
-        f"Column '{each.name}' contains dates; time is counted from the first, {each.iloc[0]}."
-        for each in series
-        if each.dtype.kind == "M"
-    )
+    dated = (each for each in series if each.dtype.kind == "M")
+    text = "Column '{}' contains dates; time is counted from the first, {}."
+    notes = tuple(text.format(each.name, each.iloc[0]) for each in dated)
     table = merge_channels(origin, [Channel(str(each.name), _values(each)) for each in series], {})
     table = dataclasses.replace(table, rows=np.arange(len(frame)), notes=notes)
     return interpret(apply_mapping(table, mapping), mapping)
@@ -152,11 +150,8 @@ def to_xarray(recording: Recording) -> Any:
         raise AirmuscleError("to_xarray needs the package xarray; pip install xarray, or use to_pandas().") from None
     timed = "time" in recording.columns
     along = "time" if timed else "row"
-    data = {name: (along, recording[name], _unit(name)) for name in recording if name != "time"}
+    units = {name: split_unit(column_heading(name))[1] for name in recording}
+    data = {name: (along, recording[name], {"units": unit} if unit else {})
+            for name, unit in units.items() if name != "time"}  # fmt: skip
     rows = ("time", recording["time"], {"units": "s"}) if timed else ("row", np.arange(len(recording)))
     return xarray.Dataset(data, coords={along: rows}, attrs={"origin": recording.origin, **recording.constants})
-
-
-def _unit(name: str) -> dict[str, str]:
-    unit = split_unit(column_heading(name))[1]
-    return {"units": unit} if unit else {}
