@@ -12,22 +12,17 @@ MOVED = ("contraction", "length", "shortening", "position")
 PROPOSALS = ("weg", "hub", "stroke", "travel", "extension", "displacement", "verschiebung", "traverse", "crosshead")
 """Beginnings of headings of displacements, whose zero and direction the heading does not state."""
 
+_SHORTENING, _ELONGATION = ({"displacement": f"{name} [mm]"} for name in ("shortening", "elongation"))
 ZERO_NOT_STATED = HintedText(
     "A displacement has no stated zero and direction.",
-    Hint(
-        "If it is the shortening from the resting length",
-        "columns",
-        {"displacement": "shortening [mm]"},
-        "ColumnMapping",
-    ),
-    Hint("If it is the elongation", "columns", {"displacement": "elongation [mm]"}, "ColumnMapping"),
+    Hint("If it is the shortening from the resting length", "columns", _SHORTENING, "ColumnMapping"),
+    Hint("If it is the elongation", "columns", _ELONGATION, "ColumnMapping"),
     Hint("To state its reading at the resting length", "displacement_zero", "12 mm", "ColumnMapping"),
 )
 """Reason and remedies where a contraction is needed and only a displacement was recorded."""
 _DISPLAY_UNITS = {
-    "pressure": (1e-3, "kPa"), "contraction": (100.0, "%"), "length": (1e3, "mm"), "position": (1e3, "mm"),
-    "shortening": (1e3, "mm"),
-    "volume": (1e6, "cm³"), "air_mass": (1e3, "g"), "mass_flow": (1e3, "g/s"),
+    "pressure": (1e-3, "kPa"), "contraction": (100.0, "%"), "volume": (1e6, "cm³"), "air_mass": (1e3, "g"),
+    "mass_flow": (1e3, "g/s"), **dict.fromkeys(("length", "position", "shortening"), (1e3, "mm")),
 }  # fmt: skip
 """Factor and unit of the quantities that are not displayed in SI units."""
 
@@ -173,13 +168,10 @@ UNIT_SPELLINGS: dict[str, tuple[str, ...]] = {
 }  # fmt: skip
 """Usual spellings of the units of each quantity, used in suggestions and to recognise a suffix as in `pressure_kPa`."""
 
-_MARKED_FORMS = tuple(
-    re.compile(pattern)
-    for pattern in (
-        r"(?P<name>.*?)\s*\[(?P<unit>.*)\]",
-        r"(?P<name>.*?)\s*\((?P<unit>.*)\)",
-        r"(?P<name>.+?)\s*/\s*(?P<unit>.+)",
-    )
+_MARKED_FORMS = (
+    re.compile(r"(?P<name>.*?)\s*\[(?P<unit>.*)\]"),
+    re.compile(r"(?P<name>.*?)\s*\((?P<unit>.*)\)"),
+    re.compile(r"(?P<name>.+?)\s*/\s*(?P<unit>.+)"),
 )
 MAX_HEADING = 1000
 """Number of characters of a heading above which it states no quantity and no unit (chosen)."""

@@ -76,15 +76,16 @@ def panels_of(names: Iterable[str], units: Mapping[str, str], *, ordered: bool) 
     return sorted(panels, key=lambda panel: ORDER.index(panel.quantity) if panel.quantity in ORDER else len(ORDER))
 
 
-def _without_role(name: str) -> tuple[str, str]:
-    """The name without the prefix of a control loop, and that prefix."""
+def _parts_of(name: str) -> tuple[str, str, str, str]:
+    """The prefix of a control loop, the name without it, its part of the plant, and the last part of the name."""
     prefix = next((prefix for prefix in ROLES if name.startswith(prefix)), "")
-    return name.removeprefix(prefix), prefix
+    base = name.removeprefix(prefix)
+    part, _, tail = base.rpartition(".")
+    return prefix, base, part, tail
 
 
 def _quantity_and_unit(name: str, known: list[str], units: Mapping[str, str]) -> tuple[str, str]:
-    base, _ = _without_role(name)
-    part, _, tail = base.rpartition(".")
+    _, base, part, tail = _parts_of(name)
     quantity, unit = quantity_of(base), units.get(name) or units.get(base, "")
     if tail in _PRESSURE_SETPOINTS and (unit == "Pa" or (not unit and f"{part}.pressure".lstrip(".") in known)):
         return "pressure", "Pa"
@@ -101,8 +102,7 @@ def _curves(quantity: str, names: list[str]) -> tuple[Curve, ...]:
     curves: list[Curve] = []
     variants: list[str] = []
     for name in sorted(names, key=lambda name: _role_of(name, quantity) != ""):
-        base, _ = _without_role(name)
-        part, _, tail = base.rpartition(".")
+        _, base, part, tail = _parts_of(name)
         role = _role_of(name, quantity)
         own = role or (tail != quantity and quantity == "opening")
         variants += [tail] if not role and tail not in variants else []
@@ -117,21 +117,14 @@ def _curves(quantity: str, names: list[str]) -> tuple[Curve, ...]:
 
 def _role_of(name: str, quantity: str) -> str:
     """The role of a column in its panel: that of its prefix, or of the set point of a pressure regulator."""
-    base, prefix = _without_role(name)
-    tail = base.rpartition(".")[2]
+    prefix, _, _, tail = _parts_of(name)
     return ROLES.get(prefix, "") or (_PRESSURE_SETPOINTS.get(tail, "") if quantity == "pressure" else "")
 
 
 def plot_columns(
-    columns: Mapping[str, Array],
-    time: Array | None,
-    title: str,
-    *,
-    ax: Any = None,
-    units: Mapping[str, str] | None = None,
-    ordered: bool = True,
-    limit: int | None = None,
-) -> Any:
+    columns: Mapping[str, Array], time: Array | None, title: str, *, ax: Any = None,
+    units: Mapping[str, str] | None = None, ordered: bool = True, limit: int | None = None,
+) -> Any:  # fmt: skip
     """Plot columns (N,) over `time` (N,) [s], or over the row number if there is no time.
 
     ax       Axes for the panels: one, or a sequence; None makes a figure
@@ -207,19 +200,17 @@ def _key(panel: Panel, parts: Sequence[str]) -> list[Any]:
     """Handles of a legend of many curves: the colour of each part, and the line style of each kind of curve."""
     from matplotlib.lines import Line2D
 
-    colours = {
-        c.part: Line2D([], [], label=(c.part or "plant").replace("_", " "), color=_colour(c, parts))
-        for c in panel.curves
-    }
+    labels = {c.part: (c.part or "plant").replace("_", " ") for c in panel.curves}
+    colours = [Line2D([], [], label=label, color=_colour(part, parts)) for part, label in labels.items()]
     styles: dict[str, Any] = {}
     for curve in panel.curves:
         name = curve.role or curve.name.rpartition(".")[2].replace("_", " ")
         styles.setdefault(name, Line2D([], [], label=name, **{**_style(curve, parts, True), "color": BLACK}))
-    return [*colours.values(), *(styles.values() if len(styles) > 1 else ())]
+    return [*colours, *(styles.values() if len(styles) > 1 else ())]
 
 
-def _colour(curve: Curve, parts: Sequence[str]) -> str:
-    return LINES[parts.index(curve.part) % len(LINES)]
+def _colour(part: str, parts: Sequence[str]) -> str:
+    return LINES[parts.index(part) % len(LINES)]
 
 
 def _scale(panel: Panel) -> tuple[float, str]:
@@ -233,7 +224,7 @@ def _scale(panel: Panel) -> tuple[float, str]:
 
 def _style(curve: Curve, parts: Sequence[str], has_time: bool) -> dict[str, Any]:
     """Line style: one colour for each part; a set point is dashed, a measurement and a command are thin."""
-    colour = _colour(curve, parts)
+    colour = _colour(curve.part, parts)
     if not has_time:
         return {"linestyle": "none", "marker": "o", "markersize": 2.5, "color": colour}
     if curve.role == "lagged set point":

@@ -86,29 +86,27 @@ class Recording(NotebookDisplay):
         values = self._column(name)
         if values is not None:
             return values
-        known = list(self.columns)
         remedy: str = ""
-        moved = next((each for each in ("length", "shortening") if each in known), "")
+        moved = next((each for each in ("length", "shortening") if each in self.columns), "")
         if name == "contraction" and moved:
             remedy = f" Specify the resting length to convert the {moved} to a contraction."
-        elif name == "contraction" and "position" in known:
+        elif name == "contraction" and "position" in self.columns:
             remedy = HintedText(" ", ZERO_NOT_STATED)
-        text = f"{self.origin}: no column '{name}'{alternatives(name, known, 'the columns are')}"
+        text = f"{self.origin}: no column '{name}'{alternatives(name, list(self.columns), 'the columns are')}"
         raise ColumnError(HintedText(text, remedy))
 
     def _column(self, name: str) -> Array | None:
         if name in self.columns:
             return self.columns[name]
-        resting_length = self.constants.get("resting_length")
-        if isinstance(resting_length, float | int):
-            if name == "contraction" and "length" in self.columns:
-                return (resting_length - self.columns["length"]) / resting_length
-            if name == "length" and "contraction" in self.columns:
-                return resting_length * (1.0 - self.columns["contraction"])
-            if "shortening" in self.columns and name in ("contraction", "length"):
-                contraction = self.columns["shortening"] / resting_length
-                return contraction if name == "contraction" else resting_length * (1.0 - contraction)
-        return None
+        length = self.constants.get("resting_length")
+        if name not in ("contraction", "length") or not isinstance(length, float | int):
+            return None
+        if name == "contraction" and "length" in self.columns:
+            return (length - self.columns["length"]) / length
+        contraction = self.columns.get("contraction")
+        if contraction is None and "shortening" in self.columns:
+            contraction = self.columns["shortening"] / length
+        return contraction if contraction is None or name == "contraction" else length * (1.0 - contraction)
 
     def __contains__(self, name: str) -> bool:
         return isinstance(name, str) and self._column(name) is not None

@@ -51,7 +51,9 @@ def shown_columns(table: Table, *, chosen: bool = True, brief: bool = False) -> 
     """
     rows = table.brief_rows if brief else list(range(len(table)))
     columns = {name: each for name, each in table.columns.items() if each.brief or not brief}
-    scales = _scales_of_rows(table.columns[UNIT], rows, chosen) if UNIT in table.columns else []
+    units = table.columns.get(UNIT, TableColumn(()))
+    labels = units.shown or units.values
+    scales = [scale_of("", units.values[i], labels[i], chosen=chosen) for i in rows if len(units)]
     shown = [_shown(name, each, rows, scales, chosen, brief) for name, each in columns.items()]
     for each in shown if chosen else ():
         if each.heading == MEANING:
@@ -75,31 +77,16 @@ def _shown(
     return ShownColumn(heading, [_times(value, factor) for value in values], column)
 
 
-def _scales_of_rows(units: TableColumn, rows: list[int], chosen: bool) -> list[tuple[float, str]]:
-    """Factor from SI and unit of each row: that of the column, or its own where the rows have different ones."""
-    shown = units.shown or units.values
-    scales = []
-    for i in rows:
-        unit, label = units.values[i], shown[i]
-        factor = 1.0 if label == unit else _factor(label, unit)
-        known = chosen and unit != "1"  # not each ratio is a contraction
-        scales.append(chosen_scale(unit, factor, label) if known else (factor, label))
-    return scales
-
-
 def scale_of(name: str, unit: str, shown: str = "", *, chosen: bool = True) -> tuple[float, str]:
     """Factor from SI, and the unit in which a quantity is shown. A ratio has a unit of choice only as contraction."""
     label = shown or unit
-    factor = 1.0 if label == unit else _factor(label.removesuffix(_ANR), unit.removesuffix(_ANR))
+    factor = 1.0
+    if label != unit:
+        plain, si_unit = label.removesuffix(_ANR), unit.removesuffix(_ANR)
+        factor = 1.0 / (known_factor(plain, 0.0) or conversion(plain, si_unit).factor)
     if chosen and (unit != "1" or "contraction" in name.lower()):
         return chosen_scale(unit, factor, label)
     return factor, label
-
-
-def _factor(unit: str, si_unit: str) -> float:
-    """The factor from SI to a unit."""
-    known = known_factor(unit, 0.0) or conversion(unit, si_unit).factor
-    return 1.0 / known
 
 
 def value_cells(named: NamedValue) -> tuple[str, str]:
