@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from ...core import ColumnError, Hint, UnitError, conversion
+from ...core import ColumnError, FileError, Hint, UnitError, conversion, listed
 from ...recording.columns import parse_heading
 from .constants import CONSTANT_UNITS, parse_constant_name
 
@@ -62,13 +62,33 @@ def stated_heading_row(
     return best
 
 
-def missing_header_error(location: str) -> ColumnError:
-    """The error for numbers in the place of the heading row."""
-    return ColumnError(
-        f"{location}: the heading row is missing. Insert a row above the numbers with name and unit of each column, "
-        "such as 'pressure [kPa], contraction [%], force [N]'.",
-        hint=Hint("To map columns by their numbers", "columns", {1: "pressure [kPa]", 2: "force [N]"}, "ColumnMapping"),
-    )
+def parse_headings(
+    origin: str, place: str, rows: Sequence[Sequence[str]], headerless: bool, above: Sequence[str] = ()
+) -> tuple[list[str], tuple[str, ...] | None, int]:
+    """The headings and units of a table, and the number of rows that they occupy, from its first three rows of cells.
+
+    `place` names the first row in messages; `above` are cells in a comment above it. Raises ColumnError for numbers
+    without headings, unless `headerless`, and FileError without a row of numbers.
+    """
+    cells = rows[0]
+    if are_headings(cells):
+        headings, count = list(cells), 1
+    elif len(above) == len(cells) and are_headings(above):
+        headings, count = list(above), 0
+    elif headerless:
+        headings, count = [str(i) for i in range(1, len(cells) + 1)], 0
+    else:
+        mapped = {1: "pressure [kPa]", 2: "force [N]"}
+        raise ColumnError(
+            f"{origin}, {place}: the heading row is missing. Insert a row above the numbers with name and unit of each "
+            "column, such as 'pressure [kPa], contraction [%], force [N]'.",
+            hint=Hint("To map columns by their numbers", "columns", mapped, "ColumnMapping"),
+        )
+    units = parse_unit_row(headings, rows[count]) if len(rows) > count else None
+    count += units is not None
+    if len(rows) <= count:
+        raise FileError(f"{origin}: no rows of numbers below the headings ({listed(headings)}).")
+    return headings, units, count
 
 
 def parse_unit_row(headings: Sequence[str], cells: Sequence[str]) -> tuple[str, ...] | None:

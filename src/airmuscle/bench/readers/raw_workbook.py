@@ -58,16 +58,9 @@ def _parse_table(origin: str, rows: Rows, text_format: TextFormat) -> RawTable:
     constants = dict(filter(None, (header.parse_constant_cells(_texts(row)) for _, row in rows[:start])))
     first, cells = rows[start]
     used = [j for j, cell in enumerate(cells) if cell not in (None, "")]
-    if header.are_headings(_texts(cells)):
-        headings, body = [_text(cells[j]) for j in used], rows[start + 1 :]
-    elif text_format.headerless:
-        headings, body = [str(n) for n in range(1, len(used) + 1)], rows[start:]
-    else:
-        raise header.missing_header_error(f"{origin}, row {first}")
-    units = header.parse_unit_row(headings, [_text(body[0][1][j]) for j in used] if body else [])
-    body = body[1:] if units else body
-    if not body:
-        raise FileError(f"{origin}: no rows of numbers below the headings ({listed(headings)}).")
+    beginning = [[_text(row[j]) for j in used] for _, row in rows[start : start + 3]]
+    headings, units, count = header.parse_headings(origin, f"row {first}", beginning, text_format.headerless)
+    body = rows[start + count :]
     for i, row in body:
         outside = next((cell for j, cell in enumerate(row) if cell not in (None, "") and j not in used), None)
         if outside is not None:

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ...core import FileError, ParameterError, abridged, listed
+from ...core import FileError, ParameterError, abridged
 from . import header
 from .channels import Cells, RawTable
 
@@ -135,11 +135,11 @@ def parse_header(origin: str, lines: NumberedLines, text_format: TextFormat) -> 
         raise FileError(f"{origin}: there is no table below the {text_format.skip_rows} lines of skip_rows.")
     preamble, body = body[:above], body[above:]
     delimiter = text_format.detect_delimiter(body[0][1])
-    headings, count = _find_headings(origin, comments, body, delimiter, text_format.headerless)
-    units = header.parse_unit_row(headings, split_cells(body[count][1], delimiter) if len(body) > count else [])
-    count += 1 if units else 0
-    if len(body) <= count:
-        raise FileError(f"{origin}: no rows of numbers below the headings ({listed(headings)}).")
+    first = body[0][0]
+    commented = [line.lstrip("#% \t") for i, line in comments if i < first]
+    rows = [split_cells(line, delimiter) for _, line in body[:3]]
+    last = split_cells(commented[-1], delimiter) if commented else ()
+    headings, units, count = header.parse_headings(origin, f"line {first}", rows, text_format.headerless, last)
     constants = [header.parse_constant_cells(split_cells(line, delimiter)) for _, line in preamble]
     constants += [header.parse_constant_comment(line) for _, line in comments]
     return TextHeader(tuple(headings), units, dict(filter(None, constants)), delimiter, above + count)
@@ -191,18 +191,3 @@ def _is_numeric(cells: list[str]) -> bool:
     filled = [cell for cell in cells if cell]
     numbers = sum(header.is_number(cell) or not any(map(str.isalpha, cell)) for cell in filled)
     return len(filled) > 1 and 2 * numbers > len(filled)
-
-
-def _find_headings(
-    origin: str, comments: NumberedLines, body: NumberedLines, delimiter: str, headerless: bool
-) -> tuple[list[str], int]:
-    """The headings, and the number of table lines that they occupy: 0 if they are in the last comment above."""
-    first, cells = body[0][0], split_cells(body[0][1], delimiter)
-    if header.are_headings(cells):
-        return cells, 1
-    above = [split_cells(line.lstrip("#% \t"), delimiter) for i, line in comments if i < first]
-    if above and len(above[-1]) == len(cells) and header.are_headings(above[-1]):
-        return above[-1], 0
-    if headerless:
-        return [str(i) for i in range(1, len(cells) + 1)], 0
-    raise header.missing_header_error(f"{origin}, line {first}")
