@@ -11,7 +11,7 @@ counts as constant.
 import dataclasses
 import itertools
 from collections import deque
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -69,11 +69,13 @@ def find_runs(recording: Recording, sensors: Mapping[str, Sensor] | None = None)
     points = find_static_points(recording)
     if points is not None:
         return _runs_of_points(recording, points)
-    bands = _constant_bands(recording, sensors or estimate_sensors(recording))
-    whole = _classify(recording, Interval(0, len(recording)), bands)
+    columns = _columns(recording)
+    bands = _constant_bands(recording, columns.values(), sensors or estimate_sensors(recording))
+    whole = _classify(recording, Interval(0, len(recording)), columns, bands)
     if whole.kind != FREE:
         return (whole,)
-    candidates = [runs for kind in _kinds_of(recording) if (runs := _runs_at_levels(recording, kind, bands))]
+    told = [kind for kind in columns if kind != ISOTONIC or ISOMETRIC in columns]
+    candidates = [runs for kind in told if (runs := _runs_at_levels(recording, kind, columns[kind], bands))]
     return max(candidates, key=lambda runs: sum(len(run.interval) for run in runs), default=(whole,))
 
 
@@ -91,37 +93,33 @@ def _runs_of_points(recording: Recording, points: StaticPoints) -> tuple[Run, ..
     return (Run(Interval(0, levels.size), FREE, None, None, ("pressure", points.moved)),)
 
 
-def _kinds_of(recording: Recording) -> tuple[RunKind, ...]:
-    """The kinds that the columns can tell: without a measured motion, a constant force is that of a slack muscle at a
-    held length as well as an isotonic one."""
-    return KINDS if moved_column(recording) is not None else tuple(kind for kind in KINDS if kind != ISOTONIC)
+def _columns(recording: Recording) -> dict[RunKind, str]:
+    """The measured column of each kind of run. Without a measured motion, a constant force does not tell the kind: it
+    is that of a slack muscle at a held length as well as an isotonic one."""
+    present = {kind: [name for name in kind.constant_columns if name in recording] for kind in KINDS}
+    return {kind: names[0] for kind, names in present.items() if names}
 
 
-def _column(recording: Recording, kind: RunKind) -> str | None:
-    return next((name for name in kind.constant_columns if name in recording), None)
-
-
-def _constant_bands(recording: Recording, sensors: Mapping[str, Sensor]) -> dict[str, float]:
+def _constant_bands(recording: Recording, columns: Iterable[str], sensors: Mapping[str, Sensor]) -> dict[str, float]:
     """The width of the band within which each measured quantity counts as constant [SI]."""
     bands = {}
-    for name in filter(None, (_column(recording, kind) for kind in KINDS)):
+    for name in columns:
         maximum = 1.0 if name == "contraction" else float(np.max(np.abs(recording[name])))
         least = maximum * (CONTRACTION_BAND if name in ("contraction", "length") else RELATIVE_BAND)
         bands[name] = max(least, 8.0 * sensors[name].std if name in sensors else 0.0)
     return bands
 
 
-def _classify(recording: Recording, interval: Interval, bands: dict[str, float]) -> Run:
+def _classify(recording: Recording, interval: Interval, names: dict[RunKind, str], bands: dict[str, float]) -> Run:
     """The run in an interval. Of several constant quantities, pressure takes precedence, then length, then force."""
-    names = {kind: name for kind in KINDS if (name := _column(recording, kind))}
-    constant = [
-        kind
-        for kind, name in names.items()
-        if spread(recording[name][interval.rows]) <= bands[name]
-        or (kind == ISOBARIC and _has_ripple(recording, interval, bands))
-    ]
+
+    def is_constant(kind: RunKind, name: str) -> bool:
+        level = spread(recording[name][interval.rows]) <= bands[name]
+        return level or (kind == ISOBARIC and _has_ripple(recording, interval, bands))
+
+    constant = [kind for kind, name in names.items() if is_constant(kind, name)]
     swept = tuple(name for kind, name in names.items() if kind not in constant)
-    isotonic_only = constant == [ISOTONIC] and ISOTONIC not in _kinds_of(recording)
+    isotonic_only = constant == [ISOTONIC] and ISOMETRIC not in names
     if not constant or (len(names) == 1 and swept) or (isotonic_only and swept):
         return Run(interval, FREE, None, None, swept)
     if not swept:
@@ -133,11 +131,8 @@ def _constant_run(recording: Recording, interval: Interval, kind: RunKind, name:
     return Run(interval, kind, name, float(np.median(recording[name][interval.rows])), swept)
 
 
-def _runs_at_levels(recording: Recording, kind: RunKind, bands: dict[str, float]) -> tuple[Run, ...]:
+def _runs_at_levels(recording: Recording, kind: RunKind, name: str, bands: dict[str, float]) -> tuple[Run, ...]:
     """The runs in which the quantity of one kind stays at a level while another quantity is swept."""
-    name = _column(recording, kind)
-    if name is None:
-        return ()
     runs = []
     intervals = list(level_intervals(recording[name], bands[name]))
     for interval in _join_ripple(recording, intervals, bands) if kind == ISOBARIC else intervals:
@@ -150,7 +145,7 @@ def _runs_at_levels(recording: Recording, kind: RunKind, bands: dict[str, float]
 
 def moved_column(recording: Recording) -> str | None:
     """The measured column of the motion: contraction, length, shortening or position; None without any."""
-    return _column(recording, ISOMETRIC)
+    return next((name for name in MOVED if name in recording), None)
 
 
 def _has_ripple(recording: Recording, interval: Interval, bands: dict[str, float]) -> bool:

@@ -167,21 +167,8 @@ def _shared(root: Node) -> set[Node]:
 
 def _long_sums(root: Node) -> set[Node]:
     """The sums inside an expression that have too many terms to stand inside a function or product."""
-    inner = {
-        each
-        for node in in_order(root)
-        if node.kind != expression.ADD
-        for each in node.arguments
-        if each.kind == expression.ADD
-    }
-    terms = {
-        each
-        for node in in_order(root)
-        if node.kind == expression.ADD
-        for each in node.arguments[1:]
-        if each.kind == expression.ADD
-    }
-    return {node for node in inner | terms if len(summands(node)) > MAX_INNER_TERMS}
+    inner = (each for node in in_order(root) for each in node.arguments[node.kind == expression.ADD :])
+    return {each for each in inner if each.kind == expression.ADD and len(summands(each)) > MAX_INNER_TERMS}
 
 
 def _labels(traced: _Traced, powers: Mapping[Node, tuple[int, ...]]) -> dict[Node, str]:
