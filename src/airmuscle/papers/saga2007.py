@@ -18,15 +18,7 @@ from .run import chapter_texts, titled
 from .saga2007_claims import ACCURACY_LIMIT, FIRST_PERCENT, HIGHER_PRESSURE, LITTLE_CHANGE, LOW_PRESSURE, ROWS
 from .saga2007_figures import plots
 from .saga2007_joint import LIMIT, feed_forward_table
-from .saga2007_muscle import (
-    DEFAULT,
-    INTERPRETATIONS,
-    LINES,
-    circular_meridian,
-    exact_mechanics,
-    exact_meridian,
-    with_rings,
-)
+from .saga2007_muscle import DEFAULT, INTERPRETATIONS, LINES, exact_meridian, with_rings
 from .saga2007_previous import previous_model_table
 
 CONTRACTIONS = np.array([0.001, 0.01, 0.05, 0.10, 0.20, 0.35])
@@ -85,7 +77,7 @@ def interpretation_table() -> Table:
 def exact_table() -> Table:
     """Return the pressures of the exact meridian and of the circular meridian with virtual work."""
     contraction = saga2007_pairs.CONTRACTIONS
-    models = {"exact meridian": exact_meridian, "circular meridian, virtual work": circular_meridian}
+    models = {"exact meridian": exact_meridian, "circular meridian, virtual work": values.circular_meridian}
     rows = [
         (f"{model}, line {name}", force, values.pressure_along(law(line), contraction, force))
         for name, line in LINES.items()
@@ -131,9 +123,9 @@ def virtual_work_table() -> Table:
     contraction, pressure, line = saga2007_pairs.CONTRACTIONS, values.PRESSURE, LINES["B"]
     forces = {
         values.interpretation_name(2, 1, "B"): DEFAULT.force(pressure, contraction),
-        "exact mechanics, line B": exact_mechanics(line).force(pressure, contraction),
+        "exact mechanics, line B": values.exact_mechanics(line).force(pressure, contraction),
         "parabola, virtual work": virtual_work(DEFAULT, pressure, contraction),
-        "circular meridian, virtual work": circular_meridian(line).force(pressure, contraction),
+        "circular meridian, virtual work": values.circular_meridian(line).force(pressure, contraction),
         "exact meridian": exact_meridian(line).shape_at_pressure(pressure, contraction).force,
     }
     columns = {f"{name} [N]": np.round(force, 2) for name, force in forces.items()}
