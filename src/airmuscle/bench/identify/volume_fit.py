@@ -7,14 +7,19 @@ ratio of volume and valve conductance: see `bench.identify.dynamic`.
 
 import dataclasses
 from collections.abc import Sequence
-from typing import NamedTuple
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core import Array, ColumnError, IdentificationError, ParameterError
+from ...core import Array, ColumnError, IdentificationError, ParameterError, cite, plotting
+from ...physics.muscle.characteristic import Characteristic, ValidityRange
+from ...physics.muscle.characteristic.energy_defect import EnergyDefect
 from ...physics.muscle.geometry import Braid, ChebyshevGeometry, Geometry
 from ...physics.pneumatics.gas import GAS_CONSTANT
 from ...recording import Recording
+from ...report.chapter import Chapter, NamedValue, Plot, Table, TableColumn
+from ...report.shown import parameter_table
 from .model_evidence import EQUIVALENT, aicc
 
 HELD = 0.005
@@ -27,6 +32,8 @@ MAX_DEGREE = 4
 """Maximum degree of a polynomial (chosen)."""
 RESOLUTION = 1e-6
 """Residual relative to the volume below which laws are not distinguished (chosen)."""
+LEVELS, VOLUMES = 3, 11
+"""Pressures at which the reciprocity is drawn, and contractions of the table of volumes (chosen)."""
 
 
 class VolumePoints(NamedTuple):
@@ -55,11 +62,6 @@ class VolumeFit:
         deviation: Array = np.sqrt(np.sum(design @ self.covariance * design, axis=1))
         return deviation
 
-    @property
-    def residuals(self) -> Array:
-        """Fitted minus measured volumes [m3], shape (N,)."""
-        return np.asarray(self.geometry.volume(self.points.contraction)) - self.points.volume
-
 
 def volume_points(recordings: Sequence[Recording], temperature: float = 293.15) -> VolumePoints:
     """The volumes of recordings with a column `volume`, or with `pressure` and `air_mass` or `mass_flow` of a fill.
@@ -67,31 +69,27 @@ def volume_points(recordings: Sequence[Recording], temperature: float = 293.15) 
     `temperature` [K] is that of the air before and after a fill, for which the muscle must come to rest. Raises
     ColumnError for a recording with neither, a contraction that was not held, or a fill without a rise of pressure.
     """
-    contractions, volumes, fills = [], [], 0
-    for recording in recordings:
-        if not len(recording):
-            raise ColumnError(f"{recording.origin}: the recording has no rows. Give one with measured values.")
-        if "volume" in recording.columns:
-            contractions.append(recording["contraction"])
-            volumes.append(recording["volume"])
-        else:
-            contractions.append(np.array([float(np.mean(_held_contraction(recording)))]))
-            volumes.append(np.array([_fill_volume(recording, temperature)]))
-            fills += 1
-    if not contractions:
+    if not recordings:
         raise IdentificationError("a volume fit needs at least one recording.")
+    contractions, volumes = zip(*(_measured(recording, temperature) for recording in recordings), strict=True)
+    fills = sum("volume" not in recording.columns for recording in recordings)
     return VolumePoints(np.concatenate(contractions), np.concatenate(volumes), fills)
 
 
-def _held_contraction(recording: Recording) -> Array:
+def _measured(recording: Recording, temperature: float) -> tuple[Array, Array]:
+    """Contractions and volumes [m3] of a water column, or the one contraction and volume of a fill."""
+    if not len(recording):
+        raise ColumnError(f"{recording.origin}: the recording has no rows. Give one with measured values.")
     contraction = recording["contraction"]
+    if "volume" in recording.columns:
+        return contraction, recording["volume"]
     if np.ptp(contraction) > HELD:
         raise ColumnError(
             f"{recording.origin}: the contraction varies by {100 * np.ptp(contraction):.2f} % during the fill; it "
             f"must be held within {100 * HELD:.1f} %. Hold the muscle, or measure the volume in a water column "
             "(a column 'volume')."
         )
-    return contraction
+    return np.array([float(np.mean(contraction))]), np.array([_fill_volume(recording, temperature)])
 
 
 def _fill_volume(recording: Recording, temperature: float) -> float:
@@ -135,26 +133,18 @@ def fit_volume(points: VolumePoints, resting_length: float) -> VolumeFit:
             f"a volume law needs four points at three contractions or more; there are {points.volume.size} at "
             f"{levels}. Fill the muscle at further lengths."
         )
-    candidates: list[Geometry | None] = [_braid(points, resting_length)]
     degrees = range(1, min(MAX_DEGREE, levels - 2, points.volume.size - 3) + 1)
-    candidates += [_polynomial(points, resting_length, degree) for degree in degrees]
-    laws = [law for law in candidates if law is not None]
-    criteria = {_name(law): _aicc(law, points) for law in laws}
-    best = min((law for law in laws if criteria[_name(law)] <= min(criteria.values()) + EQUIVALENT), key=_size)
+    polynomials = {f"polynomial of degree {n}": _polynomial(points, resting_length, n) for n in degrees}
+    braid = _braid(points, resting_length)
+    laws: dict[str, Geometry] = {"Braid": braid, **polynomials} if braid is not None else {**polynomials}
+    criteria = {name: _aicc(law, points) for name, law in laws.items()}
+    equivalent = [laws[name] for name, value in criteria.items() if value <= min(criteria.values()) + EQUIVALENT]
+    best = min(equivalent, key=lambda law: _design(law, points.contraction).shape[1])
     residuals = np.asarray(best.volume(points.contraction)) - points.volume
     design = _design(best, points.contraction)
     variance = float(residuals @ residuals) / max(points.volume.size - design.shape[1], 1)
     covariance = variance * np.linalg.pinv(design.T @ design)
     return VolumeFit(best, points, float(np.sqrt(np.mean(residuals**2))), criteria, covariance)
-
-
-def _name(law: Geometry) -> str:
-    return f"polynomial of degree {_size(law) - 1}" if isinstance(law, ChebyshevGeometry) else "Braid"
-
-
-def _size(law: Geometry) -> int:
-    """Number of coefficients."""
-    return len(law.coefficients) if isinstance(law, ChebyshevGeometry) else 2
 
 
 def _braid(points: VolumePoints, resting_length: float) -> Braid | None:
@@ -200,3 +190,108 @@ def _aicc(law: Geometry, points: VolumePoints) -> float:
     squares = float(np.sum((np.asarray(law.volume(points.contraction)) - points.volume) ** 2))
     floor = size * (RESOLUTION * float(np.abs(points.volume).max())) ** 2
     return aicc(max(squares, floor) / size, size, _design(law, points.contraction).shape[1])
+
+
+def volume_chapter(
+    fit: VolumeFit, title: str, law: Characteristic | None = None, validity_range: ValidityRange | None = None,
+    defect: EnergyDefect | None = None,
+) -> Chapter:  # fmt: skip
+    """Return the chapter of a volume fit; with a force law also dF/dp against -dV/dL and the Maxwell defect."""
+    plots = [
+        Plot("volume", "Measured volumes, and the law with two standard deviations.", partial(_volume_figure, fit))
+    ]
+    if law is not None and validity_range is not None:
+        caption = (
+            "Reciprocity: dF/dp of the force law (lines, at several pressures) and -dV/dL of the volume law (thick). "
+            "They are equal if force and volume derive from one potential."
+        )
+        plots.append(Plot("reciprocity", caption, partial(_reciprocity_figure, fit, law, validity_range)))
+    model = type(fit.geometry).__name__
+    return Chapter(
+        name="volume",
+        title=title,
+        summary=f"{volume_summary(fit)}.",
+        values=(
+            NamedValue("law", model, brief=False),
+            NamedValue("points", len(fit.points.contraction), brief=False),
+            NamedValue("fills", fit.points.fills, brief=False),
+            NamedValue("rms residual", fit.rmse, "m3", "cm3", brief=False),
+            NamedValue("maximum standard deviation", _largest_deviation(fit), "m3", "cm3", brief=False),
+            *([] if defect is None else defect_values(defect)),
+        ),
+        tables=(_volumes(fit), _compared(fit),
+                parameter_table(fit.geometry, "volume-parameters", f"Parameters of {model}")),
+        plots=tuple(plots),
+        references=tuple(cite(fit.geometry)),
+    )  # fmt: skip
+
+
+def defect_values(defect: EnergyDefect) -> list[NamedValue]:
+    """The Maxwell defect and its place; it is zero where force and volume derive from one potential."""
+    return [
+        NamedValue("Maxwell defect", defect.worst, defect.unit, remark=f"|dF/dp + dV/dL| {defect.place}"),
+        NamedValue("relative Maxwell defect", defect.relative, "1", "%", remark="of the maximum of -dV/dL"),
+    ]
+
+
+def volume_summary(fit: VolumeFit) -> str:
+    """The law with its residual and its standard deviation."""
+    return (
+        f"{type(fit.geometry).__name__}, rms residual {1e6 * fit.rmse:.4g} cm3, standard deviation of the volume at "
+        f"most {1e6 * _largest_deviation(fit):.4g} cm3"
+    )
+
+
+def _largest_deviation(fit: VolumeFit) -> float:
+    return float(fit.standard_deviation(fit.points.contraction).max())
+
+
+def _volumes(fit: VolumeFit) -> Table:
+    contraction = np.linspace(fit.points.contraction.min(), fit.points.contraction.max(), VOLUMES)
+    columns = {
+        "contraction": TableColumn(contraction, "1", "%"),
+        "volume": TableColumn(np.asarray(fit.geometry.volume(contraction)), "m3", "cm3"),
+        "standard deviation": TableColumn(fit.standard_deviation(contraction), "m3", "cm3", digits=2),
+    }
+    return Table("volume", "Volume of the muscle", columns, brief=(0, VOLUMES // 2, VOLUMES - 1))
+
+
+def _compared(fit: VolumeFit) -> Table:
+    ranked = sorted(fit.aicc.items(), key=lambda item: item[1])
+    columns = {
+        "law": [name for name, _ in ranked],
+        "AICc above the best": [value - ranked[0][1] for _, value in ranked],
+    }
+    return Table("volume-laws", "Volume laws", columns)
+
+
+def _volume_figure(fit: VolumeFit) -> Any:
+    figure, axes = plotting.new_figure()
+    contraction = np.linspace(fit.points.contraction.min(), fit.points.contraction.max(), 201)
+    volume, error = np.asarray(fit.geometry.volume(contraction)), 2 * fit.standard_deviation(contraction)
+    axes.plot(100 * contraction, 1e6 * volume, color=plotting.LINES[0], label=type(fit.geometry).__name__)
+    axes.fill_between(100 * contraction, 1e6 * (volume - error), 1e6 * (volume + error), color=plotting.LINES[0],
+                      alpha=0.25, linewidth=0)  # fmt: skip
+    axes.plot(100 * fit.points.contraction, 1e6 * fit.points.volume, ".", color=plotting.BLACK, label="measured")
+    axes.set(xlabel="contraction [%]", ylabel="volume [cm³]")
+    axes.legend()
+    return figure
+
+
+def _reciprocity_figure(fit: VolumeFit, law: Characteristic, validity_range: ValidityRange) -> Any:
+    figure, axes = plotting.new_figure()
+    low, high = validity_range.contraction
+    contraction = np.linspace(
+        max(low, float(fit.points.contraction.min())), min(high, float(fit.points.contraction.max())), 121
+    )
+    for i, pressure in enumerate(np.linspace(*validity_range.pressure, LEVELS + 2)[1:-1]):
+        pressures = np.full(contraction.size, pressure)
+        taut = np.asarray(law.force(pressures, contraction)) > 0
+        slope = np.where(taut, law.slopes(pressures, contraction).by_pressure, np.nan)
+        axes.plot(100 * contraction, 1e4 * slope, color=plotting.LINES[i + 1], label=f"dF/dp, {pressure / 1e3:.4g} kPa")
+    geometry = fit.geometry
+    area = np.asarray(geometry.volume_derivative(contraction)) / geometry.resting_length
+    axes.plot(100 * contraction, 1e4 * area, color=plotting.BLACK, linewidth=2, label="-dV/dL")
+    axes.set(xlabel="contraction [%]", ylabel="area [cm²]")
+    axes.legend()
+    return figure

@@ -4,8 +4,7 @@ import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
 
-from ...bench.identify.static_fit_chapter import volume_chapter, volume_summary
-from ...bench.identify.volume_fit import VolumeFit, fit_volume, volume_points
+from ...bench.identify.volume_fit import VolumeFit, fit_volume, volume_chapter, volume_points, volume_summary
 from ...core import ParameterError, PhysicsError, check_writable
 from ...files.library import Entry, list_files, load_law, part_toml, resting_lengths, to_toml
 from ...physics.muscle.characteristic import EnergyDefect, ValidityRange, maxwell_defect, validity_range_of
