@@ -92,8 +92,8 @@ def pulling(runs: Sequence[am.Recording]) -> list[am.Recording]:
 
 def slack_force(model: am.characteristic.ForceLaw, runs: Sequence[am.Recording]) -> float:
     """The greatest force [N] of a law at the slack rows."""
-    slack = [evaluated_rows(run, run["force"] <= 0) for run in runs]
-    return float(residuals_of_rows(model, slack, CEILING).max())
+    rows = evaluated_rows(runs)
+    return float(residuals_of_rows(model, rows.at(~rows.measured), CEILING).max())
 
 
 def validation_errors(

@@ -26,7 +26,7 @@ from airmuscle.bench import (
     write,
 )
 from airmuscle.bench.identify import blank_surface, levels_of
-from airmuscle.bench.identify.curve_plots import band_plot
+from airmuscle.bench.identify.static_fit_chapter import band_plot
 from airmuscle.files import load
 from airmuscle.physics import ContractileSurface, Sarosi2012, ValidityRange
 from airmuscle.recording import Recording

@@ -55,6 +55,7 @@ from .parameter_covariance import NORMAL_QUANTILE as NORMAL_QUANTILE
 from .parameter_covariance import Runs as Runs
 from .pooled_covariance import EffectRows as EffectRows
 from .pooled_covariance import estimate_pooled_covariance as estimate_pooled_covariance
+from .problem import LeastSquaresSolution as LeastSquaresSolution
 from .problem import fitted_quantity_of as fitted_quantity_of
 from .problem import make_problem as make_problem
 from .recursive_fit import NextPoint as NextPoint
@@ -64,7 +65,6 @@ from .result import Fit as Fit
 from .slack import Slackness as Slackness
 from .slack import SlackPull as SlackPull
 from .slack import slack_pull as slack_pull
-from .solver import LeastSquaresSolution as LeastSquaresSolution
 from .solver import solve_iteratively as solve_iteratively
 from .solver import solve_least_squares as solve_least_squares
 from .specimen_effects import predict_effects as predict_effects

@@ -17,7 +17,7 @@ from .fit_points import FitPoints
 from .group_refits import GroupRefits, KnownMinima, RowIndices
 from .problem import FitProblem
 from .result import Fit
-from .solver import LeastSquaresSolution, design_matrix, is_linear, solve_iteratively, solve_least_squares
+from .solver import design_matrix, is_linear, solve_iteratively, solve_least_squares
 from .weighting import LeastSquares
 
 MIN_GROUPS = 5
@@ -175,8 +175,7 @@ def _refit_iteratively(common: tuple[Fit, RowIndices, Array, Callable[[float], N
     for found in known_values[np.isfinite(known_values).all(axis=1)]:
         known.add(found)
     if isinstance(fit.loss, LeastSquares) and not is_linear(problem):
-        solution = LeastSquaresSolution(fit.values, problem.predict(fit.values), problem.jacobian(fit.values))
-        near = GroupRefits(problem, solution, group, count)
+        near = GroupRefits(problem, problem.solution(fit.values), group, count)
     for i, counts in enumerate(draws):
         if progress is not None:
             progress(0.1 * i / len(draws))

@@ -2,7 +2,7 @@
 this process or in several."""
 
 import dataclasses
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,10 +11,8 @@ from ...core import AirmuscleError, Array, tree
 from ...engine.distribution import DistributedCalls
 from ...engine.processes import Workers, process_pool
 from ...physics.muscle.characteristic import Characteristic, PooledLengthLaw
-from ...recording import Recording
 from .candidates import Candidate, ExcludedModel
 from .compared_points import ComparedPoints, cause_of, residuals_of_rows
-from .cross_validation import GroupSplit, label_folds
 from .fit_points import FitPoints
 from .model_evidence import aicc, effective_sample_size
 from .pooling import population_of
@@ -89,16 +87,10 @@ def count_parameters(fit: Fit) -> int:
 Score = RankedModel | ExcludedModel
 
 
-def points_of_splits(runs: Sequence[Recording], splits: Sequence[GroupSplit]) -> tuple[ComparedPoints, ...]:
-    """The compared points of each split, which share the rows. Raises IdentificationError for fewer than two groups."""
-    points = FitPoints.from_recordings(runs)
-    return tuple(ComparedPoints.from_recordings(runs, *label_folds(runs, split), points) for split in splits)
-
-
 def score_candidate(
-    candidate: Candidate, splits: Sequence[ComparedPoints], loss: Loss, limits: Sequence[float] = ()
+    candidate: Candidate, splits: Sequence[ComparedPoints], loss: Loss, limits: Sequence[float]
 ) -> tuple[Score, ...]:
-    """The scores of a candidate for each split; above `limits` [N] it is not cross-validated further."""
+    """The scores of a candidate for each split; without further folds above `limits` [N], if there are any."""
     try:
         own_loss = in_fitted_quantity(loss, candidate.law, splits[0].points)
         fit = fit_to_points(candidate.law, splits[0].points, loss=own_loss, fixed=candidate.fixed)
@@ -106,11 +98,10 @@ def score_candidate(
         residuals = residuals_of_rows(fit.model, splits[0].rows, splits[0].max_force)
     except AirmuscleError as error:
         return (ExcludedModel(candidate.name, error.message, cause_of(error)),) * len(splits)
-    bounds = limits or [np.inf] * len(splits)
-    limit = loss.limit(residuals[splits[0].measured])
+    limit = loss.limit(residuals[splits[0].rows.measured])
     return tuple(
         _cross_validate(candidate, points, own_loss, fit, residuals, notes, bound, limit)
-        for points, bound in zip(splits, bounds, strict=True)
+        for points, bound in zip(splits, limits or [np.inf] * len(splits), strict=True)
     )
 
 
@@ -123,7 +114,7 @@ def _cross_validate(
     rmse = points.rms(in_sample)
     if rmse > bound:
         return _excess_error(candidate.name, rmse, bound, "on the rows of the fit")
-    count = sum(points.rows_of_folds)
+    count = points.left_out_count
     try:
         for name, each, measured in points.left_out_residuals(candidate, fit, loss):
             left_out += [FoldScore.of(name, np.clip(each, -limit, limit), measured)] if each.size else []
@@ -136,10 +127,10 @@ def _cross_validate(
     return RankedModel(
         candidate, fit, rmse,
         cross_validated_rmse=float(np.sqrt(np.average([each.rmse**2 for each in left_out], weights=rows))),
-        aicc=aicc(rmse**2, int(np.count_nonzero(points.measured)), count_parameters(fit)),
+        aicc=aicc(rmse**2, int(np.count_nonzero(points.rows.measured)), count_parameters(fit)),
         fold_scores=tuple(left_out),
         slack=points.slack_pull(residuals, rmse),
-        effective_rows=effective_sample_size(in_sample[points.measured]),
+        effective_rows=effective_sample_size(in_sample[points.rows.measured]),
         notes=notes,
         limit=limit,
         limited_rows=int(np.count_nonzero(np.abs(residuals) > limit)),
@@ -166,8 +157,6 @@ def in_fitted_quantity(loss: Loss, law: Characteristic, points: FitPoints) -> Lo
 
 Progress = Callable[[str, float], None]
 Scores = list[tuple[Score, ...]]
-_Task = tuple[Candidate, Sequence[float]]
-"""A candidate with the errors [N] above which it is not cross-validated further."""
 
 
 def score_candidates(
@@ -188,8 +177,14 @@ def score_candidates(
                 _ = split.points.checks  # before they are sent
         distribution = DistributedCalls(pool, _score_tasks, (tuple(splits), loss))
         for indices in (early, late):
-            lowest = _lowest_errors(scores_of.values(), len(splits)) if indices is late else ()
-            groups = _of_one_population(candidates, indices)
+            lowest = [
+                min((each.cross_validated_rmse for each in scores if isinstance(each, RankedModel)), default=np.inf)
+                for scores in zip(*scores_of.values(), strict=True)
+            ]
+            of_population: dict[Any, list[int]] = {}  # whose fits are computed once
+            for i in indices:
+                of_population.setdefault(tree.structure(population_of(candidates[i].law)), []).append(i)
+            groups = list(of_population.values())
             if pool is not None:  # those that take longest first
                 groups.sort(key=lambda group: -sum(1 for i in group for _ in tree.leaves(candidates[i].law)))
             limits = {i: [max_excess(candidates[i]) * each for each in lowest] for i in indices}
@@ -219,20 +214,7 @@ def max_excess(candidate: Candidate) -> float:
     return float("inf") if names <= set(fields) else 1.0 + MAX_RECOMMENDED_EXCESS
 
 
-def _score_tasks(common: tuple[Sequence[ComparedPoints], Loss], tasks: Sequence[_Task]) -> Scores:
+def _score_tasks(
+    common: tuple[Sequence[ComparedPoints], Loss], tasks: Sequence[tuple[Candidate, Sequence[float]]]
+) -> Scores:
     return [score_candidate(candidate, *common, limits) for candidate, limits in tasks]
-
-
-def _of_one_population(candidates: Sequence[Candidate], indices: Sequence[int]) -> list[list[int]]:
-    """The indices of the candidates, those of laws with one population together: its fits are computed once."""
-    groups: dict[Any, list[int]] = {}
-    for i in indices:
-        groups.setdefault(tree.structure(population_of(candidates[i].law)), []).append(i)
-    return list(groups.values())
-
-
-def _lowest_errors(scores: Collection[tuple[Score, ...]], count: int) -> tuple[float, ...]:
-    """The lowest cross-validated error [N] for each split; infinite where no law is ranked."""
-    splits = ([score[i] for score in scores] for i in range(count))
-    ranked = ([each.cross_validated_rmse for each in split if isinstance(each, RankedModel)] for split in splits)
-    return tuple(min(errors, default=float("inf")) for errors in ranked)

@@ -176,7 +176,8 @@ def _fold_figure(comparison: Comparison) -> Any:
         error_of = {part.fold: part.rmse for part in contender.fold_scores}
         errors = [error_of[fold] for fold in folds]
         axes.plot(errors, MARKERS[i], color=LINES[i], linestyle=":", linewidth=0.8, label=contender.candidate.name)
-    common = _common_word(folds)
+    word = folds[0].partition(" ")[0] + " "  # that all names begin with, if they do
+    common = word if all(name.startswith(word) for name in folds) else ""
     own = [name[len(common) :] for name in folds]
     axes.set_xticks(range(len(own)), [n if len(n) <= 22 else f"...{n[-20:]}" for n in own], rotation=30, ha="right")
     axes.set(xlabel=common.strip(), ylabel=f"rms error, {comparison.leave_out.group_name} left out [N]", yscale="log")
@@ -187,12 +188,6 @@ def _fold_figure(comparison: Comparison) -> Any:
 def _natural_order(name: str) -> list[str | float]:
     """A key that sorts names by the numbers in them: contraction 3 % before contraction 12 %."""
     return [float(part) if i % 2 else part for i, part in enumerate(re.split(r"(\d+(?:\.\d+)?)", name))]
-
-
-def _common_word(names: Sequence[str]) -> str:
-    """The first word of the names with the blank behind it, if all have the same; otherwise an empty text."""
-    word = names[0].partition(" ")[0] + " "
-    return word if all(name.startswith(word) for name in names) else ""
 
 
 def residual_figure(fit: Fit) -> Any:

@@ -12,14 +12,14 @@ from ...core import AirmuscleError, Array, HintedText, IdentificationError, tree
 from ...physics.muscle.characteristic import Characteristic, PooledLengthLaw
 from ...recording import Recording
 from .candidates import Candidate, evaluate_force, slack_rows
-from .cross_validation import Labels, specimen_name
+from .cross_validation import GroupSplit, label_folds, specimen_name
 from .fit_points import FitPoints
-from .group_refits import GroupRefits
+from .group_refits import GroupRefits, RowIndices
 from .pooling import Pooling, make_pooling
-from .problem import FitProblem, with_length
+from .problem import POINT_COLUMNS, RESTING_LENGTH, FitProblem, LeastSquaresSolution, with_length
 from .result import Fit
 from .slack import SlackPull, pull_limit, slack_pull, with_slack_bounds
-from .solver import LeastSquaresSolution, design_matrix, is_linear
+from .solver import design_matrix, is_linear
 from .static_fit import refit
 from .weighting import LeastSquares, Loss
 
@@ -28,30 +28,37 @@ FORCE_MARGIN = 3.0
 
 
 class EvaluatedRows(NamedTuple):
-    """The complete rows of a recording [SI], and its resting length [m] if it is known; a force of 0 or less is that of
-    a slack muscle."""
+    """N complete rows of recordings [SI], in which the errors of laws in force are evaluated; a force of 0 or less is
+    that of a slack muscle."""
 
     pressure: Array
     contraction: Array
     force: Array
-    resting_length: float | None
-    specimen: str = ""
+    run: RowIndices
+    """Index of the recording of each row."""
+    muscles: tuple[tuple[float | None, str], ...]
+    """Resting length [m] of each recording, if it is known, and specimen."""
 
     @property
     def measured(self) -> npt.NDArray[np.bool_]:
         """Mask of the rows with a positive force."""
         return np.asarray(self.force > 0)
 
+    def at(self, rows: npt.NDArray[np.bool_]) -> "EvaluatedRows":
+        """The rows of a mask (N,)."""
+        return EvaluatedRows(
+            self.pressure[rows], self.contraction[rows], self.force[rows], self.run[rows], self.muscles
+        )
 
-def evaluated_rows(run: Recording, rows: npt.NDArray[np.bool_] | None = None) -> EvaluatedRows:
-    """The rows of a recording, or those of a mask, in which the errors of laws in force are evaluated."""
-    pressure, contraction, force = (run[name] for name in ("pressure", "contraction", "force"))
-    mask = np.isfinite(pressure + contraction + force)
-    if rows is not None:
-        mask &= rows
-    length = run.constants.get("resting_length")
-    return EvaluatedRows(pressure[mask], contraction[mask], force[mask], None if length is None else float(length),
-                         specimen_name(run))  # fmt: skip
+
+def evaluated_rows(runs: Sequence[Recording]) -> EvaluatedRows:
+    """The complete rows of recordings."""
+    pressure, contraction, force = (np.concatenate([run[name] for run in runs]) for name in POINT_COLUMNS)
+    index = np.repeat(np.arange(len(runs)), [len(run) for run in runs])
+    stated = [run.constants.get(RESTING_LENGTH) for run in runs]
+    lengths = [None if length is None else float(length) for length in stated]
+    muscles = tuple(zip(lengths, map(specimen_name, runs), strict=True))
+    return EvaluatedRows(pressure, contraction, force, index, muscles).at(np.isfinite(pressure + contraction + force))
 
 
 def law_of_length(law: Characteristic, length: float | None, specimen: str = "") -> Any:
@@ -66,23 +73,24 @@ def force_residuals(model: Characteristic, runs: Sequence[Recording], max_force:
 
     `max_force` [N] limits the force of laws that give contraction or pressure.
     """
-    return residuals_of_rows(model, [evaluated_rows(run, run["force"] > 0) for run in runs], max_force)
+    rows = evaluated_rows(runs)
+    return residuals_of_rows(model, rows.at(rows.measured), max_force)
 
 
-def residuals_of_rows(model: Characteristic, parts: Sequence[EvaluatedRows], max_force: float) -> Array:
+def residuals_of_rows(model: Characteristic, rows: EvaluatedRows, max_force: float) -> Array:
     """Residuals (model - measured) in force [N] at these rows, at a slack row the force of the law, which should be 0;
     one evaluation of the law for each resting length, of a pooled law for each specimen."""
-    residuals: list[Array] = [np.zeros(0)] * len(parts)
-    by_specimen = isinstance(model, PooledLengthLaw)
-    muscles = [(part.resting_length, part.specimen if by_specimen else "") for part in parts]
-    for muscle in dict.fromkeys(muscles):
-        same = [i for i, each in enumerate(muscles) if each == muscle]
-        pressure, contraction = (np.concatenate([parts[i][column] for i in same]) for column in (0, 1))
-        forces = evaluate_force(law_of_length(model, *muscle), pressure, contraction, max_force)
-        ends = np.cumsum([parts[i].force.size for i in same])[:-1]
-        for i, modelled in zip(same, np.split(forces, ends), strict=True):
-            residuals[i] = modelled - np.maximum(parts[i].force, 0.0)
-    return np.concatenate(residuals)
+    by_specimen, residuals = isinstance(model, PooledLengthLaw), np.zeros(rows.force.size)
+    muscles = [(length, specimen if by_specimen else "") for length, specimen in rows.muscles]
+    distinct = list(dict.fromkeys(muscles))
+    member = np.array([distinct.index(muscle) for muscle in muscles])[rows.run]
+    for i in np.unique(member):
+        own = member == i
+        forces = evaluate_force(
+            law_of_length(model, *distinct[i]), rows.pressure[own], rows.contraction[own], max_force
+        )
+        residuals[own] = forces - np.maximum(rows.force[own], 0.0)
+    return residuals
 
 
 def cause_of(error: AirmuscleError) -> str:
@@ -90,95 +98,74 @@ def cause_of(error: AirmuscleError) -> str:
     return getattr(error, "cause", "") or "the fit fails"
 
 
-class LeftOutGroup(NamedTuple):
-    """A group of rows that is left out: its name, and the mask of its rows in each recording."""
-
-    name: str
-    masks: list[npt.NDArray[np.bool_]]
-
-
 @dataclasses.dataclass(frozen=True, eq=False)
 class ComparedPoints:
     """All recordings and the folds. Sensors, runs and branches are estimated once for all candidates."""
 
     recordings: Sequence[Recording]
-    labels: Sequence[Labels]
-    folds: tuple[LeftOutGroup, ...]
+    folds: Sequence[str]
+    """Names of the groups that are left out in turn."""
+    fold_of_rows: RowIndices
+    """Index of the fold of each row; one more than the last for rows that are never left out."""
     points: FitPoints
     """The rows of all recordings."""
 
     @classmethod
-    def from_recordings(
-        cls, runs: Sequence[Recording], labels: Sequence[Labels], names: Sequence[str], points: FitPoints | None = None
-    ) -> "ComparedPoints":
-        """The points divided into the folds of these names; `points` are those of the recordings, if they exist."""
-        folds = tuple(LeftOutGroup(name, [label == name for label in labels]) for name in names)
-        return cls(runs, labels, folds, points or FitPoints.from_recordings(runs))
+    def of(cls, runs: Sequence[Recording], split: GroupSplit, points: FitPoints | None = None) -> "ComparedPoints":
+        """The points divided into the groups of a split; `points` are those of the recordings, if they exist.
+
+        Raises IdentificationError for fewer than two groups.
+        """
+        labels, names = label_folds(runs, split)
+        joined = np.concatenate(labels)
+        fold_of_rows = np.full(joined.size, len(names))
+        for i, name in enumerate(names):
+            fold_of_rows[joined == name] = i
+        return cls(runs, names, fold_of_rows, points or FitPoints.from_recordings(runs))
 
     @functools.cached_property
     def max_force(self) -> float:
         """Limit of the force [N] of laws that give contraction or pressure."""
-        return FORCE_MARGIN * max(float(np.nanmax(run["force"])) for run in self.recordings)
+        return FORCE_MARGIN * float(np.nanmax(self.points.joined["force"]))
 
     @functools.cached_property
-    def rows(self) -> list[EvaluatedRows]:
-        """The evaluated rows of each recording."""
-        return [evaluated_rows(run) for run in self.recordings]
+    def rows(self) -> EvaluatedRows:
+        """The evaluated rows of all recordings."""
+        return evaluated_rows(self.recordings)
 
     @functools.cached_property
-    def _left_out_rows(self) -> list[list[EvaluatedRows]]:
-        return [
-            [evaluated_rows(run, mask) for run, mask in zip(self.recordings, fold.masks, strict=True) if mask.any()]
-            for fold in self.folds
-        ]
+    def _left_out_rows(self) -> list[EvaluatedRows]:
+        columns = (self.points.joined[name] for name in POINT_COLUMNS)
+        fold = self.fold_of_rows[np.isfinite(np.stack([*columns])).all(axis=0)]
+        return [self.rows.at(fold == i) for i in range(len(self.folds))]
 
     @functools.cached_property
-    def rows_of_folds(self) -> list[int]:
-        """The number of rows that count in each fold, as in `FoldScore`."""
-        counts = [[(int(np.count_nonzero(p.measured)), p.force.size) for p in parts] for parts in self._left_out_rows]
-        return [sum(n for n, _ in fold) or sum(n for _, n in fold) for fold in counts]
-
-    @functools.cached_property
-    def _group(self) -> npt.NDArray[np.intp]:
-        """The index of the fold of each complete row; one more than the last for rows that are never left out."""
-        group = np.full(len(self.points.joined), len(self.folds))
-        for i, fold in enumerate(self.folds):
-            group[np.concatenate(fold.masks)] = i
-        return group[~self.points.missing]
-
-    @functools.cached_property
-    def measured(self) -> npt.NDArray[np.bool_]:
-        """Mask of the evaluated rows with a positive force."""
-        return np.concatenate([part.measured for part in self.rows])
-
-    @functools.cached_property
-    def joined_rows(self) -> dict[str, npt.NDArray[Any]]:
-        """Pressure, contraction, force and specimen of the evaluated rows."""
-        columns = {n: np.concatenate([getattr(r, n) for r in self.rows]) for n in ("pressure", "contraction", "force")}
-        return {**columns, "specimen": np.repeat([r.specimen for r in self.rows], [r.force.size for r in self.rows])}
+    def left_out_count(self) -> int:
+        """The number of rows that count in all folds, as in `FoldScore`."""
+        return sum(int(np.count_nonzero(rows.measured)) or rows.force.size for rows in self._left_out_rows)
 
     def rms(self, residuals: Array) -> float:
         """Root mean square [N] of the residuals of the evaluated rows (N,); those of slack rows are added to the rows
         with a positive force."""
-        return float(np.sqrt(residuals @ residuals / max(int(np.count_nonzero(self.measured)), 1)))
+        return float(np.sqrt(residuals @ residuals / max(int(np.count_nonzero(self.rows.measured)), 1)))
 
     def slack_pull(self, residuals: Array, rmse: float) -> SlackPull:
         """The force at the slack rows of a law with these residuals of the evaluated rows (N,) and this error [N]."""
-        rows = self.joined_rows
-        limit = pull_limit(rmse, float(np.max(rows["force"], initial=0.0)))
-        modelled = residuals + np.maximum(rows["force"], 0.0)
-        return slack_pull(rows["pressure"], rows["contraction"], rows["force"], modelled, limit, rows["specimen"])
+        rows = self.rows
+        limit = pull_limit(rmse, float(np.max(rows.force, initial=0.0)))
+        modelled = residuals + np.maximum(rows.force, 0.0)
+        specimen = np.array([name for _, name in rows.muscles])[rows.run]
+        return slack_pull(rows.pressure, rows.contraction, rows.force, modelled, limit, specimen)
 
     def slack_notes(self, model: Characteristic) -> tuple[str, ...]:
         """A remark where the law is slack at points with a positive force.
 
         Raises IdentificationError where it gives no force although it is not slack.
         """
-        masks = [
-            slack_rows(law_of_length(model, r.resting_length), r.pressure[r.measured], r.contraction[r.measured])
-            for r in self.rows
-        ]
-        slack, count = sum(int(np.count_nonzero(mask)) for mask in masks), sum(mask.size for mask in masks)
+        rows, slack, count = self.rows, 0, int(np.count_nonzero(self.rows.measured))
+        for i, (length, _) in enumerate(rows.muscles):
+            own = rows.at(self.rows.measured & (rows.run == i))
+            slack += int(np.count_nonzero(slack_rows(law_of_length(model, length), own.pressure, own.contraction)))
         text = (
             f"it is slack at {slack} of {count} points with a positive force and is ranked with zero force there; its "
             "method force raises SolveError at these points."
@@ -193,41 +180,40 @@ class ComparedPoints:
         """
         law, refits = candidate.law, self._refits_of(fit) if isinstance(loss, LeastSquares) else None
         pooling = make_pooling(law, self.points, fit.problem) if isinstance(law, PooledLengthLaw) else None
-        for i, (fold, rows) in enumerate(zip(self.folds, self._left_out_rows, strict=True)):
+        for i, (name, rows) in enumerate(zip(self.folds, self._left_out_rows, strict=True)):
             model = None if refits is None else refits.law_without(i, pooling)
             if model is None:
-                model = self._refit_exactly(candidate, fit, fold, loss)
-            count = sum(int(np.count_nonzero(part.measured)) for part in rows)
-            yield fold.name, residuals_of_rows(model, rows, self.max_force), count
+                model = self._refit_exactly(candidate, fit, i, loss)
+            yield name, residuals_of_rows(model, rows, self.max_force), int(np.count_nonzero(rows.measured))
 
     def _refits_of(self, fit: Fit) -> "_FoldRefits":
         """The refits of a population law without each fold; kept for the next law of the same population."""
         if not self._kept_refits or self._kept_refits[0].problem is not fit.problem:
-            self._kept_refits[:] = [_FoldRefits(fit, self._group, len(self.folds), self.points)]
+            group = self.fold_of_rows[~self.points.missing]
+            self._kept_refits[:] = [_FoldRefits(fit, group, len(self.folds), self.points)]
         return self._kept_refits[0]
 
     @functools.cached_property
     def _kept_refits(self) -> "list[_FoldRefits]":
         return []
 
-    def _refit_exactly(self, candidate: Candidate, fit: Fit, fold: LeftOutGroup, loss: Loss) -> Characteristic:
+    def _refit_exactly(self, candidate: Candidate, fit: Fit, fold: int, loss: Loss) -> Characteristic:
         """The refit by a search of its own."""
-        training = [
-            run if not mask.any() else run.rows(~mask) for run, mask in zip(self.recordings, fold.masks, strict=True)
-        ]
+        ends = np.cumsum([len(run) for run in self.recordings])[:-1]
+        parts = zip(self.recordings, np.split(self.fold_of_rows != fold, ends), strict=True)
         try:
-            points = FitPoints.from_recordings([run for run in training if len(run)])
-            return refit(fit.model, points, loss=loss, fixed=candidate.fixed)
+            others = [run if kept.all() else run.rows(kept) for run, kept in parts if kept.any()]
+            return refit(fit.model, FitPoints.from_recordings(others), loss=loss, fixed=candidate.fixed)
         except AirmuscleError as error:
-            cause = f"without {fold.name}, {cause_of(error)}"
-            message = HintedText(f"Not determined without {fold.name}: ", error.message)
-            raise IdentificationError(message, cause=cause) from None
+            without = f"without {self.folds[fold]}"
+            message = HintedText(f"Not determined {without}: ", error.message)
+            raise IdentificationError(message, cause=f"{without}, {cause_of(error)}") from None
 
 
 class _FoldRefits:
     """The laws fitted to all groups but one, from the fit to all rows; of pooled laws the population."""
 
-    def __init__(self, fit: Fit, group: npt.NDArray[np.intp], count: int, points: FitPoints) -> None:
+    def __init__(self, fit: Fit, group: RowIndices, count: int, points: FitPoints) -> None:
         self.problem, self._group = fit.problem, group
         if points.kept.get("problem") is not fit.problem:  # not yet for another split
             bounded = with_slack_bounds(fit.problem, points)
@@ -254,6 +240,6 @@ class _FoldRefits:
 def _solution(problem: FitProblem, values: Array) -> LeastSquaresSolution:
     """The solution with these parameters (P,), with its Jacobian."""
     if not is_linear(problem):
-        return LeastSquaresSolution(values, problem.predict(values), problem.jacobian(values))
+        return problem.solution(values)
     matrix, constant = design_matrix(problem)
     return LeastSquaresSolution(values, matrix @ values + constant, matrix)

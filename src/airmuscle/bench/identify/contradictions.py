@@ -1,5 +1,6 @@
-"""Contradictions: runs of one specimen whose forces differ at equal pressure, contraction and direction of motion; rows
-that occur in two recordings, as where files overlap, which are one measurement."""
+"""Contradictions: runs of one specimen whose forces differ at equal pressure, contraction and direction of motion, also
+in two groups as of two muscles in one file; rows in two recordings, as where files overlap, which are one measurement.
+"""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -7,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import AMBIENT_PRESSURE, Array, Hint, HintedText
+from ...core import AMBIENT_PRESSURE, Array, Hint, HintedText, listed
 from ...recording import Recording
 from ..checks.bench_rows import file_list
 from ..segment.interval import true_intervals
@@ -23,11 +24,10 @@ _FACTORS = (1.0, 1.2345678912345e6, 1.3247179572447e3)
 
 
 class RepeatedRows(NamedTuple):
-    """Successive rows of a recording that another one has already, by the indices of the recordings."""
+    """Successive rows of a recording, by its index, that another one has already."""
 
     recording: int
     rows: slice
-    of: int
     origins: tuple[str, str]
 
     def __str__(self) -> str:
@@ -42,12 +42,11 @@ def find_repeated_rows(recordings: Sequence[Recording], columns: Sequence[str]) 
     """
     if len(recordings) < 2:
         return ()
-    keys = [_keys(run, columns) for run in recordings]
     found = []
-    for here, there, offset in _candidates(keys):
+    for here, there, offset in _candidates([_keys(run, columns) for run in recordings]):
         one, other = recordings[here], recordings[there]
         stretches = _equal_stretches(one, other, offset, columns)
-        found += [RepeatedRows(here, rows, there, (one.origin, other.origin)) for rows in stretches]
+        found += [RepeatedRows(here, rows, (one.origin, other.origin)) for rows in stretches]
     return tuple(found)
 
 
@@ -173,12 +172,91 @@ def _cause(contradicting: Sequence[MatchedRuns], matches: Matches) -> list[str |
 def _separating_column(contradicting: Sequence[MatchedRuns], matches: Matches) -> str | None:
     """The column whose values differ in all contradicting pairs and in no other; None without one."""
     chosen = {id(each) for each in contradicting}
-    for name, _ in contradicting[0].first.labels:
-        differs = {id(each) for each in matches.runs if _label(each.first, name) != _label(each.second, name)}
+    for name in contradicting[0].first.labels:
+        differs = {id(each) for each in matches.runs if each.first.labels.get(name) != each.second.labels.get(name)}
         if chosen <= differs and len(differs - chosen) <= 0.5 * len(differs):
             return name
     return None
 
 
-def _label(block: Block, name: str) -> float | None:
-    return dict(block.labels).get(name)
+MIN_GROUPED, MIN_GAP = 4, 3.0
+"""Minimum number of runs that are divided; gap of the groups in standard deviations of the runs of a group (chosen)."""
+MAX_PLACES = 80
+"""Characters of the recordings of a group that are named (chosen)."""
+
+
+class TwoGroups(NamedTuple):
+    """Blocks of two levels of force, the lower one first, their relative difference, and the scatter within."""
+
+    sides: tuple[list[Block], list[Block]]
+    difference: float
+    scatter: float
+
+
+def two_muscle_notes(matches: Matches) -> list[str]:
+    """The remark that the runs fall into two groups, as those of two muscles do; empty if they do not.
+
+    A drift has no gap between two levels. Hysteresis, and friction that grows with the speed, raise the force of one
+    direction of the motion and lower that of the other, so that both directions must give the same groups; static
+    points must differ by more than hysteresis.
+    """
+    runs = [each for each in matches.runs if not each.is_unordered]
+    is_static = all(each.first.direction == 0 for each in runs)
+    ways, least = ((0,), MAX_HYSTERESIS) if is_static else ((1, -1), MIN_DIFFERENCE)
+    groups = [_two_groups([each for each in runs if each.first.direction == way], least) for way in ways]
+    found = [each for each in groups if each is not None]
+    if len(found) < len(ways) or not all(_agree(found[0], each) for each in found[1:]):
+        return []
+    text = (
+        f"The runs fall into two groups: their forces differ by {100 * min(g.difference for g in found):.2g} % at "
+        f"equal pressure and contraction, and agree to {100 * max(g.scatter for g in found):.2g} % within a group "
+        f"({'; '.join(_places([b for g in found for b in g.sides[i]]) for i in (0, 1))}). Are they two muscles, or has "
+        "the muscle or a zero changed between them? "
+    )
+    purpose = "To fit each muscle by itself, write its name in a column, and"
+    return [HintedText(text, Hint(purpose, "columns", {"muscle": "specimen"}, "ColumnMapping"))]
+
+
+def _two_groups(runs: Sequence[MatchedRuns], least: float) -> TwoGroups | None:
+    """The two levels of force of runs; None unless a gap wider than `least` and three times the scatter divides them.
+
+    The levels, of mean zero where matched rows connect them, solve the relative differences by least squares.
+    """
+    blocks = list({id(b): b for each in runs for b in (each.first, each.second)}.values())
+    if len(blocks) < MIN_GROUPED:
+        return None
+    number = {id(block): i for i, block in enumerate(blocks)}
+    matrix, ratios = np.zeros((len(runs), len(blocks))), np.zeros(len(runs))
+    for i, each in enumerate(runs):
+        ratios[i] = 2.0 * np.median(each.differences / sum(each.forces))
+        matrix[i, [number[id(each.first)], number[id(each.second)]]] = 1.0, -1.0
+    levels = np.linalg.lstsq(matrix, ratios, rcond=1e-10)[0]
+    order = np.argsort(levels)
+    gaps = np.diff(levels[order])
+    low, high = np.split(order, [int(np.argmax(gaps)) + 1])
+    means = float(levels[low].mean()), float(levels[high].mean())
+    scatter = float(np.sqrt(np.mean(np.r_[levels[low] - means[0], levels[high] - means[1]] ** 2)))
+    if min(low.size, high.size) < 2 or gaps.max() < max(least, MIN_GAP * scatter):
+        return None
+    return TwoGroups(([blocks[i] for i in low], [blocks[i] for i in high]), means[1] - means[0], scatter)
+
+
+def _agree(first: TwoGroups, second: TwoGroups) -> bool:
+    """Whether the higher group is the later one, or the only one, of the same recordings in both directions."""
+    orders = []
+    for groups in (first, second):
+        rows: dict[int, tuple[list[float], list[float]]] = {}
+        for higher, side in enumerate(groups.sides):
+            for block in side:
+                rows.setdefault(id(block.recording), ([-1.0], [-1.0]))[higher].append(float(np.mean(block.rows)))
+        orders.append({key: max(high) > max(low) for key, (low, high) in rows.items()})
+    common = orders[0].keys() & orders[1].keys()
+    return bool(common) and sum(orders[0][key] == orders[1][key] for key in common) >= 0.8 * len(common)
+
+
+def _places(blocks: Sequence[Block]) -> str:
+    """The recordings of blocks, with the range of their rows."""
+    rows: dict[str, list[int]] = {}
+    for block in blocks:
+        rows.setdefault(block.recording.origin, []).extend((int(block.rows[0]) + 1, int(block.rows[-1]) + 1))
+    return listed([f"{name} rows {min(ends)} to {max(ends)}" for name, ends in rows.items()], MAX_PLACES)

@@ -17,9 +17,8 @@ from ..checks.bench_rows import file_list
 from ..checks.contractions import without_missing_codes
 from ..segment import estimate_noise, estimate_sensors, find_outliers, remembered
 from .branch_residuals import SensorDelay, delay_notes, find_delay
-from .contradictions import contradiction_notes, repeatability
+from .contradictions import contradiction_notes, repeatability, two_muscle_notes
 from .matched_rows import match_rows
-from .two_groups import two_muscle_notes
 from .weighting import Huber
 
 MAX_MISFIT = 3.0
@@ -74,10 +73,16 @@ class Scatter:
 
 @dataclasses.dataclass(frozen=True)
 class Remarks:
-    """Notes on a fit and its data, as sentences, and the scatter of the data."""
+    """What recordings show, without a law or with a fit to them.
+
+    notes    remarks, as sentences; what contradicts a static characteristic with files and remedy
+    scatter  noise of the force sensor and repeatability of the force
+    delay    delay of the force after the pressure; None without one
+    """
 
     notes: tuple[str, ...]
-    scatter: Scatter | None
+    scatter: Scatter
+    delay: SensorDelay | None
 
 
 MIN_DISTANCE = 0.02
@@ -98,7 +103,7 @@ def outlier_notes(recordings: Sequence[Recording]) -> list[str]:
     if not timed:
         return []
     sensors = estimate_sensors(timed)
-    greatest = float(np.nanquantile(np.concatenate([run["force"] for run in timed]), 0.99))
+    greatest = _greatest_force(timed)
     found = [
         (run, outlier)
         for run in timed
@@ -130,7 +135,7 @@ def saturation_notes(recordings: Sequence[Recording]) -> list[str]:
     if not runs:
         return []
     limit = estimate_sensors([Recording({"pressure": run["pressure"]}, run.origin) for run in runs])["pressure"]
-    least = MIN_DISTANCE * float(np.nanquantile(np.concatenate([run["force"] for run in runs]), 0.99))
+    least = MIN_DISTANCE * _greatest_force(runs)
     at_limit = {run.origin: run.rows(run["pressure"] >= limit.upper_limit - 0.25 * limit.resolution) for run in runs}
     held = {name: run for name, run in at_limit.items() if len(run) and np.ptp(run["contraction"]) < HELD}
     found = {name: len(run) for name, run in held.items() if np.ptp(run["force"]) > least}
@@ -142,22 +147,12 @@ def saturation_notes(recordings: Sequence[Recording]) -> list[str]:
     return [text] if found else []
 
 
-@dataclasses.dataclass(frozen=True)
-class DataChecks:
-    """What the recordings of a bench show without a law.
-
-    notes    what contradicts a static characteristic, as sentences with files and remedy
-    scatter  noise of the force sensor and repeatability of the force
-    delay    delay of the force after the pressure; None without one
-    """
-
-    notes: tuple[str, ...]
-    scatter: Scatter
-    delay: SensorDelay | None
+def _greatest_force(recordings: Sequence[Recording]) -> float:
+    return float(np.nanquantile(np.concatenate([run["force"] for run in recordings]), 0.99))
 
 
 @remembered
-def check_data(recordings: Sequence[Recording]) -> DataChecks:
+def check_data(recordings: Sequence[Recording]) -> Remarks:
     """The checks of recordings, without the rows in which a code stands for a missing value."""
     measured = without_missing_codes([recording for recording in recordings if len(recording)])
     matches, delay = match_rows(measured), find_delay(measured)
@@ -165,4 +160,4 @@ def check_data(recordings: Sequence[Recording]) -> DataChecks:
     if not any(" tells the contradicting rows apart" in note for note in contradictions):
         contradictions += two_muscle_notes(match_rows(measured, by_branch=True))
     found = (*contradictions, *outlier_notes(measured), *saturation_notes(measured), *delay_notes(delay))
-    return DataChecks((*find_suspicious(recordings), *found), Scatter.of(measured, repeatability(matches)), delay)
+    return Remarks((*find_suspicious(recordings), *found), Scatter.of(measured, repeatability(matches)), delay)

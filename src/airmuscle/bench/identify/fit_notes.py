@@ -1,7 +1,7 @@
 """Notes of a static fit: rows, weights, bounds, losses and misfit that affect its interpretation, as sentences."""
 
 import dataclasses
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -9,11 +9,10 @@ from ...core import Array, Hint, HintedText
 from ...recording.columns import displayed
 from ..segment.runs import RIPPLE_BAND
 from .branch_residuals import branch_distance, branch_notes
-from .data_checks import HELD, Remarks, Scatter
+from .data_checks import HELD, Remarks
 from .fit_points import FitPoints
-from .problem import FORCE, FitProblem
+from .problem import FORCE, RESTING_LENGTH, FitProblem, LeastSquaresSolution
 from .result import Fit
-from .solver import LeastSquaresSolution
 from .specimen_effects import SpecimenEffects
 from .statistics import FitStatistics
 from .weighting import UNCENSORED, Censoring, LeastSquares, Loss, default_censoring
@@ -24,30 +23,27 @@ ILL_CONDITIONED = 1e5
 """Condition number of the scaled design matrix above which a note is added (chosen): half of the digits are lost."""
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Examination:
-    """The examination of the data of a fit, called with the fit; `own` are the notes that need no examination.
+def examine(points: FitPoints, problem: FitProblem, modelled: Array, own: Sequence[str], fit: Fit) -> Remarks:
+    """The remarks on a fit and its points; `own` are notes on the fit that need no examination of the data.
 
     The branches that the residuals follow are those of `problem` with the quantity `modelled` at its rows; of a pooled
     law they are those of its population.
     """
-
-    points: FitPoints
-    problem: FitProblem
-    modelled: Array
-    own: tuple[str, ...]
-
-    def __call__(self, fit: Fit) -> Remarks:
-        points, checks, quantity = self.points, self.points.checks, self.problem.fitted_quantity
-        residuals = np.full(len(points.joined), np.nan)
-        differences = self.modelled - self.problem.data[quantity.name]
-        residuals[~points.missing] = np.where(self.problem.censoring == 0, differences, np.nan)
-        ends = np.cumsum([len(run) for run in points.recordings])
-        distance = branch_distance(points.recordings, np.split(residuals, ends[:-1]), quantity.name)
-        scatter = dataclasses.replace(checks.scatter, branches=distance) if quantity == FORCE else None
-        branches = branch_notes(points.recordings, distance, quantity.name, delayed=checks.delay is not None)
-        notes = (*checks.notes, *map(str, points.repeated), *self.own, *branches, *_level_notes(fit.data_ranges))
-        return Remarks((*notes, *_effect_notes(fit.effects), *_misfit_notes(fit, scatter, points)), scatter)
+    checks, quantity = points.checks, problem.fitted_quantity
+    residuals = np.full(len(points.joined), np.nan)
+    differences = modelled - problem.data[quantity.name]
+    residuals[~points.missing] = np.where(problem.censoring == 0, differences, np.nan)
+    ends = np.cumsum([len(run) for run in points.recordings])
+    distance = branch_distance(points.recordings, np.split(residuals, ends[:-1]), quantity.name)
+    scatter = dataclasses.replace(checks.scatter, branches=distance)
+    branches = branch_notes(points.recordings, distance, quantity.name, delayed=checks.delay is not None)
+    notes = (*checks.notes, *map(str, points.repeated), *own, *branches, *_level_notes(fit.data_ranges))
+    notes += _effect_notes(fit.effects)
+    if quantity == FORCE:
+        lengths = {run.constants.get(RESTING_LENGTH) for run in points.recordings} - {None}
+        count = 1 if hasattr(fit.model, "with_resting_length") else len(lengths)
+        notes += tuple(scatter.misfit_notes(fit.rmse, fit.data_ranges["force"][1], count))
+    return dataclasses.replace(checks, notes=notes, scatter=scatter)
 
 
 def level_text(name: str, value: float) -> str:
@@ -81,29 +77,6 @@ def _effect_notes(effects: SpecimenEffects | None) -> tuple[str, ...]:
     )
 
 
-def _misfit_notes(result: Fit, scatter: Scatter | None, points: FitPoints) -> list[str]:
-    """A remark where the residuals in force exceed the scatter of the data."""
-    if scatter is None:
-        return []
-    lengths = {run.constants.get("resting_length") for run in points.recordings} - {None}
-    count = 1 if hasattr(result.model, "with_resting_length") else len(lengths)
-    return scatter.misfit_notes(result.rmse, result.data_ranges["force"][1], count)
-
-
-def weighting_notes(by_recording: Array | None, problem: FitProblem) -> list[str]:
-    """A remark where the rows of different test rigs are weighted by their sensors."""
-    if by_recording is None:
-        return []
-    unit = "" if problem.fitted_quantity.unit == "1" else f" {problem.fitted_quantity.unit}"
-    return [
-        HintedText(
-            "The recordings come from test rigs with different sensors: rows are weighted by standard deviations of "
-            f"{min(by_recording):.3g} to {max(by_recording):.3g}{unit}.",
-            Hint("To weight all rows equally", "sigma", 1.0),
-        )
-    ]
-
-
 def _row_notes(problem: FitProblem, statistics: FitStatistics, dropped: int) -> Iterator[str]:
     """Remarks on rows that are dropped, censored, above the limit of the law, or at zero force and not censored."""
     force, usual = problem.data["force"], default_censoring(problem.law)
@@ -131,40 +104,42 @@ def _row_notes(problem: FitProblem, statistics: FitStatistics, dropped: int) -> 
         yield HintedText(text, *([slack] if usual != UNCENSORED else []))
 
 
-def collect_notes(problem: FitProblem, statistics: FitStatistics, loss: Loss, dropped: int) -> Iterator[str]:
-    """Remarks on the data and the fit that affect its interpretation, as sentences."""
+def collect_notes(
+    problem: FitProblem, solution: LeastSquaresSolution, statistics: FitStatistics, loss: Loss, dropped: int,
+    by_recording: Array | None,
+) -> Iterator[str]:  # fmt: skip
+    """Remarks on the data and the fit that affect its interpretation, as sentences.
+
+    `dropped` is the number of rows with a missing value, `by_recording` the standard deviations of sensors that differ.
+    """
     yield from _row_notes(problem, statistics, dropped)
-    yield from _length_notes(problem)
+    length = problem.data.constants.get(RESTING_LENGTH)  # to which the contraction is relative
+    for leaf in problem.leaves:
+        if leaf.declared.name == RESTING_LENGTH and length is not None and abs(leaf.value - float(length)) > 1e-6:
+            yield (
+                f"The muscle in the recording has a resting length of {length:.4g} m, but {leaf.path} is "
+                f"{leaf.value:.4g} m."
+            )
     for i in np.flatnonzero(statistics.on_bound):
         yield f"{problem.leaves[problem.free[i]].path} is on its bound; its value is not determined by the data."
     if not np.isfinite(statistics.sigma):
         yield "There are as many rows as parameters, so the standard errors are unknown."
     if statistics.condition > ILL_CONDITIONED:
         yield f"The problem is ill-conditioned (condition number {statistics.condition:.2g})."
+    unit = "" if problem.fitted_quantity.unit == "1" else f" {problem.fitted_quantity.unit}"
     if not isinstance(loss, LeastSquares):
-        unit = problem.fitted_quantity.unit
-        yield f"Robust loss: {loss}{'' if unit == '1' else f', in {unit}'}."
-
-
-def loss_scale_notes(problem: FitProblem, solution: LeastSquaresSolution, loss: Loss) -> tuple[str, ...]:
-    """A remark where the scale of a robust loss is so small that most rows count as outliers."""
-    if isinstance(loss, LeastSquares):
-        return ()
-    residuals = np.abs(problem.residuals(solution.modelled))[problem.censoring == 0]
-    inside = int(np.count_nonzero(residuals <= loss.scale))
-    if inside >= residuals.size / 2:
-        return ()
-    return (
-        f"Only {inside} of {residuals.size} residuals are within the scale of {loss}, so the standard errors are too "
-        "small. Use a scale of about three times the standard deviation of the noise.",
-    )
-
-
-def _length_notes(problem: FitProblem) -> list[str]:
-    """A remark where the law is of another resting length than the data, since contraction is relative to it."""
-    length = problem.data.constants.get("resting_length")
-    return [
-        f"The muscle in the recording has a resting length of {length:.4g} m, but {leaf.path} is {leaf.value:.4g} m."
-        for leaf in problem.leaves
-        if leaf.declared.name == "resting_length" and length is not None and abs(leaf.value - float(length)) > 1e-6
-    ]
+        yield f"Robust loss: {loss}{unit and f', in{unit}'}."
+    if by_recording is not None:
+        yield HintedText(
+            "The recordings come from test rigs with different sensors: rows are weighted by standard deviations of "
+            f"{min(by_recording):.3g} to {max(by_recording):.3g}{unit}.",
+            Hint("To weight all rows equally", "sigma", 1.0),
+        )
+    if not isinstance(loss, LeastSquares):
+        residuals = np.abs(problem.residuals(solution.modelled))[problem.censoring == 0]
+        inside = int(np.count_nonzero(residuals <= loss.scale))
+        if inside < residuals.size / 2:
+            yield (
+                f"Only {inside} of {residuals.size} residuals are within the scale of {loss}, so the standard errors "
+                "are too small. Use a scale of about three times the standard deviation of the noise."
+            )

@@ -15,9 +15,9 @@ from ..segment import ISOBARIC, ISOMETRIC, RELATIVE_BAND, find_runs, level_inter
 from ..segment.interval import spread
 from .contradictions import RepeatedRows, find_repeated_rows
 from .cross_validation import specimen_name
-from .data_checks import DataChecks, check_data
+from .data_checks import Remarks, check_data
 from .parameter_covariance import Runs
-from .problem import RESTING_LENGTH, FitProblem, fitted_quantity_of, make_problem, with_length
+from .problem import POINT_COLUMNS, RESTING_LENGTH, FitProblem, fitted_quantity_of, make_problem, with_length
 from .weighting import Censoring, default_censoring, force_limits, sensor_deviations
 
 LEVEL_BAND = 0.1
@@ -26,7 +26,6 @@ MIN_ROWS_OF_RUN = 12
 """Minimum number of rows of a run whose constant quantity is replaced by its level (chosen)."""
 _MAX_ROWS_OF_POINTS = 2000
 """Maximum number of rows of a recording that is examined for single points first (chosen)."""
-POINT_COLUMNS = ("pressure", "contraction", "force")
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -73,7 +72,7 @@ class FitPoints:
         return Runs(index, specimen, all("time" in run for run in self.recordings))
 
     @functools.cached_property
-    def checks(self) -> DataChecks:
+    def checks(self) -> Remarks:
         """Contradictions, suspicious values and scatter of the recordings."""
         return check_data(self.recordings)
 

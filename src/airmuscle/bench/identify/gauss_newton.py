@@ -12,15 +12,13 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core import Array
-from .problem import FitProblem
+from .problem import FitProblem, LeastSquaresSolution
 
 BoolArray = npt.NDArray[np.bool_]
 RELATIVE_STEP = 1e-9
 """Step, in standard deviations of the residuals, at which the iteration ends (chosen)."""
 MIN_EIGENVALUE = 1e-6
 """Minimum eigenvalue of the normal matrix in the basis of the start (chosen)."""
-BOUND_MARGIN = 1e-6
-"""Relative distance from a bound within which a parameter is on it (chosen): a search may stop strictly inside."""
 _MAX_ITERATIONS = 50
 _MAX_REDUCTIONS = 20
 """Maximum reductions of the length of one step (chosen)."""
@@ -68,8 +66,8 @@ class _Linearisation(NamedTuple):
 
 def gauss_newton(
     problem: FitProblem, start: Array, known: FirstStep | None = None, relative_step: float = RELATIVE_STEP
-) -> tuple[Array, Array, Array] | None:
-    """The parameters (P,) of least squares near `start`, with the fitted quantity (N,) and its Jacobian (N, P) there.
+) -> LeastSquaresSolution | None:
+    """The solution of least squares near `start` (P,).
 
     None where the iteration is not certain: redundant parameters, a step that does not reduce the sum of squares, or
     slow convergence. With `known` the first step needs no Jacobian, and the last Jacobian is one step old.
@@ -90,14 +88,15 @@ def gauss_newton(
         basis, length = linear.basis, float(np.linalg.norm(np.linalg.solve(linear.normal, linear.gradient)))
         tolerance = residual_std(point.residuals, point.values.size)
         if length <= RELATIVE_STEP * tolerance:
-            return point.values, point.modelled, jacobian
+            return LeastSquaresSolution(point.values, point.modelled, jacobian)
         moved = _curved_step(problem, point, linear, min(2 * fraction, 1.0))
         if moved is None:
             return None
         point, fraction = moved
         ratio = min(length / previous, 1.0) if previous > 0 else 1.0
         if fraction == 1 and length * ratio <= relative_step * tolerance and relative_step > RELATIVE_STEP:
-            return point.values, point.modelled, jacobian  # the next step is smaller by the same ratio at least
+            # The next step is smaller by the same ratio at least.
+            return LeastSquaresSolution(point.values, point.modelled, jacobian)
         previous = length
     return None
 
@@ -193,10 +192,9 @@ def residual_std(residuals: Array, parameters: int) -> float:
 
 def held_on_bounds(problem: FitProblem, values: Array, gradient: Array) -> BoolArray:
     """Mask (P,) of the parameters on a bound that steps against the gradient would leave outwards."""
-    low, high = problem.bounds
-    margin = BOUND_MARGIN * np.maximum(np.abs(values), np.abs(problem.initial_values))
     with np.errstate(invalid="ignore"):
-        return np.asarray(((values - low <= margin) & (gradient >= 0)) | ((high - values <= margin) & (gradient <= 0)))
+        low, high = problem.bounds_reached(values)
+        return np.asarray((low & (gradient >= 0)) | (high & (gradient <= 0)))
 
 
 def orthonormal_basis(matrix: Array, free: BoolArray) -> StepBasis | None:

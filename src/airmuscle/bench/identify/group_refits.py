@@ -25,8 +25,8 @@ import numpy.typing as npt
 from ...core import Array
 from . import gauss_newton as steps
 from .model_evidence import student_quantile
-from .problem import FitProblem
-from .solver import LeastSquaresSolution, is_linear
+from .problem import FitProblem, LeastSquaresSolution
+from .solver import is_linear
 from .variable_projection import RANK_TOLERANCE
 
 LEVEL = 0.95
@@ -214,4 +214,4 @@ class GroupRefits:
         problem = dataclasses.replace(problem, weights=problem.weights * np.sqrt(repeats[drawn]))
         first = steps.FirstStep(self._basis, step, float(counts @ self._sums.squares)) if start is None else None
         solution = steps.gauss_newton(problem, self._solution.values if start is None else start, first, RELATIVE_STEP)
-        return None if solution is None else solution[0]
+        return None if solution is None else solution.values

@@ -7,7 +7,7 @@ their difference is hysteresis.
 
 import dataclasses
 import itertools
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -48,7 +48,7 @@ class Block:
     recording: Recording
     rows: npt.NDArray[np.intp]
     direction: int
-    labels: tuple[tuple[str, float], ...]
+    labels: Mapping[str, float]
     residuals: Array
     """Force minus that of the polynomial [N]."""
     slopes: Array
@@ -140,7 +140,7 @@ def _blocks_of(recording: Recording, least: float, step: int, by_branch: bool) -
     values, member = np.unique(np.stack(keys), axis=1, return_inverse=True)
     for i, key in enumerate(values.T):
         rows = np.flatnonzero((member.ravel() == i) & pulls)[::step]
-        labels = tuple(zip(labelling, key[2:].tolist(), strict=True))
+        labels = dict(zip(labelling, key[2:].tolist(), strict=True))
         yield Block(recording, rows, int(key[0]), labels, np.zeros(0), np.zeros(0))
 
 
@@ -198,7 +198,7 @@ def _spread(blocks: Sequence[Block]) -> Iterator[MatchedRuns]:
     for own in parts.values():
         joined = [np.concatenate([getattr(block, n) for block in own]) for n in ("rows", "residuals", "slopes")]
         if len(joined[0]) >= MIN_SPREAD_ROWS:
-            block = Block(own[0].recording, joined[0], 0, (), *joined[1:])
+            block = Block(own[0].recording, joined[0], 0, {}, *joined[1:])
             points = np.column_stack([block.recording[n][block.rows] for n in ("pressure", "contraction")])
             spread = points / np.maximum(np.ptp(points, axis=0), 1e-9)
             yield _paired(block, _neighbours(spread, SPREAD_NEIGHBOURS, np.inf), are_near=False)

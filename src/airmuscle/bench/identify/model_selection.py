@@ -11,9 +11,11 @@ from ...engine.processes import Workers
 from ...recording import Recording
 from ...report.chapter import Chapter, NamedValue, Table, TableColumn
 from ..reported import Reported
-from .candidate_scores import MAX_RECOMMENDED_EXCESS, RankedModel, Score, points_of_splits, score_candidates
+from .candidate_scores import MAX_RECOMMENDED_EXCESS, RankedModel, Score, score_candidates
 from .candidates import Candidate, ExcludedModel, started_candidates
+from .compared_points import ComparedPoints
 from .cross_validation import GroupSplit, default_split
+from .fit_points import FitPoints
 from .length_errors import find_length_errors, length_notes
 from .model_evidence import aicc
 from .weighting import LeastSquares, Loss
@@ -237,9 +239,10 @@ def compare_splits(
     loss: Loss = LeastSquares(), workers: Workers = 1, progress: Callable[[str, float], None] | None = None,
 ) -> tuple[Comparison, ...]:  # fmt: skip
     """A comparison for each split, as `compare`; every candidate is fitted once to all rows."""
-    points = points_of_splits(runs, splits)
+    points = FitPoints.from_recordings(runs)
+    folds = [ComparedPoints.of(runs, split, points) for split in splits]
     compared, unavailable = started_candidates(runs) if candidates is None else (candidates, ())
-    scores = score_candidates(compared, points, loss, workers, progress, can_exclude=candidates is None)
+    scores = score_candidates(compared, folds, loss, workers, progress, can_exclude=candidates is None)
     return tuple(_comparison(runs, split, [each[i] for each in scores], unavailable) for i, split in enumerate(splits))
 
 

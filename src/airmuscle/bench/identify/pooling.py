@@ -21,7 +21,7 @@ from .result import Fit
 from .slack import PULL_RATIO, Slackness
 from .solver import design_matrix
 from .specimen_effects import BoundedRows, SpecimenEffects, bounded_coefficients, predict_effects
-from .statistics import WorstPoint, correlation_index, rms_of_rows, row_errors
+from .statistics import goodness_of_fit
 
 Rows = npt.NDArray[np.bool_]
 DECAY_RANGE = 0.05
@@ -210,7 +210,6 @@ def pool(law: PooledLengthLaw, population: Fit, points: FitPoints) -> Fit:
     model = _pooled(population.model, pooling.specimens, predicted)
     data = population.recording.with_columns(**{SPECIMEN: pooling.specimens.member.astype(float)})
     modelled = evaluate(model, "force", population.fitted_quantity.arguments, data)
-    errors, measured = row_errors(population.problem, modelled), population.censoring == 0
     estimates = zip(population.estimates, effects.population_errors.tolist(), strict=True)
     return dataclasses.replace(
         population,
@@ -218,11 +217,9 @@ def pool(law: PooledLengthLaw, population: Fit, points: FitPoints) -> Fit:
         estimates=tuple(dataclasses.replace(each, stderr=error) for each, error in estimates),
         correlations=effects.population_correlations,
         sigma=effects.sigma,
-        rmse=rms_of_rows(errors, measured),
-        max_error=WorstPoint.of(errors, data),
-        correlation_index=correlation_index(data["force"][measured], modelled[measured]),
         recording=data,
         effects=effects,
+        **goodness_of_fit(population.problem, modelled, data),
     )
 
 

@@ -3,7 +3,7 @@
 import dataclasses
 import functools
 from collections.abc import Collection, Iterator, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +14,9 @@ from ...recording import Recording
 from ...recording.columns import QUANTITIES
 from .weighting import UNCENSORED, Censoring
 
+BOUND_MARGIN = 1e-6
+"""Relative distance from a bound within which a parameter is on it (chosen)."""
+POINT_COLUMNS = ("pressure", "contraction", "force")
 RESTING_LENGTH = "resting_length"
 """Column with the resting length [m] of every row, in data of several specimens."""
 SPECIMEN = "specimen"
@@ -85,6 +88,14 @@ def fitted_quantity_of(law: Characteristic) -> FittedQuantity:
     )
 
 
+class LeastSquaresSolution(NamedTuple):
+    """The optimal free parameters (P,), with the fitted quantity (N,) and its Jacobian (N, P) there."""
+
+    values: Array
+    modelled: Array
+    jacobian: Array
+
+
 @dataclasses.dataclass(frozen=True, eq=False)
 class FitProblem:
     """N data points and the P free parameters of a law."""
@@ -118,6 +129,13 @@ class FitProblem:
         """Lower and upper bounds of the free parameters; shape (P,) each."""
         pairs = np.array([self.leaves[i].declared.bounds for i in self.free], dtype=float)
         return pairs[:, 0], pairs[:, 1]
+
+    def bounds_reached(self, values: Array) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
+        """Masks (P,) of the parameters on their lower and on their upper bound, within a margin, because a search may
+        stop strictly inside."""
+        low, high = self.bounds
+        margin = BOUND_MARGIN * np.maximum(np.abs(values), np.abs(self.initial_values))
+        return values - low <= margin, high - values <= margin
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -185,6 +203,10 @@ class FitProblem:
     def active_rows(self, modelled: Array) -> npt.NDArray[np.bool_]:
         """Mask of the uncensored rows and of the censored rows whose bound the law violates; shape (N,)."""
         return np.asarray((self.censoring == 0) | (self.censoring * (modelled - self.target) > 0))
+
+    def solution(self, values: Array) -> LeastSquaresSolution:
+        """The solution with these free parameters (P,)."""
+        return LeastSquaresSolution(values, self.predict(values), self.jacobian(values))
 
     def jacobian(self, values: Array) -> Array:
         """Derivatives of `predict` with respect to the free parameters, shape (N, P).

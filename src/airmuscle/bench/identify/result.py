@@ -2,28 +2,31 @@
 
 import dataclasses
 import functools
+import textwrap
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from ...core import Array, check_known, contraction_text, quantity_text
+from ...core import Array, check_known, contraction_text, given_axes, plotting, quantity_text
 from ...physics.muscle.characteristic import Characteristic, ValidityRange
 from ...recording import Recording
+from ...recording.columns import display_scale
 from ...report.chapter import Chapter, NamedValue, Plot, Table
 from ...report.shown import estimate_table
 from ..reported import Reported
 from .data_checks import Remarks, Scatter
 from .parameter_covariance import ParameterCovariance
-from .plot import plot_fit
-from .problem import FitProblem, FittedQuantity, evaluate
+from .problem import FORCE, FitProblem, FittedQuantity, evaluate
 from .specimen_effects import SpecimenEffects
 from .statistics import CorrelationIndex, WorstPoint
 from .weighting import Loss
 
 MAX_ROWS = 12
 """Maximum number of parameters in the brief view (chosen)."""
+MANY_POINTS = 1000
+"""Number of points of a plot from which markers are small."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -106,7 +109,7 @@ class Fit(Reported):
     @property
     def scatter(self) -> Scatter | None:
         """Noise and repeatability of the measured force; None for laws that give contraction or pressure."""
-        return self._remarks.scatter
+        return self._remarks.scatter if self.fitted_quantity == FORCE else None
 
     @property
     def degrees_of_freedom(self) -> int:
@@ -191,13 +194,34 @@ class Fit(Reported):
         return ValidityRange(*ranges["pressure"], *ranges["contraction"])
 
     def plot(self, *, ax: Any = None) -> Any:
-        """Plot the modelled against the measured values, and the residuals.
+        """Plot the modelled against the measured values, and the residuals; censored rows are marked.
 
         `ax` is an Axes for the values, or a sequence of two, also for the residuals, and is returned; without it a new
         figure is returned. Raises ParameterError for another `ax`.
         """
         quantity = self.fitted_quantity.name
-        return plot_fit(quantity, self.recording[quantity], self.modelled, self.censoring != 0, self._title, ax=ax)
+        factor, unit = display_scale(quantity)
+        x, y = self.recording[quantity] * factor, self.modelled * factor
+        given = None if ax is None else (None, given_axes(ax, 1, "plot of a fit"))
+        figure, axes = given or plotting.new_figure(1, 2, width=7.0, height=3.4)
+        ends, size = [min(x.min(), y.min()), max(x.max(), y.max())], 3.5 if x.size < MANY_POINTS else 1.8
+        axes[0].plot(ends, ends, color=plotting.BLACK, linewidth=0.8, label="model = measured", zorder=3)
+        bound = self.censoring != 0
+        kinds = (~bound, plotting.BLUE, "o", "measured"), (bound, plotting.RED, "x", "censored (bound)")
+        for rows, colour, marker, label in kinds:
+            style = {"color": colour, "marker": marker, "linestyle": "none", "markersize": size, "label": label}
+            for axis, drawn in zip(axes[:2], (y, y - x), strict=False) if rows.any() else ():
+                axis.plot(x[rows], drawn[rows], **style)
+        axes[0].set(xlabel=f"measured {quantity} [{unit}]", ylabel=f"modelled {quantity} [{unit}]")
+        for axis in axes[1:2]:
+            axis.axhline(0.0, color=plotting.BLACK, linewidth=0.8)
+            axis.set(xlabel=f"measured {quantity} [{unit}]", ylabel=f"residual (model - measured) [{unit}]")
+        if figure is None:
+            axes[0].legend(loc="upper left", frameon=False, fontsize=8)
+            return ax
+        plotting.legend_below(figure, axes[0], 3)
+        figure.suptitle(textwrap.fill(self._title, 90, max_lines=2, placeholder=" …"), fontsize=9)
+        return figure
 
     @property
     def _title(self) -> str:

@@ -19,8 +19,8 @@ import numpy.typing as npt
 from ...core import Array, contraction_text, quantity_text
 from ...recording import Recording
 from .fit_points import FitPoints
-from .problem import FORCE, RESTING_LENGTH, FitProblem
-from .solver import LeastSquaresSolution, is_linear, solve_least_squares
+from .problem import FORCE, RESTING_LENGTH, FitProblem, LeastSquaresSolution
+from .solver import is_linear, solve_least_squares
 from .weighting import Loss
 
 Rows = npt.NDArray[np.bool_]

@@ -1,13 +1,13 @@
 """Least-squares solvers: direct for laws linear in their parameters, iterative otherwise."""
 
 import dataclasses
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from ...core import Array, Hint, IdentificationError, Leaf
 from .gauss_newton import gauss_newton
-from .problem import FitProblem
+from .problem import FitProblem, LeastSquaresSolution
 from .variable_projection import (
     find_initial_values,
     is_determined_without_censored,
@@ -27,14 +27,6 @@ _SINGULAR_TOLERANCE = 1e-8
 """Relative singular value below which parameters count as redundant (chosen)."""
 
 
-class LeastSquaresSolution(NamedTuple):
-    """The optimal free parameters (P,), with the fitted quantity (N,) and its Jacobian (N, P) there."""
-
-    values: Array
-    modelled: Array
-    jacobian: Array
-
-
 def solve_least_squares(problem: FitProblem, loss: Loss, start: Array | None = None) -> LeastSquaresSolution:
     """The free parameters that minimise the loss. Raises IdentificationError where the search does not converge.
 
@@ -44,7 +36,7 @@ def solve_least_squares(problem: FitProblem, loss: Loss, start: Array | None = N
     if not is_linear(problem):
         near = gauss_newton(problem, start) if start is not None and isinstance(loss, LeastSquares) else None
         if near is not None:
-            return LeastSquaresSolution(*near)
+            return near
         return solve_iteratively(problem, loss, find_initial_values(problem) if start is None else start)
     linear = _solve_linear(problem)
     if isinstance(loss, LeastSquares):
@@ -103,7 +95,7 @@ def solve_iteratively(problem: FitProblem, loss: Loss, start: Array) -> LeastSqu
         return np.asarray(problem.jacobian(values) * (active * problem.weights / spread)[:, None] * scale)
 
     if np.abs(residuals(start / scale)).max() < 1e-14:  # an exact fit: the gradient vanishes
-        return LeastSquaresSolution(start, problem.predict(start), problem.jacobian(start))
+        return problem.solution(start)
     options: dict[str, Any] = {
         "jac": jacobian,
         "bounds": (low / scale, high / scale),
@@ -122,8 +114,7 @@ def solve_iteratively(problem: FitProblem, loss: Loss, start: Array) -> LeastSqu
             break
     else:
         raise _not_converged(problem)
-    values = np.clip(scaled * scale, low, high)
-    return LeastSquaresSolution(values, problem.predict(values), problem.jacobian(values))
+    return problem.solution(np.clip(scaled * scale, low, high))
 
 
 def _is_converged(result: Any) -> bool:

@@ -12,7 +12,7 @@ from ...recording import Recording
 from .candidate_scores import FoldScore, RankedModel
 from .candidates import Candidate
 from .compared_points import ComparedPoints
-from .cross_validation import SpecimenSplit, label_folds, specimen_name
+from .cross_validation import SpecimenSplit, specimen_name
 from .group_refits import MIN_MEMBERS, specimen_deviation, t_quantile
 from .model_selection import Comparison
 from .result import Fit
@@ -106,7 +106,7 @@ def specimen_errors(fit: Fit, recordings: Sequence[Recording], fixed: tuple[str,
     if len(specimens_of(recordings)) < MIN_MEMBERS:
         return None
     try:
-        points = ComparedPoints.from_recordings(recordings, *label_folds(recordings, SpecimenSplit()))
+        points = ComparedPoints.of(recordings, SpecimenSplit())
         parts = [p for p in points.left_out_residuals(Candidate("", fit.model, fixed), fit, fit.loss) if p[1].size]
     except AirmuscleError:  # the others do not determine the law, so that no error is known
         return None

@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Collection, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -13,14 +14,14 @@ from ...recording import Recording
 from ..checks import find_suspicious
 from ..checks.contractions import MAX_CONTRACTION
 from . import statistics as stats
-from .fit_notes import Examination, collect_notes, loss_scale_notes, weighting_notes
+from .fit_notes import collect_notes, examine
 from .fit_points import FitPoints
 from .gauss_newton import gauss_newton
 from .pooling import check_poolable, pool, population_of, refit_pooled
-from .problem import FitProblem, evaluate
+from .problem import FitProblem, LeastSquaresSolution, evaluate
 from .result import Estimate, Fit
 from .slack import solve_bounded
-from .solver import LeastSquaresSolution, is_linear
+from .solver import is_linear
 from .variable_projection import find_initial_values
 from .weighting import Censoring, LeastSquares, Loss
 
@@ -28,28 +29,19 @@ from .weighting import Censoring, LeastSquares, Loss
 def check_arguments(characteristic: object, recording: object) -> None:
     """Raise ParameterError for a characteristic or a recording of another type."""
     if not isinstance(characteristic, Characteristic):
-        raise ParameterError(
-            f"fit: {_describe_argument(characteristic)} is not a characteristic. Give one, for example "
-            f"{_initial_law(characteristic)}."
-        )
+        given, example = one_line(characteristic), "load(...).characteristic"
+        if isinstance(characteristic, type):
+            given = f"the class {characteristic.__name__}"
+            if issubclass(characteristic, Characteristic):
+                values = ".blank(degree=5)" if hasattr(characteristic, "blank") else "(...) with initial values"
+                example = f"an object of the class, {characteristic.__name__}{values}"
+        raise ParameterError(f"fit: {given} is not a characteristic. Give one, for example {example}.")
     runs = recording if isinstance(recording, Sequence) and not isinstance(recording, str) else [recording]
     for run in runs:
         if not isinstance(run, Recording):
             raise ParameterError(
                 f"fit: {one_line(run)} is not a Recording. Give one, as returned by read, read_csv or simulate."
             )
-
-
-def _describe_argument(argument: object) -> str:
-    return f"the class {argument.__name__}" if isinstance(argument, type) else one_line(argument)
-
-
-def _initial_law(argument: object) -> str:
-    """A characteristic to fit as an expression, of the class of the argument if that is a class of characteristics."""
-    if isinstance(argument, type) and issubclass(argument, Characteristic):
-        values = ".blank(degree=5)" if hasattr(argument, "blank") else "(...) with initial values"
-        return f"an object of the class, {argument.__name__}{values}"
-    return "load(...).characteristic"
 
 
 def fit(
@@ -77,14 +69,10 @@ def fit(
     try:
         return fit_to_points(law, points, loss=loss, censoring=censoring, sigma=sigma, fixed=fixed)
     except IdentificationError as error:
-        raise _with_remarks(error, points) from None
-
-
-def _with_remarks(error: IdentificationError, points: FitPoints) -> IdentificationError:
-    """The error, followed by what the recordings show without a law, which may be its cause; `read` says the rest."""
-    known = find_suspicious(points.recordings)
-    remarks = [part for note in points.checks.notes if note not in known for part in (" ", note)]
-    return IdentificationError(HintedText(error.message, *remarks), cause=error.cause)
+        # What the recordings show without a law may be the cause; `read` has stated the rest.
+        known = find_suspicious(points.recordings)
+        remarks = [part for note in points.checks.notes if note not in known for part in (" ", note)]
+        raise IdentificationError(HintedText(error.message, *remarks), cause=error.cause) from None
 
 
 def fit_to_points(
@@ -113,11 +101,39 @@ def _fit_law(
     solution = solve_bounded(problem, points, loss)
     statistics = stats.compute_statistics(problem, solution, loss, points.runs)
     stats.check_determined_by_levels(problem, solution, points.at_levels)
-    by_recording = None if sigma is not None else points.deviations(problem.fitted_quantity.name)
-    notes = (*collect_notes(problem, statistics, loss, points.dropped), *weighting_notes(by_recording, problem))
-    notes += loss_scale_notes(problem, solution, loss)
-    examination = Examination(points, problem, solution.modelled, notes)
-    return _build_result(problem, solution, statistics, loss, points.dropped, examination)
+    data, quantity = problem.data, problem.fitted_quantity
+    by_recording = None if sigma is not None else points.deviations(quantity.name)
+    notes = tuple(collect_notes(problem, solution, statistics, loss, points.dropped, by_recording))
+    model = tree.with_parameters(problem.law, problem.leaf_values(solution.values))
+    return Fit(
+        model=model,
+        estimates=_build_estimates(problem, solution, statistics),
+        correlations=statistics.correlations,
+        parameter_covariance=statistics.covariance,
+        rank=statistics.rank,
+        condition=statistics.condition,
+        sigma=statistics.sigma,
+        rows_censored=int(np.count_nonzero(problem.censoring)),
+        rows_dropped=points.dropped,
+        recording=data,
+        fitted_quantity=quantity,
+        censoring=problem.censoring,
+        problem=dataclasses.replace(problem, law=model, leaves=tuple(tree.leaves(model))),
+        loss=loss,
+        remarks=partial(examine, points, problem, solution.modelled, notes),
+        **stats.goodness_of_fit(problem, evaluate(model, quantity.name, quantity.arguments, data), data),
+    )
+
+
+def _build_estimates(
+    problem: FitProblem, solution: LeastSquaresSolution, statistics: stats.FitStatistics
+) -> tuple[Estimate, ...]:
+    leaves, numbers = [problem.leaves[i] for i in problem.free], (solution.values, statistics.standard_errors)
+    columns = zip(leaves, problem.labels, *(each.tolist() for each in (*numbers, statistics.on_bound)), strict=True)
+    return tuple(
+        Estimate(leaf.path, label, value, stderr, leaf.declared.unit, leaf.declared.meaning, on_bound)
+        for leaf, label, value, stderr, on_bound in columns
+    )
 
 
 def refit(
@@ -136,60 +152,10 @@ def refit(
         solution = (
             solve_bounded(problem, points, loss, find_initial_values(problem, multi_start=False))
             if near is None
-            else LeastSquaresSolution(*near)
+            else near
         )
     except IdentificationError:
         solution = solve_bounded(problem, points, loss)
     stats.check_determined(problem, solution)
     model: Characteristic = tree.with_parameters(problem.law, problem.leaf_values(solution.values))
     return model
-
-
-def _build_result(
-    problem: FitProblem, solution: LeastSquaresSolution, statistics: stats.FitStatistics, loss: Loss, dropped: int,
-    examination: Examination,
-) -> Fit:  # fmt: skip
-    data, quantity = problem.data, problem.fitted_quantity.name
-    model = tree.with_parameters(problem.law, problem.leaf_values(solution.values))
-    clamped = evaluate(model, quantity, problem.fitted_quantity.arguments, data)
-    measured = problem.censoring == 0
-    errors = stats.row_errors(problem, clamped)
-    varies = bool(np.ptp(data[quantity][measured]) > 0)
-    return Fit(
-        model=model,
-        estimates=_build_estimates(problem, solution, statistics),
-        correlations=statistics.correlations,
-        parameter_covariance=statistics.covariance,
-        rank=statistics.rank,
-        condition=statistics.condition,
-        sigma=statistics.sigma,
-        rmse=stats.rms_of_rows(errors, measured),
-        max_error=stats.WorstPoint.of(errors, data),
-        correlation_index=stats.correlation_index(data[quantity][measured], clamped[measured]) if varies else None,
-        rows_censored=int(np.count_nonzero(~measured)),
-        rows_dropped=dropped,
-        recording=data,
-        fitted_quantity=problem.fitted_quantity,
-        censoring=problem.censoring,
-        problem=dataclasses.replace(problem, law=model, leaves=tuple(tree.leaves(model))),
-        loss=loss,
-        remarks=examination,
-    )
-
-
-def _build_estimates(
-    problem: FitProblem, solution: LeastSquaresSolution, statistics: stats.FitStatistics
-) -> tuple[Estimate, ...]:
-    leaves = (problem.leaves[i] for i in problem.free)
-    columns = zip(
-        leaves,
-        problem.labels,
-        solution.values.tolist(),
-        statistics.standard_errors.tolist(),
-        statistics.on_bound.tolist(),
-        strict=True,
-    )
-    return tuple(
-        Estimate(leaf.path, label, value, stderr, leaf.declared.unit, leaf.declared.meaning, on_bound)
-        for leaf, label, value, stderr, on_bound in columns
-    )

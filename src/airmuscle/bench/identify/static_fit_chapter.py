@@ -1,27 +1,37 @@
-"""Report chapter of a static fit with the equation of its law."""
+"""Report chapter of a static fit: equation of its law, isobars, isometric ramps, confidence and prediction bands."""
 
+import contextlib
 import dataclasses
 from collections.abc import Mapping, Sequence
 from functools import partial
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
-from ...core import AirmuscleError, Reference, cite
+import numpy as np
+
+from ...core import AirmuscleError, Array, IdentificationError, Reference, cite, level_text, plotting
 from ...physics.muscle.characteristic import PooledLengthLaw, ValidityRange
 from ...physics.muscle.characteristic.energy_defect import maxwell_defect
 from ...physics.muscle.geometry import Geometry
 from ...physics.muscle.isobars import compute_isobars, isobar_figure
+from ...recording import Recording
+from ...recording.columns import display_scale
 from ...report.chapter import BY_ROW, Chapter, DisplayedEquation, NamedValue, Plot, Table, TableColumn
 from ...report.equation import LawEquation, law_equation
 from ...report.equation.source_code import REMARKS, displayed_lines, source_codes
 from ...report.formatting import format_number
-from . import Fit
-from .cross_validation import is_pressure_ramp, levels_of
-from .curve_plots import band_plot, ramp_plot
+from . import Band, Fit, confidence_band
+from .candidates import evaluate_force
+from .cross_validation import LEVEL_TOLERANCE, MAX_LEVEL_WIDTH, held_levels, is_pressure_ramp, levels_of
+from .problem import with_length
 from .surface.shape import shape_violations_of_fit
 from .uncertainty_chapter import violation_table
 from .volume_fit import defect_values
 
-MAX_CURVES = 8
+MAX_ISOBARS, MAX_CURVES = 8, 5
+"""Maximum numbers of isobars, and of curves with bands, which would overlap."""
+MAX_PANELS, MAX_RAMPS = 4, 6
+"""Maximum numbers of resting lengths, and of contractions for each of them; evenly selected if there are more."""
+POINTS, LEVEL = 121, 0.95
 
 
 class MuscleDescription(Protocol):
@@ -45,8 +55,17 @@ def fit_chapter(
     notes          on the fit and the muscle
     of_recordings  notes on the reading of the data, for the page
     """
-    chapter, (equations, symbols) = fit.chapter(), equation_section(fit)
-    plots = (ramp_plot(fit), _isobars(fit, entry), *chapter.plots, band_plot(fit))
+    chapter, (equations, symbols), data = fit.chapter(), equation_section(fit), fit.recording
+    swept = is_pressure_ramp(data["pressure"], data["contraction"])  # the pressures of isobars are then round
+    curves = compute_isobars(
+        fit.model, entry.validity_range, pressures=None if swept else levels_of(data["pressure"], MAX_ISOBARS)
+    )
+    isobars = Plot(
+        "isobars",
+        f"{entry.title}: force over contraction at constant gauge pressure.",
+        partial(isobar_figure, fit.model, entry.title, curves, entry.validity_range, measured=data),
+    )
+    plots = (ramp_plot(fit), isobars, *chapter.plots, band_plot(fit))
     parameters, correlations = chapter.tables
     violations, title = shape_violations_of_fit(fit), "Monotonicity violations of the fitted law"
     broken = (violation_table(violations, "shape", title),) if violations else ()
@@ -65,13 +84,10 @@ def fit_chapter(
 
 def _energy_consistency(fit: Fit, entry: MuscleDescription) -> list[NamedValue]:
     """The Maxwell defect of the law with the volume of the muscle, if it has one."""
-    if entry.geometry is None or entry.validity_range is None:
-        return []
-    try:
-        defect = maxwell_defect(fit.model, entry.geometry, entry.validity_range)
-    except AirmuscleError:  # slack everywhere, or contractions outside the geometry
-        return []
-    return defect_values(defect)
+    if entry.geometry is not None and entry.validity_range is not None:
+        with contextlib.suppress(AirmuscleError):  # slack everywhere, or contractions outside the geometry
+            return defect_values(maxwell_defect(fit.model, entry.geometry, entry.validity_range))
+    return []
 
 
 def _rows(fit: Fit) -> Table:
@@ -87,21 +103,6 @@ def _rows(fit: Fit) -> Table:
     return Table("rows", "Measured and modelled values", columns, series=True)
 
 
-def _isobars(fit: Fit, entry: MuscleDescription) -> Plot:
-    """Return the isobars of the fitted law at measured pressures, with the measured points.
-
-    The pressures are round if the pressure was swept.
-    """
-    ramp = is_pressure_ramp(fit.recording["pressure"], fit.recording["contraction"])
-    pressures = None if ramp else levels_of(fit.recording["pressure"], MAX_CURVES)
-    curves = compute_isobars(fit.model, entry.validity_range, pressures=pressures)
-    return Plot(
-        "isobars",
-        f"{entry.title}: force over contraction at constant gauge pressure.",
-        partial(isobar_figure, fit.model, entry.title, curves, entry.validity_range, measured=fit.recording),
-    )
-
-
 def equation_section(fit: Fit) -> tuple[tuple[DisplayedEquation, ...], tuple[Table, ...]]:
     """Return the equations of a fitted law within the range of its data, and the table of their symbols.
 
@@ -115,7 +116,15 @@ def equation_section(fit: Fit) -> tuple[tuple[DisplayedEquation, ...], tuple[Tab
     validity = _validity(fit.data_ranges, quantity.arguments)
     shown = tuple(_displayed(equation, f"equation-{i}", validity) for i, equation in enumerate(equations, 1))
     effects, tables = _specimen_effects(fit, validity)
-    return (*shown, *effects), (_symbol_table(equations[0]), *tables)
+    parameters = equations[0].parameters
+    columns: dict[str, Any] = {
+        "symbol": [each.name for each in parameters],
+        "value": TableColumn([each.value for each in parameters], BY_ROW),
+        "unit": [each.unit for each in parameters],
+        "meaning": [each.meaning for each in parameters],
+    }
+    symbols = Table("equation-symbols", "Symbols of the equation", columns)
+    return (*shown, *effects), (symbols, *tables)
 
 
 def _specimen_effects(fit: Fit, validity: str) -> tuple[list[DisplayedEquation], list[Table]]:
@@ -123,10 +132,13 @@ def _specimen_effects(fit: Fit, validity: str) -> tuple[list[DisplayedEquation],
     law, effects = fit.model, fit.effects
     if effects is None or not isinstance(law, PooledLengthLaw):
         return [], []
-    shown, quantity = [], fit.fitted_quantity
+    shown, quantity, share = [], fit.fitted_quantity, ""
+    if law.effect_decay:
+        limit = f"{format_number(1 / law.effect_decay)} N"
+        share = f" (below zero force of the population it decreases to zero within {limit})"
     for i, (name, effect) in enumerate(zip(law.specimens, law.effects, strict=True), 1):
         equations = law_equation(effect, quantity.name, quantity.arguments, fit.data_ranges)
-        title = f"Effect of specimen {name}, added to the law of the population {_share(law)}".rstrip()
+        title = f"Effect of specimen {name}, added to the law of the population{share}"
         titled = dataclasses.replace(equations[-1], title=title)
         shown.append(_displayed(titled, f"effect-{i}", validity))
     surface: Any = law.effects[0]
@@ -135,13 +147,6 @@ def _specimen_effects(fit: Fit, validity: str) -> tuple[list[DisplayedEquation],
         columns |= {name: TableColumn(values, "N"), f"{name}, standard error": TableColumn(errors, "N")}
     title = f"Specimen effects (standard deviation of the prior {format_number(effects.deviation)} N)"
     return shown, [Table("specimen-effects", title, columns)]
-
-
-def _share(law: PooledLengthLaw) -> str:
-    """The share of the effects where the population is slack, as a remark."""
-    if not law.effect_decay:
-        return ""
-    return f"(below zero force of the population it decreases to zero within {format_number(1 / law.effect_decay)} N)"
 
 
 def _displayed(equation: LawEquation, name: str, validity: str) -> DisplayedEquation:
@@ -162,16 +167,6 @@ def _validity(ranges: Mapping[str, tuple[float, float]], arguments: tuple[str, .
     return f"Valid for {' and '.join(parts)}, the range of the data; outside it the law may be continued differently."
 
 
-def _symbol_table(equation: LawEquation) -> Table:
-    columns: dict[str, Any] = {
-        "symbol": [each.name for each in equation.parameters],
-        "value": TableColumn([each.value for each in equation.parameters], BY_ROW),
-        "unit": [each.unit for each in equation.parameters],
-        "meaning": [each.meaning for each in equation.parameters],
-    }
-    return Table("equation-symbols", "Symbols of the equation", columns)
-
-
 def _definition(law: type[Any]) -> DisplayedEquation:
     """Return the definition of a law whose expression has no closed form, or is too long to be shown."""
     text = " ".join((law.__doc__ or law.__name__).split("\n\n")[0].split())
@@ -179,3 +174,123 @@ def _definition(law: type[Any]) -> DisplayedEquation:
     sources = "; ".join(f"{each.authors} {each.year or ''}".strip() for each in references)
     note = f"{text} The law has no closed form of a length that can be shown. Source: {sources or 'none published'}."
     return DisplayedEquation("equation-1", "Definition", (), note, {})
+
+
+def ramp_plot(fit: Fit) -> Plot | None:
+    """Return measured and modelled force over pressure at the held contractions; None if the pressure was not swept
+    at held contractions."""
+    data = fit.recording
+    if not is_pressure_ramp(data["pressure"], data["contraction"]):
+        return None
+    lengths = data.columns.get("resting_length")
+    panels: list[float | None] = [None] if lengths is None else [float(x) for x in levels_of(lengths, MAX_PANELS)]
+    columns, rows = min(2, len(panels)), -(-len(panels) // 2)
+    width, height = (6.3, 3.6) if len(panels) == 1 else (7.4, 2.9 * rows + 0.4)
+    figure, axes = plotting.new_figure(rows, columns, width=width, height=height, squeeze=False, sharey=True)
+    for axis, length in zip(axes.ravel(), panels, strict=False):
+        selected = np.full(len(data), True) if lengths is None or length is None else _at(lengths, length)
+        _draw_panel(axis, fit, data.rows(selected), length)
+    for axis in axes.ravel()[len(panels) :]:
+        axis.set_visible(False)
+    for axis in axes[:, 0]:
+        axis.set_ylabel("force [N]")
+    caption = "Force over gauge pressure at the held contractions; points: measured, lines: model."
+    return Plot("ramps", caption, figure)
+
+
+def _at(values: Array, level: float) -> Any:
+    return np.abs(values - level) <= MAX_LEVEL_WIDTH * LEVEL_TOLERANCE * np.abs(values).max()
+
+
+def _draw_panel(axes: Any, fit: Fit, data: Recording, length: float | None) -> None:
+    """Draw the ramps of one resting length [m]."""
+    law = with_length(fit.model, length)
+    levels = held_levels(data["contraction"]).values
+    selected = levels[np.unique(np.linspace(0, levels.size - 1, min(levels.size, MAX_RAMPS)).astype(int))]
+    for i, level in enumerate(selected):
+        rows = data.rows(_at(data["contraction"], level) if levels.size > 1 else slice(None))
+        pressure = np.linspace(rows["pressure"].min(), rows["pressure"].max(), POINTS)
+        force = evaluate_force(law, pressure, np.full(POINTS, level), float(fit.recording["force"].max()))
+        colour, marker = plotting.LINES[i % len(plotting.LINES)], plotting.MARKERS[i % len(plotting.MARKERS)]
+        points = {"linestyle": "none", "marker": marker, "markersize": 2.2, "alpha": 0.45, "markeredgewidth": 0.5}
+        axes.plot(rows["pressure"] / 1e3, rows["force"], color=colour, **points)
+        label = level_text("contraction", float(level), float(np.abs(levels).max()))
+        style = {"linestyle": plotting.DASHES[i % len(plotting.DASHES)], "linewidth": 1.6}
+        axes.plot(pressure / 1e3, force, color=colour, label=label, **style)
+    axes.set(xlabel="gauge pressure [kPa]")
+    if length is not None:
+        axes.set_title(f"resting length {1e3 * length:.4g} mm", fontsize=9)
+    axes.legend(title="contraction", loc="upper left", fontsize=8, title_fontsize=8, frameon=False)
+
+
+_CURVE_AXES = {
+    "force": ("pressure", "contraction"),
+    "contraction": ("pressure", "force"),
+    "pressure": ("contraction", "force"),
+}
+"""The quantity that is constant on a curve of the fitted one, and the one that varies along it."""
+_CAPTION = (
+    "Left: 95 % confidence bands (dark) and prediction bands of one further measurement (light) at measured levels. "
+    "Right: half width of the confidence bands (thick) and the prediction bands (thin), for non-negative forces. The "
+    "variance of the parameters is estimated "
+)
+
+
+class BandCurve(NamedTuple):
+    """A fitted curve at one level of the constant quantity, with both 95 % bands; SI, shape (N,) each."""
+
+    constant: str
+    level: float
+    varying: str
+    points: Array
+    """Values of the varying quantity."""
+    confidence: Band
+    prediction: Band
+
+
+def band_curves(fit: Fit) -> list[BandCurve]:
+    """Return the fitted curves at measured levels with their bands, for the median resting length; none if a band
+    cannot be computed. They are over the pressure if it was swept at held contractions."""
+    data, quantity = fit.recording, fit.fitted_quantity.name
+    ramp = quantity == "force" and is_pressure_ramp(data["pressure"], data["contraction"])
+    constant, varying = ("contraction", "pressure") if ramp else _CURVE_AXES[quantity]
+    along, lengths, curves = np.linspace(*fit.data_ranges[varying], POINTS), data.columns.get("resting_length"), []
+    constants = {} if lengths is None else {"resting_length": float(np.median(lengths))}
+    for level in levels_of(data[constant], MAX_CURVES).tolist():
+        points = Recording({varying: along, constant: np.full(POINTS, level)}, data.origin, constants)
+        try:
+            bands = [confidence_band(fit, points, level=LEVEL, prediction=further) for further in (False, True)]
+        except IdentificationError:
+            return []
+        curves.append(BandCurve(constant, level, varying, along, *bands))
+    return curves
+
+
+def band_plot(fit: Fit) -> Plot | None:
+    """Return the fitted curves with 95 % bands and the half width of the bands; None if no band can be computed."""
+    curves, quantity = band_curves(fit), fit.fitted_quantity.name
+    if not curves:
+        return None
+    constant, varying = curves[0].constant, curves[0].varying
+    figure, (left, right) = plotting.new_figure(1, 2, width=7.4, height=3.7)
+    (factor, unit), (x_factor, x_unit) = display_scale(quantity), display_scale(varying)
+    for i, each in enumerate(curves):
+        confidence, prediction = each.confidence, each.prediction
+        colour = plotting.LINES[i % len(plotting.LINES)]
+        x = x_factor * np.where(confidence.value < 0 if quantity == "force" else False, np.nan, each.points)
+        label = level_text(constant, each.level, max(abs(other.level) for other in curves))
+        style = {"color": colour, "linestyle": plotting.DASHES[i % 5]}
+        left.plot(x, factor * confidence.value, label=label, **style)
+        left.fill_between(x, factor * prediction.low, factor * prediction.high, color=colour, alpha=0.15, linewidth=0)
+        left.fill_between(x, factor * confidence.low, factor * confidence.high, color=colour, alpha=0.35, linewidth=0)
+        right.plot(x, factor * (confidence.high - confidence.value), **style)
+        right.plot(x, factor * (prediction.high - prediction.value), color=colour, linewidth=0.7, alpha=0.7)
+    measured = fit.recording.rows(fit.censoring == 0)
+    x, y = x_factor * measured[varying], factor * measured[quantity]
+    left.plot(x, y, ".", markersize=2, color=plotting.BLACK, alpha=0.35, label="measured")
+    margin = 0.08 * float(np.ptp(y)) or 1.0
+    limits = float(y.min()) - margin, float(y.max()) + margin
+    left.set(xlabel=f"{varying} [{x_unit}]", ylabel=f"{quantity} [{unit}]", ylim=limits)
+    right.set(xlabel=f"{varying} [{x_unit}]", ylabel=f"half width of the band [{unit}]", ylim=(0.0, None))
+    plotting.legend_below(figure, left, columns=MAX_CURVES + 1)
+    return Plot("bands", f"{_CAPTION}{fit.error_basis}.", figure)

@@ -2,7 +2,7 @@
 
 import dataclasses
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -13,8 +13,7 @@ from ...recording import Recording
 from ..segment import RELATIVE_BAND, level_intervals
 from .identifiability import singular_vectors
 from .parameter_covariance import ParameterCovariance, Runs, estimate_covariance
-from .problem import FitProblem
-from .solver import LeastSquaresSolution
+from .problem import POINT_COLUMNS, FitProblem, LeastSquaresSolution
 from .variable_projection import RANK_TOLERANCE, uncensored_rank
 from .weighting import LeastSquares, Loss
 
@@ -76,22 +75,22 @@ class WorstPoint:
     contraction: float
     force: float
 
-    @classmethod
-    def of(cls, errors: Array, data: Recording) -> "WorstPoint":
-        """The row of the error (N,) of maximum magnitude."""
-        worst = int(np.argmax(np.abs(errors)))
-        return cls(float(errors[worst]), *(float(data[name][worst]) for name in ("pressure", "contraction", "force")))
 
+def goodness_of_fit(problem: FitProblem, modelled: Array, data: Recording) -> dict[str, Any]:
+    """The rms error, maximum error and correlation index of a law, as fields of a `Fit`.
 
-def row_errors(problem: FitProblem, modelled: Array) -> Array:
-    """Model - measured at every row (N,); at a censored row the violation of its bound, because its reading is not a
-    measured value."""
-    return problem.residuals(modelled) / problem.weights
-
-
-def rms_of_rows(errors: Array, measured: npt.NDArray[np.bool_]) -> float:
-    """Root mean square of the errors (N,) in relation to the measured rows (mask); squares of violations are added."""
-    return float(np.sqrt(errors @ errors / max(int(np.count_nonzero(measured)), 1)))
+    The error at a row is model - measured, with the model (N,) clamped; at a censored row it is the violation of its
+    bound, because its reading is not a measured value. The squares of violations are added to those of measured rows.
+    """
+    measured, target = problem.censoring == 0, data[problem.fitted_quantity.name]
+    errors = problem.residuals(modelled) / problem.weights
+    worst = int(np.argmax(np.abs(errors)))
+    varies = np.ptp(target[measured]) > 0
+    return {
+        "rmse": float(np.sqrt(errors @ errors / max(int(np.count_nonzero(measured)), 1))),
+        "max_error": WorstPoint(float(errors[worst]), *(float(data[name][worst]) for name in POINT_COLUMNS)),
+        "correlation_index": correlation_index(target[measured], modelled[measured]) if varies else None,
+    }
 
 
 _MAX_NAMES = 3
@@ -120,7 +119,7 @@ class FitStatistics:
 
 def compute_statistics(problem: FitProblem, solution: LeastSquaresSolution, loss: Loss, runs: Runs) -> FitStatistics:
     """Statistics of a solution. Raises IdentificationError where the design matrix is rank-deficient."""
-    low, high = bounds_reached(problem, solution.values)
+    low, high = problem.bounds_reached(solution.values)
     on_bound, active = low | high, problem.active_rows(solution.modelled)
     design = _check_rank(problem, solution, on_bound)
     residuals = problem.residuals(solution.modelled)[active]
@@ -142,7 +141,7 @@ def compute_statistics(problem: FitProblem, solution: LeastSquaresSolution, loss
 
 def check_determined(problem: FitProblem, solution: LeastSquaresSolution) -> None:
     """Raise IdentificationError where the design matrix at the solution is rank-deficient."""
-    low, high = bounds_reached(problem, solution.values)
+    low, high = problem.bounds_reached(solution.values)
     _check_rank(problem, solution, low | high)
 
 
@@ -201,14 +200,6 @@ def _check_rank(problem: FitProblem, solution: LeastSquaresSolution, on_bound: M
         shares = np.sqrt(np.sum(design.right_singular_vectors[design.null] ** 2, axis=0))
         raise _rank_deficiency(problem, ~on_bound, shares, int(np.count_nonzero(~design.null)))
     return design
-
-
-def bounds_reached(problem: FitProblem, values: Array) -> tuple[Mask, Mask]:
-    """Masks of the parameters on their lower and on their upper bound, within a margin, because the search stays
-    strictly inside."""
-    low, high = problem.bounds
-    margin = 1e-6 * np.maximum(np.abs(values), np.abs(problem.initial_values))
-    return values - low <= margin, high - values <= margin
 
 
 def _residual_std(residuals: Array, parameters: int, loss: Loss) -> tuple[float, Array]:

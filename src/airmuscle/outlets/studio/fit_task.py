@@ -17,11 +17,10 @@ import numpy as np
 import airmuscle as am
 
 from ...bench.identify.compare_chapter import LawSelection
-from ...bench.identify.curve_plots import band_curves
 from ...bench.identify.hysteresis import LoopFit, find_loops, fit_jointly, fit_loop, loops_not_joined
 from ...bench.identify.hysteresis.hysteresis_chapter import hysteresis_chapters, joint_friction_chapter, loop_chapter
 from ...bench.identify.hysteresis.joint import select_friction
-from ...bench.identify.static_fit_chapter import equation_section
+from ...bench.identify.static_fit_chapter import band_curves, equation_section
 from ...bench.segment import check_contents, motion_direction
 from ...core import AirmuscleError, AirmuscleWarning, atomic_folder
 from ...files.library import missing_geometry, part_toml, resting_lengths, save
@@ -230,13 +229,12 @@ def _parity(fit: am.Fit) -> dict[str, Any]:
 
 
 def _bands(fit: am.Fit) -> dict[str, Any] | None:
-    computed = band_curves(fit)
-    if computed is None:
+    curves = band_curves(fit)
+    if not curves:
         return None
-    axes, curves = computed
     return {
-        "constant": axes.constant,
-        "varying": axes.varying,
+        "constant": curves[0].constant,
+        "varying": curves[0].varying,
         "basis": fit.error_basis,
         "curves": [
             {
