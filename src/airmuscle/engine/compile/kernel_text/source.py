@@ -114,19 +114,15 @@ class _Plain(ast.NodeTransformer):
         return node
 
     def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.AST:
-        node.decorator_list, node.returns = [], None
-        for argument in node.args.args:
-            argument.annotation = None
+        node.decorator_list = []
         return self.generic_visit(node)
 
     def visit_Subscript(self, node: ast.Subscript) -> ast.AST:
         self.generic_visit(node)
         if isinstance(node.slice, ast.Tuple):
-            *rows, last = node.slice.elts
-            table = node.value
+            *rows, node.slice = node.slice.elts
             for row in rows:
-                table = ast.copy_location(ast.Subscript(table, row, ast.Load()), node)
-            node.value, node.slice = table, last
+                node.value = ast.Subscript(node.value, row, ast.Load())
         return node
 
 

@@ -3,8 +3,6 @@
 By enumeration with bounds, the search of predictive control with a finite control set.
 """
 
-from typing import Any
-
 import numba
 
 from ....core import Status
@@ -15,7 +13,7 @@ DONE, NOT_FINITE = Status.DONE.value, Status.NOT_FINITE.value
 
 
 @PART
-def tracking_cost(y: Any, wanted: Any, weights: Any) -> Any:
+def tracking_cost(y, wanted, weights):
     """The weighted sum of the squared errors."""
     cost = 0.0
     for i in range(y.shape[0]):
@@ -24,7 +22,7 @@ def tracking_cost(y: Any, wanted: Any, weights: Any) -> Any:
 
 
 @PART
-def keep_best(cost: Any, sequence: Any, best: Any) -> None:
+def keep_best(cost, sequence, best):
     """Keep a complete sequence and its cost."""
     best[0] = cost
     for k in range(1, best.shape[0]):
@@ -33,9 +31,9 @@ def keep_best(cost: Any, sequence: Any, best: Any) -> None:
 
 @numba.njit(error_model="numpy", fastmath={"contract", "reassoc"}, nogil=True)
 def choose_mode(
-    rates: Any, measured: Any, c: Any, sizes: Any, h: Any, modes: Any, changes: Any, wanted: Any, weights: Any,
-    states: Any, costs: Any, sequence: Any, best: Any, count: Any, f: Any, a: Any, work: Any, y: Any, slopes: Any,
-) -> Any:  # fmt: skip
+    rates, measured, c, sizes, h, modes, changes, wanted, weights, states, costs, sequence, best, count, f, a, work, y,
+    slopes,
+):  # fmt: skip
     """The sequence of modes with the least sum of weights (y - wanted)^2 and of the costs of changes of mode.
 
     rates, measured  addresses of the functions of AugmentedRates

@@ -3,8 +3,6 @@
 numba copies a part into the kernel that calls it, which so remains one function, whose machine code can be stored.
 """
 
-from typing import Any
-
 import numba
 from llvmlite import ir
 from numba import types
@@ -14,11 +12,11 @@ from numba.np import arrayobj
 
 
 @intrinsic
-def invoke(typing_context: Any, address: Any, arguments: Any) -> Any:
+def invoke(typing_context, address, arguments):
     """Call the function at `address`, which returns nothing, with addresses and floats."""
     signature = types.void(types.intp, arguments)
 
-    def generate(context: Any, builder: Any, sig: Any, values: Any) -> Any:
+    def generate(context, builder, sig, values):
         items = [builder.extract_value(values[1], i) for i in range(len(arguments))]
         kind = ir.FunctionType(ir.VoidType(), [item.type for item in items])
         builder.call(builder.inttoptr(values[0], kind.as_pointer()), items)
@@ -28,11 +26,11 @@ def invoke(typing_context: Any, address: Any, arguments: Any) -> Any:
 
 
 @intrinsic
-def pointer(typing_context: Any, array: Any) -> Any:
+def pointer(typing_context, array):
     """The address of an array's first element."""
     signature = types.intp(array)
 
-    def generate(context: Any, builder: Any, sig: Any, values: Any) -> Any:
+    def generate(context, builder, sig, values):
         data = context.make_array(sig.args[0])(context, builder, values[0]).data
         return builder.ptrtoint(data, ir.IntType(64))
 
@@ -40,11 +38,11 @@ def pointer(typing_context: Any, array: Any) -> Any:
 
 
 @intrinsic
-def as_vector(typing_context: Any, table: Any) -> Any:
+def as_vector(typing_context, table):
     """The numbers of a C-contiguous table as one vector that shares its memory."""
     vector = types.Array(table.dtype, 1, "C")
 
-    def generate(context: Any, builder: Any, sig: Any, values: Any) -> Any:
+    def generate(context, builder, sig, values):
         given = context.make_array(sig.args[0])(context, builder, values[0])
         flat = context.make_array(vector)(context, builder)
         shape, strides = (cgutils.pack_array(builder, [each]) for each in (given.nitems, given.itemsize))
@@ -55,11 +53,11 @@ def as_vector(typing_context: Any, table: Any) -> Any:
 
 
 @intrinsic
-def call_kernel(typing_context: Any, address: Any, slots: Any) -> Any:
+def call_kernel(typing_context, address, slots):
     """Call the entry point of a compiled kernel at `address` with the address of its slots; its status."""
     signature = types.int64(types.intp, types.intp)
 
-    def generate(context: Any, builder: Any, sig: Any, values: Any) -> Any:
+    def generate(context, builder, sig, values):
         word = ir.IntType(64)
         return builder.call(builder.inttoptr(values[0], ir.FunctionType(word, [word]).as_pointer()), [values[1]])
 

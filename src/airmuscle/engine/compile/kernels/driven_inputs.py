@@ -3,8 +3,6 @@
 A signal of an input is an array (3, capacity): end, value at the start, and slope of each segment.
 """
 
-from typing import Any
-
 from ..kernel_layout import DriverKind, Progress
 from .calls import PART
 from .drivers import delayed_switch, pulse_width_modulation
@@ -14,14 +12,14 @@ SEGMENTS, ROWS = int(Progress.SEGMENTS), int(Progress.ROWS)
 
 
 @PART
-def is_full(progress: Any, columns: Any, wanted: Any, new_ends: Any, times: Any) -> Any:
+def is_full(progress, columns, wanted, new_ends, times):
     """Whether the buffers have no room for the segments and rows that drivers may add in an interval."""
     room = columns.shape[2] * columns.shape[0]
     return progress[SEGMENTS] + room > new_ends.shape[0] or progress[ROWS] + room + wanted > times.shape[0]
 
 
 @PART
-def load_columns(ends: Any, values: Any, slopes: Any, first: Any, pieces: Any, columns: Any, counts: Any) -> None:
+def load_columns(ends, values, slopes, first, pieces, columns, counts):
     """Copy the segments of an interval to the signals of the inputs."""
     for i in range(columns.shape[0]):
         counts[0, i] = pieces
@@ -32,7 +30,7 @@ def load_columns(ends: Any, values: Any, slopes: Any, first: Any, pieces: Any, c
 
 
 @PART
-def find_piece(ends: Any, last: Any, piece: Any, time: Any) -> Any:
+def find_piece(ends, last, piece, time):
     """The number of the segment in which a time lies, from `piece` to `last`; where two meet, the later one."""
     while piece < last and ends[piece] <= time:
         piece += 1
@@ -40,9 +38,7 @@ def find_piece(ends: Any, last: Any, piece: Any, time: Any) -> Any:
 
 
 @PART
-def setpoints_at(
-    ends: Any, setpoint_values: Any, setpoint_slopes: Any, last: Any, start: Any, piece: Any, time: Any, setpoint: Any
-) -> Any:  # fmt: skip
+def setpoints_at(ends, setpoint_values, setpoint_slopes, last, start, piece, time, setpoint):
     """Write the set points at a time, of a signal that begins at `start`; the number of its segment."""
     piece = find_piece(ends, last, piece, time)
     begin = ends[piece - 1] if piece > 0 else start
@@ -52,10 +48,7 @@ def setpoints_at(
 
 
 @PART
-def cut_segments(
-    ends: Any, given_values: Any, given_slopes: Any, last: Any, start: Any, piece: Any, begin: Any, end: Any,
-    command: Any, commanded: Any, columns: Any,
-) -> Any:  # fmt: skip
+def cut_segments(ends, given_values, given_slopes, last, start, piece, begin, end, command, commanded, columns):
     """Write the signals of the inputs from `begin` to `end`; commands are held.
 
     Returns the number of the segment at the end, and how many segments each signal has.
@@ -82,9 +75,7 @@ def cut_segments(
 
 
 @PART
-def apply_drivers(
-    kinds: Any, settings: Any, states: Any, later: Any, columns: Any, counts: Any, scratch: Any, start: Any, ulp: Any
-) -> None:
+def apply_drivers(kinds, settings, states, later, columns, counts, scratch, start, ulp):
     """Pass the signals of inputs, columns (m, 3, capacity) with their counts (m,), through their drivers (D,).
 
     kinds (D, 2)  input and kind of each driver, in the order of the signal
@@ -109,9 +100,7 @@ def apply_drivers(
 
 
 @PART
-def merge_columns(
-    columns: Any, counts: Any, at: Any, begins: Any, start: Any, ends: Any, values: Any, slopes: Any, first: Any
-) -> Any:
+def merge_columns(columns, counts, at, begins, start, ends, values, slopes, first):
     """Write the signals of all inputs as common segments from number `first` on; how many there are.
 
     at (m,), begins (m,)  workspace: the present segment of each input and its start
@@ -140,9 +129,7 @@ def merge_columns(
 
 
 @PART
-def merge_times(
-    grid: Any, begin: Any, end: Any, instants: Any, first: Any, count: Any, close: Any, times: Any, row: Any
-) -> Any:
+def merge_times(grid, begin, end, instants, first, count, close, times, row):
     """Write the rows `begin` to `end` of a grid and the instants in rising order from `row` on; how many there are.
 
     A row of the grid within `close` of an instant is replaced by it.
@@ -166,9 +153,9 @@ def merge_times(
 
 @PART
 def merge_inputs(
-    columns: Any, counts: Any, begins: Any, begin: Any, new_ends: Any, new_values: Any, new_slopes: Any,
-    at_segment: Any, grid: Any, grid_begin: Any, grid_end: Any, close: Any, times: Any, at_row: Any,
-) -> Any:  # fmt: skip
+    columns, counts, begins, begin, new_ends, new_values, new_slopes, at_segment, grid, grid_begin, grid_end, close,
+    times, at_row,
+):  # fmt: skip
     """Merge the signals of an interval behind the drivers; the numbers of segments and of output times that result."""
     driven = merge_columns(columns, counts[0], counts[1], begins, begin, new_ends, new_values, new_slopes, at_segment)
     instants = driven if driven > 1 else 0

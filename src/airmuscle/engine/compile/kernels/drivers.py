@@ -4,8 +4,6 @@
 signal is an array (3, capacity): end, value at the start, and slope of each segment; `count` of them are used.
 """
 
-from typing import Any
-
 import numpy as np
 
 from .calls import PART
@@ -18,7 +16,7 @@ ARRIVED = 1e-12
 
 
 @PART
-def end_of_pulse(time: Any, duty: Any, period: Any, smallest: Any) -> Any:
+def end_of_pulse(time, duty, period, smallest):
     """The end of the pulse of a period that begins at `time`: -infinity without a pulse, infinity without a gap."""
     width = period * min(max(duty, 0.0), 1.0)
     end = time + width
@@ -30,7 +28,7 @@ def end_of_pulse(time: Any, duty: Any, period: Any, smallest: Any) -> Any:
 
 
 @PART
-def hold_levels(result: Any, levels: Any, end: Any) -> None:
+def hold_levels(result, levels, end):
     """Turn instants at which levels begin into ends of segments without slope."""
     for i in range(levels):
         result[0, i] = result[0, i + 1] if i + 1 < levels else end
@@ -38,9 +36,7 @@ def hold_levels(result: Any, levels: Any, end: Any) -> None:
 
 
 @PART
-def pulse_width_modulation(
-    settings: Any, state: Any, later: Any, signal: Any, count: Any, start: Any, ulp: Any, result: Any
-) -> Any:
+def pulse_width_modulation(settings, state, later, signal, count, start, ulp, result):
     """Modulate a signal from `start`; the number of segments of the result.
 
     settings  frequency, smallest pulse
@@ -86,7 +82,7 @@ def pulse_width_modulation(
 
 
 @PART
-def find_switchings(signal: Any, count: Any, start: Any, coil: Any, events: Any) -> Any:
+def find_switchings(signal, count, start, coil, events):
     """Write the instants at which a signal passes the threshold, and the new coil states; how many there are."""
     switchings, present, begin = 0, coil, start
     for k in range(count):
@@ -107,7 +103,7 @@ def find_switchings(signal: Any, count: Any, start: Any, coil: Any, events: Any)
 
 
 @PART
-def move_towards(target: Any, opening: Any, edge: Any, stop: Any, settings: Any, result: Any, segments: Any) -> Any:
+def move_towards(target, opening, edge, stop, settings, result, segments):
     """Write the motion of the opening from `edge` to `stop`, and the rest after it; the opening, and the segments."""
     after, arrival = target, edge
     if target != opening:
@@ -130,9 +126,7 @@ def move_towards(target: Any, opening: Any, edge: Any, stop: Any, settings: Any,
 
 
 @PART
-def delayed_switch(
-    settings: Any, state: Any, later: Any, signal: Any, count: Any, start: Any, events: Any, result: Any
-) -> Any:
+def delayed_switch(settings, state, later, signal, count, start, events, result):
     """Opening of a switch that follows a signal from `start`; the number of segments of the result.
 
     settings  opening delay, closing delay, opening ramp, closing ramp

@@ -1,21 +1,19 @@
 """Kernels that evaluate compiled functions: at rows, at many plants, around a step taken by hand, for a recording."""
 
-from typing import Any
-
 import numba
 
 from .calls import CONTRACTED_PART, PART, as_vector, invoke, pointer
 
 
 @numba.njit(error_model="numpy", nogil=True)
-def evaluate(function: Any, c: Any, states: Any, inputs: Any, results: Any) -> None:
+def evaluate(function, c, states, inputs, results):
     """Fill results (N, k) with function(x, u, c, o) at states (N, n) and inputs (N, m), all C-contiguous."""
     for row in range(states.shape[0]):
         invoke(function, (pointer(states[row]), pointer(inputs[row]), pointer(c), pointer(results[row])))
 
 
 @numba.njit(error_model="numpy", nogil=True)
-def evaluate_rates(function: Any, precomputed: Any, inputs: Any, states: Any, rates: Any) -> None:
+def evaluate_rates(function, precomputed, inputs, states, rates):
     """Fill rates (N, K, n) with function(x, u, c, f) at K states (N, K, n) of each of N plants, all C-contiguous.
 
     precomputed (N, c) is what the function needs of each plant's parameters, inputs (m,) are the same for all.
@@ -27,7 +25,7 @@ def evaluate_rates(function: Any, precomputed: Any, inputs: Any, states: Any, ra
 
 
 @numba.njit(error_model="numpy", nogil=True)
-def begin_step(given: Any, lower: Any, upper: Any, state: Any, start: Any) -> Any:
+def begin_step(given, lower, upper, state, start):
     """Copy the state (n,) into `start`; 1 + the index of the first of the inputs `given` (m,) that is not a number
     within its limits, 0 where all are within."""
     for i in range(state.shape[0]):
@@ -39,10 +37,7 @@ def begin_step(given: Any, lower: Any, upper: Any, state: Any, start: Any) -> An
 
 
 @numba.njit(error_model="numpy", nogil=True)
-def end_step(
-    function: Any, c: Any, end: Any, given: Any, values: Any, lower: Any, upper: Any, low: Any, high: Any,
-    state: Any, inputs: Any, outputs: Any, always: Any,
-) -> Any:  # fmt: skip
+def end_step(function, c, end, given, values, lower, upper, low, high, state, inputs, outputs, always):
     """Compute values (k,) by function(x, u, c, o) at `end` (n,) under `given` (m,), and compare with the limits.
 
     lower, upper  (n,): limits of the states; low, high (k,): limits of the outputs
@@ -68,7 +63,7 @@ def end_step(
 
 
 @PART
-def _find_range(table: Any, column: Any, lower: Any, upper: Any, place: Any) -> None:
+def _find_range(table, column, lower, upper, place):
     """Smallest and largest value of a column of a table (N, k), into `place`; one that is not a number is passed over.
 
     Four rows at a time, because a comparison waits for the one before it.
@@ -90,7 +85,7 @@ def _find_range(table: Any, column: Any, lower: Any, upper: Any, place: Any) -> 
 
 
 @PART
-def _is_finite(table: Any) -> Any:
+def _is_finite(table):
     """Whether all values of a table are finite; read as one vector, because rows are short."""
     values, defects = as_vector(table), 0
     for i in range(values.size):
@@ -99,7 +94,7 @@ def _is_finite(table: Any) -> Any:
 
 
 @PART
-def _rows_before(times: Any, row: Any, end: Any) -> Any:
+def _rows_before(times, row, end):
     """The first row from `row` on that is not before `end`, found in growing and then in shrinking strides."""
     count, stride = times.shape[0], 1
     if row >= count or times[row] >= end:
@@ -115,7 +110,7 @@ def _rows_before(times: Any, row: Any, end: Any) -> Any:
 
 
 @PART
-def _evaluate(function: Any, c: Any, states: Any, inputs: Any, outputs: Any, x: Any, u: Any, o: Any) -> None:
+def _evaluate(function, c, states, inputs, outputs, x, u, o):
     """Outputs (N, k) at states (N, n) and inputs (N, m), W rows at once; x, u, o (W, ...) hold the last block."""
     width, count, rest = x.shape[0], states.shape[0], 0
     while rest + width <= count:
@@ -135,10 +130,7 @@ def _evaluate(function: Any, c: Any, states: Any, inputs: Any, outputs: Any, x: 
 
 
 @numba.njit(error_model="numpy", nogil=True)
-def record(
-    function: Any, c: Any, states: Any, times: Any, begin: Any, ends: Any, values: Any, slopes: Any,
-    inputs: Any, outputs: Any, columns: Any, lower: Any, upper: Any, x: Any, u: Any, o: Any,
-) -> Any:  # fmt: skip
+def record(function, c, states, times, begin, ends, values, slopes, inputs, outputs, columns, lower, upper, x, u, o):
     """Fill inputs (N, m) and outputs (N, k) at states (N, n) and rising times (N,); the first row that is not finite.
 
     function(x, u, c, o)  address of the outputs at W rows: `outputs` of a program, or its `row_outputs`
@@ -178,14 +170,14 @@ def record(
 
 
 @CONTRACTED_PART
-def set_inputs(base: Any, elapsed: Any, w: Any, u: Any) -> None:
+def set_inputs(base, elapsed, w, u):
     """The inputs `u` so long after the start of a segment, where they were `base`; they move at `w`."""
     for i in range(u.shape[0]):
         u[i] = base[i] + elapsed * w[i]
 
 
 @CONTRACTED_PART
-def write_present(times: Any, row: Any, t: Any, y: Any, rows: Any) -> Any:
+def write_present(times, row, t, y, rows):
     """Write the present states at the output times up to `t`; the next row."""
     while row < times.shape[0] and times[row] <= t:
         for i in range(y.shape[0]):

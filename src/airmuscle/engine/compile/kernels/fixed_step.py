@@ -5,8 +5,6 @@ not depend on the output times. The run calls a step that is printed whole; `sin
 rates stage by stage, because exported programs print them.
 """
 
-from typing import Any
-
 import numba
 import numpy as np
 
@@ -18,13 +16,13 @@ DONE, PAUSED, NOT_FINITE = Status.DONE.value, Status.PAUSED.value, Status.NOT_FI
 
 
 @CONTRACTED_PART
-def count_steps(start: Any, end: Any, length: Any) -> Any:
+def count_steps(start, end, length):
     """The number of steps of a segment, of which the last may be shorter."""
     return np.ceil((end - start) / length - 1e-6)
 
 
 @CONTRACTED_PART
-def plan_step(start: Any, end: Any, t: Any, length: Any, done: Any, total: Any) -> Any:
+def plan_step(start, end, t, length, done, total):
     """The end and the length of the step from `t` after `done` of the steps of a segment; the last one meets `end`."""
     last = done + 1 >= total
     reached = end if last else start + (done + 1) * length
@@ -33,10 +31,7 @@ def plan_step(start: Any, end: Any, t: Any, length: Any, done: Any, total: Any) 
 
 
 @CONTRACTED_PART
-def explicit_step(
-    rhs: Any, c: Any, nodes: Any, table: Any, weights: Any, y: Any, base: Any, w: Any, elapsed: Any, h: Any,
-    u: Any, x: Any, k: Any, yn: Any,
-) -> None:  # fmt: skip
+def explicit_step(rhs, c, nodes, table, weights, y, base, w, elapsed, h, u, x, k, yn):
     """A step of an explicit Runge-Kutta method with rates that are called stage by stage, from `y` to `yn`.
 
     nodes (s,), table (s, s), weights (s,)  the tableau of the method
@@ -64,7 +59,7 @@ def explicit_step(
 
 
 @CONTRACTED_PART
-def take(yn: Any, y: Any) -> Any:
+def take(yn, y):
     """Copy the new states to `y`; the sum of their sizes."""
     total_size = 0.0
     for i in range(y.shape[0]):
@@ -74,10 +69,7 @@ def take(yn: Any, y: Any) -> Any:
 
 
 @CONTRACTED_PART
-def single_step(
-    rhs: Any, c: Any, nodes: Any, table: Any, weights: Any, y: Any, base: Any, w: Any, t: Any, start: Any, end: Any,
-    h: Any, done: Any, u: Any, x: Any, k: Any, yn: Any,
-) -> Any:  # fmt: skip
+def single_step(rhs, c, nodes, table, weights, y, base, w, t, start, end, h, done, u, x, k, yn):
     """A step from `y` at `t` to `yn`, after `done` steps of length `h` in this segment.
 
     Returns a status, the time reached, the step, the next step, and the number of rejected steps.
@@ -92,18 +84,13 @@ def single_step(
 
 
 @CONTRACTED_PART
-def state_between(
-    rhs: Any, c: Any, nodes: Any, table: Any, weights: Any, y: Any, base: Any, w: Any, start: Any, t: Any, time: Any,
-    u: Any, x: Any, k: Any, between: Any,
-) -> None:  # fmt: skip
+def state_between(rhs, c, nodes, table, weights, y, base, w, start, t, time, u, x, k, between):
     """The states at a time within the step from `y` at `t`, by a step of its own."""
     explicit_step(rhs, c, nodes, table, weights, y, base, w, t - start, time - t, u, x, k, between)
 
 
 @CONTRACTED_PART
-def write_between(
-    step: Any, y: Any, u: Any, c: Any, w: Any, new: Any, times: Any, row: Any, limit: Any, t: Any, rows: Any
-) -> Any:  # fmt: skip
+def write_between(step, y, u, c, w, new, times, row, limit, t, rows):
     """Write the states at the output times before `limit`, each reached by a step of its own; the next row."""
     while row < times.shape[0] and times[row] < limit:
         invoke(step, (pointer(y), pointer(u), pointer(c), pointer(w), times[row] - t, pointer(new)))
@@ -114,10 +101,7 @@ def write_between(
 
 
 @numba.njit(error_model="numpy", fastmath={"contract", "reassoc"}, nogil=True)
-def fixed_step(
-    step: Any, c: Any, y: Any, ends: Any, values: Any, slopes: Any, times: Any, rows: Any,
-    length: Any, clock: Any, count: Any, budget: Any, work: Any,
-) -> Any:  # fmt: skip
+def fixed_step(step, c, y, ends, values, slopes, times, rows, length, clock, count, budget, work):
     """Advance `y` (n,) through the segments by steps of `length`, and write the states at `times` into `rows`.
 
     step(x, u, c, w, h, y)  address of the printed step; `c` what it needs of the parameters

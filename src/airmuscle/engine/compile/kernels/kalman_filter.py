@@ -1,22 +1,18 @@
 """Extended and unscented Kalman filters: prediction of the state with its covariance, correction by measurements."""
 
 from math import sqrt
-from typing import Any
 
 import numba
 
 from ....core import Status
 from .calls import PART, invoke, pointer
-from .matrices import cholesky, exponential_step, multiply, solve_row
+from .matrices import cholesky, exponential_step, multiply, solve_factor
 
 DONE, SINGULAR, NOT_FINITE = Status.DONE.value, Status.SINGULAR.value, Status.NOT_FINITE.value
 
 
 @numba.njit(error_model="numpy", fastmath={"contract", "reassoc"}, nogil=True)
-def predict_extended(
-    rates: Any, c: Any, sizes: Any, h: Any, noise: Any, x: Any, u: Any, covariance: Any, transition: Any, f: Any,
-    a: Any, work: Any, product: Any,
-) -> Any:  # fmt: skip
+def predict_extended(rates, c, sizes, h, noise, x, u, covariance, transition, f, a, work, product):
     """Mean `x` (N,) and `covariance` (N, N) one sample later, in place, and `transition` (N, N).
 
     sizes   (N,) magnitudes of the states
@@ -47,7 +43,7 @@ def predict_extended(
 
 
 @PART
-def update_covariance(rest: Any, product: Any, gain: Any, noise: Any, covariance: Any) -> None:
+def update_covariance(rest, product, gain, noise, covariance):
     """The covariance after a measurement in Joseph's form: rest P rest^T + gain R gain^T; product = rest P."""
     total, p = gain.shape
     for i in range(total):
@@ -62,7 +58,7 @@ def update_covariance(rest: Any, product: Any, gain: Any, noise: Any, covariance
 
 
 @PART
-def apply_gain(gain: Any, difference: Any, x: Any) -> None:
+def apply_gain(gain, difference, x):
     """Add gain (N, p) times the innovation to the states."""
     for i in range(x.shape[0]):
         for k in range(difference.shape[0]):
@@ -71,9 +67,8 @@ def apply_gain(gain: Any, difference: Any, x: Any) -> None:
 
 @numba.njit(error_model="numpy", nogil=True)
 def correct_extended(
-    measured: Any, constants: Any, noise: Any, x: Any, u: Any, covariance: Any, values: Any, difference: Any, s: Any,
-    factor: Any, c: Any, gain: Any, rest: Any, product: Any,
-) -> Any:  # fmt: skip
+    measured, constants, noise, x, u, covariance, values, difference, s, factor, c, gain, rest, product,
+):  # fmt: skip
     """Mean `x` (N,) and `covariance` (N, N) after a measurement `values` (p,), in place.
 
     measured(x, u, c, y, C)  its address
@@ -92,7 +87,7 @@ def correct_extended(
     if cholesky(s, factor) != DONE:
         return SINGULAR
     for k in range(total):
-        solve_row(factor, gain[k])
+        solve_factor(factor, p, gain[k])
     for i in range(total):
         for j in range(total):
             value = 1.0 if i == j else 0.0
@@ -106,7 +101,7 @@ def correct_extended(
 
 
 @PART
-def sigma_points(x: Any, covariance: Any, spread: Any, points: Any, root: Any) -> None:
+def sigma_points(x, covariance, spread, points, root):
     """`points` (2 N + 1, N): x, then x +- spread times the columns of a Cholesky factor of the covariance.
 
     A state without variance gets a column of zeros; root (N, N) is workspace.
@@ -132,7 +127,7 @@ def sigma_points(x: Any, covariance: Any, spread: Any, points: Any, root: Any) -
 
 
 @PART
-def weighted_mean(points: Any, weights: Any, mean: Any) -> None:
+def weighted_mean(points, weights, mean):
     """The mean (N,) of points (2 N + 1, N)."""
     for i in range(mean.shape[0]):
         value = weights[0] * points[0, i]
@@ -142,9 +137,7 @@ def weighted_mean(points: Any, weights: Any, mean: Any) -> None:
 
 
 @PART
-def covariances_of_measurement(
-    points: Any, y: Any, x: Any, mean: Any, weights: Any, noise: Any, s: Any, cross: Any
-) -> None:
+def covariances_of_measurement(points, y, x, mean, weights, noise, s, cross):
     """Covariance `s` (p, p) of the measurement, and `cross` (N, p) of states and measurement."""
     for j in range(mean.shape[0]):
         for i in range(mean.shape[0]):
@@ -162,10 +155,7 @@ def covariances_of_measurement(
 
 
 @numba.njit(error_model="numpy", fastmath={"contract", "reassoc"}, nogil=True)
-def predict_unscented(
-    rates: Any, c: Any, sizes: Any, h: Any, spread: Any, weights: Any, noise: Any, x: Any, u: Any, covariance: Any,
-    points: Any, root: Any, f: Any, a: Any, work: Any,
-) -> Any:  # fmt: skip
+def predict_unscented(rates, c, sizes, h, spread, weights, noise, x, u, covariance, points, root, f, a, work):
     """Mean `x` (N,) and `covariance` (N, N) one sample later, in place.
 
     sizes    (N,) magnitudes of the states
@@ -194,9 +184,9 @@ def predict_unscented(
 
 @numba.njit(error_model="numpy", nogil=True)
 def correct_unscented(
-    measured: Any, constants: Any, spread: Any, weights: Any, noise: Any, x: Any, u: Any, covariance: Any, values: Any,
-    difference: Any, s: Any, factor: Any, points: Any, root: Any, y: Any, c: Any, gain: Any, cross: Any,
-) -> Any:  # fmt: skip
+    measured, constants, spread, weights, noise, x, u, covariance, values, difference, s, factor, points, root, y, c,
+    gain, cross,
+):  # fmt: skip
     """Mean `x` (N,) and `covariance` (N, N) after a measurement `values` (p,), in place.
 
     noise                    (p,) variances of the measurement
@@ -215,7 +205,7 @@ def correct_unscented(
     if cholesky(s, factor) != DONE:
         return SINGULAR
     for i in range(total):
-        solve_row(factor, gain[i])
+        solve_factor(factor, p, gain[i])
     for i in range(p):
         difference[i] = values[i] - difference[i]
     for i in range(total):

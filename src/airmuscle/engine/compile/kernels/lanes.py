@@ -6,8 +6,6 @@ has its own length of step, and one that waits has the length zero; where all ma
 without a look at the clock. So the result of a lane does not depend on its neighbours.
 """
 
-from typing import Any
-
 import numba
 import numpy as np
 
@@ -20,10 +18,7 @@ MAX_UNINTERRUPTED = 10_000
 
 
 @PART
-def begin_segments(
-    segment: Any, first: Any, last: Any, ended: Any, total: Any, start: Any, begin: Any, length: Any,
-    ends: Any, values: Any, slopes: Any, base: Any, w: Any, u: Any,
-) -> Any:  # fmt: skip
+def begin_segments(segment, first, last, ended, total, start, begin, length, ends, values, slopes, base, w, u):
     """Set steps and inputs of the present segment of each lane; whether an input changes within one."""
     moving = False
     for lane in range(segment.shape[0]):
@@ -43,7 +38,7 @@ def begin_segments(
 
 
 @PART
-def set_inputs(base: Any, w: Any, done: Any, further: Any, length: Any, u: Any) -> None:
+def set_inputs(base, w, done, further, length, u):
     """The inputs of each lane after its steps and so many further ones."""
     for i in range(base.shape[0]):
         for lane in range(done.shape[0]):
@@ -51,7 +46,7 @@ def set_inputs(base: Any, w: Any, done: Any, further: Any, length: Any, u: Any) 
 
 
 @PART
-def count_common_steps(ended: Any, total: Any, done: Any, start: Any, instant: Any, length: Any) -> Any:
+def count_common_steps(ended, total, done, start, instant, length):
     """The number of full steps that every lane may take at once before the next row."""
     common = float(MAX_UNINTERRUPTED)
     for lane in range(ended.shape[0]):
@@ -62,10 +57,7 @@ def count_common_steps(ended: Any, total: Any, done: Any, start: Any, instant: A
 
 
 @PART
-def take_common_steps(
-    step: Any, at: Any, common: Any, moving: Any, base: Any, w: Any, u: Any, h: Any, length: Any, done: Any,
-    y: Any, other: Any,
-) -> None:  # fmt: skip
+def take_common_steps(step, at, common, moving, base, w, u, h, length, done, y, other):
     """Advance all lanes by so many full steps; at  (y, u, c, w, h, other): addresses."""
     at_y, at_u, at_c, at_w, at_h, at_other = at
     n, width = y.shape
@@ -85,9 +77,7 @@ def take_common_steps(
 
 
 @PART
-def choose_single_steps(
-    ended: Any, segment: Any, ends: Any, done: Any, total: Any, start: Any, instant: Any, length: Any, h: Any
-) -> Any:
+def choose_single_steps(ended, segment, ends, done, total, start, instant, length, h):
     """Set the next step of each lane, zero for one that waits; whether a lane steps."""
     any_steps = False
     for lane in range(ended.shape[0]):
@@ -104,7 +94,7 @@ def choose_single_steps(
 
 
 @PART
-def finish_single_steps(h: Any, other: Any, y: Any, done: Any, total: Any, start: Any, ends: Any, segment: Any) -> Any:
+def finish_single_steps(h, other, y, done, total, start, ends, segment):
     """Take over the states of the lanes that stepped; whether a lane begins another segment."""
     entered = False
     for lane in range(y.shape[1]):
@@ -122,10 +112,9 @@ def finish_single_steps(h: Any, other: Any, y: Any, done: Any, total: Any, start
 
 @PART
 def advance_lanes(
-    step: Any, at: Any, instant: Any, moving: Any, entered: Any, stop: Any, segment: Any, first: Any, last: Any,
-    ended: Any, total: Any, done: Any, start: Any, begin: Any, length: Any, ends: Any, values: Any, slopes: Any,
-    base: Any, w: Any, u: Any, h: Any, y: Any, other: Any,
-) -> Any:  # fmt: skip
+    step, at, instant, moving, entered, stop, segment, first, last, ended, total, done, start, begin, length, ends,
+    values, slopes, base, w, u, h, y, other,
+):  # fmt: skip
     """Take the steps of all lanes that end before an instant.
 
     Returns DONE or INTERRUPTED, whether an input changes within a segment, and whether a lane begins another segment.
@@ -154,7 +143,7 @@ def advance_lanes(
 
 
 @PART
-def choose_steps_to_row(ended: Any, start: Any, done: Any, instant: Any, length: Any, h: Any) -> Any:
+def choose_steps_to_row(ended, start, done, instant, length, h):
     """Set the step of each lane to the instant of a row; whether a lane needs one."""
     between = False
     for lane in range(ended.shape[0]):
@@ -167,7 +156,7 @@ def choose_steps_to_row(ended: Any, start: Any, done: Any, instant: Any, length:
 
 
 @PART
-def keep_others(h: Any, y: Any, other: Any) -> None:
+def keep_others(h, y, other):
     """Copy the states of the lanes that did not step."""
     for lane in range(y.shape[1]):
         if h[0, lane] == 0.0:
@@ -176,7 +165,7 @@ def keep_others(h: Any, y: Any, other: Any) -> None:
 
 
 @PART
-def set_inputs_at(instant: Any, base: Any, w: Any, start: Any, u: Any) -> None:
+def set_inputs_at(instant, base, w, start, u):
     """The inputs of each lane at an instant."""
     for i in range(base.shape[0]):
         for lane in range(start.shape[0]):
@@ -184,7 +173,7 @@ def set_inputs_at(instant: Any, base: Any, w: Any, start: Any, u: Any) -> None:
 
 
 @PART
-def write_columns(chosen: Any, row: Any, states: Any, o: Any, u: Any, rows: Any) -> None:
+def write_columns(chosen, row, states, o, u, rows):
     """Write the chosen states, outputs and inputs of all lanes to a row."""
     n, k = states.shape[0], o.shape[0]
     for j in range(chosen.shape[0]):
@@ -199,7 +188,7 @@ def write_columns(chosen: Any, row: Any, states: Any, o: Any, u: Any, rows: Any)
 
 
 @PART
-def finish(y: Any, final: Any, status: Any) -> None:
+def finish(y, final, status):
     """The final states and the status of each lane."""
     n, width = y.shape
     for lane in range(width):
@@ -212,11 +201,9 @@ def finish(y: Any, final: Any, status: Any) -> None:
 
 @numba.njit(error_model="numpy", nogil=True)
 def lanes(
-    prepare: Any, step: Any, outputs: Any, p: Any, c: Any, y: Any, other: Any, u: Any, base: Any, w: Any, h: Any,
-    o: Any, ends: Any, values: Any, slopes: Any, first: Any, last: Any, begin: Any, length: Any, times: Any,
-    chosen: Any, rows: Any, final: Any, status: Any, stop: Any,
-    segment: Any, ended: Any, done: Any, total: Any, start: Any,
-) -> Any:  # fmt: skip
+    prepare, step, outputs, p, c, y, other, u, base, w, h, o, ends, values, slopes, first, last, begin, length, times,
+    chosen, rows, final, status, stop, segment, ended, done, total, start,
+):  # fmt: skip
     """Integrate the states `y` (n, W) of W systems from `begin` through their segments; DONE or INTERRUPTED.
 
     prepare(p, c), step(x, u, c, w, h, y), outputs(x, u, c, o)  addresses of the printed functions, W lanes each
@@ -267,9 +254,7 @@ def lanes(
 
 
 @numba.njit(error_model="numpy", nogil=True)
-def lane_blocks(
-    step: Any, outputs: Any, x: Any, u: Any, c: Any, w: Any, h: Any, other: Any, o: Any, span: Any, steps: Any
-) -> Any:
+def lane_blocks(step, outputs, x, u, c, w, h, other, o, span, steps):
     """Advance the blocks span[0] .. span[1] - 1 by steps[0] steps, then compute their outputs.
 
     step(x, u, c, w, h, y), outputs(x, u, c, o)  addresses of the printed functions, W lanes each

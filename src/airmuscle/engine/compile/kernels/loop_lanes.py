@@ -5,8 +5,6 @@ instant to the next, the last step of each segment shortened so that its end is 
 by a step of their own.
 """
 
-from typing import Any
-
 import numba
 import numpy as np
 
@@ -19,7 +17,7 @@ LARGEST = 1.7976931348623157e308
 
 
 @PART
-def measure_lanes(y: Any, o: Any, measured_at: Any, measured: Any, k: Any, samples: Any, status: Any) -> None:
+def measure_lanes(y, o, measured_at, measured, k, samples, status):
     """Write the measured columns of all lanes, also among the samples; a lane without a number fails."""
     n = y.shape[0]
     for i in range(measured_at.shape[0]):
@@ -33,7 +31,7 @@ def measure_lanes(y: Any, o: Any, measured_at: Any, measured: Any, k: Any, sampl
 
 
 @PART
-def copy_table(source: Any, target: Any) -> None:
+def copy_table(source, target):
     """Copy a table of its size; an assignment of slices would need numba at run time."""
     for i in range(target.shape[0]):
         for lane in range(target.shape[1]):
@@ -41,9 +39,7 @@ def copy_table(source: Any, target: Any) -> None:
 
 
 @PART
-def command_lanes(
-    command: Any, low: Any, high: Any, commanded_at: Any, k: Any, first: Any, values: Any, commands: Any, status: Any
-) -> None:
+def command_lanes(command, low, high, commanded_at, k, first, values, commands, status):
     """Limit the commands of all lanes, and write them into the segments of interval `k`; NaN fails its lane."""
     for i in range(command.shape[0]):
         at = commanded_at[i]
@@ -59,7 +55,7 @@ def command_lanes(
 
 
 @PART
-def set_lane_inputs(values: Any, slopes: Any, s: Any, ahead: Any, u: Any) -> None:
+def set_lane_inputs(values, slopes, s, ahead, u):
     """The inputs of all lanes so long after the start of segment `s`."""
     for i in range(u.shape[0]):
         for lane in range(u.shape[1]):
@@ -67,7 +63,7 @@ def set_lane_inputs(values: Any, slopes: Any, s: Any, ahead: Any, u: Any) -> Non
 
 
 @PART
-def check_lanes(y: Any, bounds: Any, status: Any) -> None:
+def check_lanes(y, bounds, status):
     """Fail the lanes whose states are no numbers, or below their bounds."""
     for lane in range(y.shape[1]):
         size, below = 0.0, False
@@ -79,10 +75,7 @@ def check_lanes(y: Any, bounds: Any, status: Any) -> None:
 
 
 @PART
-def write_row(
-    outputs: Any, chosen: Any, row: Any, s: Any, ahead: Any, values: Any, slopes: Any, c: Any, states: Any, base: Any,
-    o: Any, rows: Any, bounds: Any, status: Any,
-) -> None:  # fmt: skip
+def write_row(outputs, chosen, row, s, ahead, values, slopes, c, states, base, o, rows, bounds, status):
     """Write the chosen states, outputs and inputs of all lanes at a row, so long after the start of its segment."""
     n, k = states.shape[0], o.shape[0]
     check_lanes(states, bounds, status)
@@ -96,19 +89,10 @@ def write_row(
 
 
 @PART
-def keep_states(new: Any, y: Any) -> None:
-    """Copy the new states of all lanes to `y`."""
-    for i in range(y.shape[0]):
-        for lane in range(y.shape[1]):
-            y[i, lane] = new[i, lane]
-
-
-@PART
 def advance_segment(
-    step: Any, outputs: Any, s: Any, start: Any, end: Any, length: Any, values: Any, slopes: Any, c: Any, y: Any,
-    other: Any, u: Any, base: Any, w: Any, h: Any, o: Any, times: Any, row: Any, row_segment: Any, starts: Any,
-    chosen: Any, rows: Any, bounds: Any, status: Any,
-) -> Any:  # fmt: skip
+    step, outputs, s, start, end, length, values, slopes, c, y, other, u, base, w, h, o, times, row, row_segment,
+    starts, chosen, rows, bounds, status,
+):  # fmt: skip
     """Take the steps of segment `s`, and write the rows before its end; the next row."""
     for i in range(w.shape[0]):
         for lane in range(w.shape[1]):
@@ -132,7 +116,7 @@ def advance_segment(
         set_lane_inputs(values, slopes, s, t - start, u)
         h[0, :] = end - t if closing else length
         invoke(step, (pointer(y), pointer(u), pointer(c), pointer(w), pointer(h), pointer(other)))
-        keep_states(other, y)
+        copy_table(other, y)
         t = reached
     set_lane_inputs(values, slopes, s, end - start, u)
     return row
@@ -140,12 +124,10 @@ def advance_segment(
 
 @numba.njit(error_model="numpy", nogil=True)
 def loop_lanes(
-    prepare: Any, step: Any, outputs: Any, sample: Any, p: Any, c: Any, y: Any, other: Any, u: Any, base: Any, w: Any,
-    h: Any, o: Any, parameters: Any, memory: Any, later: Any, measured: Any, setpoint: Any, command: Any, low: Any,
-    high: Any, period: Any, edges: Any, setpoints: Any, first: Any, starts: Any, ends: Any, values: Any, slopes: Any,
-    length: Any, measured_at: Any, commanded_at: Any, bounds: Any, times: Any, row_segment: Any, chosen: Any,
-    rows: Any, samples: Any, commands: Any, status: Any, stop: Any,
-) -> Any:  # fmt: skip
+    prepare, step, outputs, sample, p, c, y, other, u, base, w, h, o, parameters, memory, later, measured, setpoint,
+    command, low, high, period, edges, setpoints, first, starts, ends, values, slopes, length, measured_at,
+    commanded_at, bounds, times, row_segment, chosen, rows, samples, commands, status, stop,
+):  # fmt: skip
     """Run the loops of W systems from sample to sample; DONE or INTERRUPTED.
 
     prepare, step, outputs  as in `lanes`; sample(measured, setpoints, memory, low, high, period, parameters, command,

@@ -1,7 +1,6 @@
 """Small matrices as parts of kernels: products, factors, exponential Euler step with the Jacobian and the rates."""
 
 from math import sqrt
-from typing import Any
 
 from ....core import Status
 from .calls import PART, invoke, pointer
@@ -12,7 +11,7 @@ MAX_NORM = 0.125
 
 
 @PART
-def scaled_rates(f: Any, a: Any, sizes: Any, h: Any, m: Any) -> Any:
+def scaled_rates(f, a, sizes, h, m):
     """Write h (A, f) of the scaled states to `m` (n, N + 1); its 1-norm, infinite if it is not finite."""
     n, total, norm = f.shape[0], sizes.shape[0], 0.0
     for j in range(total + 1):
@@ -29,7 +28,7 @@ def scaled_rates(f: Any, a: Any, sizes: Any, h: Any, m: Any) -> Any:
 
 
 @PART
-def taylor_polynomial(m: Any, share: Any, square: Any, cube: Any, other: Any, e: Any) -> None:
+def taylor_polynomial(m, share, square, cube, other, e):
     """The Taylor polynomial of order 8 of exp(share m) in `e`, by Paterson and Stockmeyer's scheme."""
     n, columns = m.shape
     for i in range(n):
@@ -57,7 +56,7 @@ def taylor_polynomial(m: Any, share: Any, square: Any, cube: Any, other: Any, e:
 
 
 @PART
-def square_repeatedly(e: Any, times: Any, other: Any) -> None:
+def square_repeatedly(e, times, other):
     """Square the matrix whose first n rows are `e` (n, N + 1); the rows below are those of the identity."""
     n, columns = e.shape
     for _ in range(times):
@@ -71,10 +70,7 @@ def square_repeatedly(e: Any, times: Any, other: Any) -> None:
 
 
 @PART
-def exponential_step(
-    rates: Any, c: Any, sizes: Any, x: Any, u: Any, h: Any, f: Any, a: Any, m: Any, square: Any, cube: Any, e: Any,
-    other: Any,
-) -> Any:  # fmt: skip
+def exponential_step(rates, c, sizes, x, u, h, f, a, m, square, cube, e, other):
     """Row k < n of `e` (n, N + 1): exp(A h) of the scaled states, and in its last column the increment of state k.
 
     rates(x, u, c, f, a)   its address: f (n,), a = df/dx (n, N); the N - n states at the end have no rates
@@ -96,7 +92,7 @@ def exponential_step(
 
 
 @PART
-def multiply(a: Any, b: Any, result: Any) -> None:
+def multiply(a, b, result):
     """The product of `a` (n, k) and `b` (k, m) in `result` (n, m)."""
     for i in range(result.shape[0]):
         for j in range(result.shape[1]):
@@ -107,7 +103,7 @@ def multiply(a: Any, b: Any, result: Any) -> None:
 
 
 @PART
-def add_product(a: Any, b: Any, result: Any) -> None:
+def add_product(a, b, result):
     """Add the product of the first n columns of `a` and of `b` (n, m) to `result` (n, m); zeros of `a` are skipped."""
     n = result.shape[0]
     for i in range(n):
@@ -118,7 +114,7 @@ def add_product(a: Any, b: Any, result: Any) -> None:
 
 
 @PART
-def cholesky(s: Any, factor: Any) -> Any:
+def cholesky(s, factor):
     """Lower triangular `factor` (p, p) of a positive definite matrix `s`; a status."""
     for i in range(s.shape[0]):
         for j in range(i + 1):
@@ -135,21 +131,7 @@ def cholesky(s: Any, factor: Any) -> Any:
 
 
 @PART
-def solve_row(factor: Any, row: Any) -> None:
-    """Replace `row` (p,) by S^-1 row, where S = L L^T with the factor L."""
-    p = factor.shape[0]
-    for i in range(p):
-        for k in range(i):
-            row[i] -= factor[i, k] * row[k]
-        row[i] /= factor[i, i]
-    for i in range(p - 1, -1, -1):
-        for k in range(i + 1, p):
-            row[i] -= factor[k, i] * row[k]
-        row[i] /= factor[i, i]
-
-
-@PART
-def solve_factor(factor: Any, count: Any, x: Any) -> None:
+def solve_factor(factor, count, x):
     """Replace the first `count` numbers of `x` by the solution of L L^T y = x with the factor L."""
     for i in range(count):
         for k in range(i):

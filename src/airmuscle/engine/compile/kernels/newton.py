@@ -1,7 +1,5 @@
 """Newton's method on printed functions: g(x, p) = target of many unknowns, and of pairs of functions."""
 
-from typing import Any
-
 import numba
 
 from ....core import Status
@@ -14,7 +12,7 @@ MAX_ITERATIONS, MAX_STEP, TOLERANCE = 50, 10.0, 1e-11
 
 
 @PART
-def scale_equations(by_x: Any, values: Any, target: Any, sizes: Any, a: Any, b: Any) -> None:
+def scale_equations(by_x, values, target, sizes, a, b):
     """Write the linear equations a s = b of the step s in sizes, each divided by its largest coefficient."""
     n = b.shape[0]
     for i in range(n):
@@ -29,7 +27,7 @@ def scale_equations(by_x: Any, values: Any, target: Any, sizes: Any, a: Any, b: 
 
 
 @PART
-def eliminate(a: Any, b: Any) -> Any:
+def eliminate(a, b):
     """Reduce the equations to an upper triangle, with row pivoting; whether the matrix is regular."""
     n, regular = b.shape[0], True
     for column in range(n):
@@ -52,7 +50,7 @@ def eliminate(a: Any, b: Any) -> Any:
 
 
 @PART
-def substitute_back(a: Any, b: Any) -> Any:
+def substitute_back(a, b):
     """Solve the upper triangle in place of `b`; the largest step in sizes."""
     n, step = b.shape[0], 0.0
     for i in range(n - 1, -1, -1):
@@ -64,9 +62,7 @@ def substitute_back(a: Any, b: Any) -> Any:
 
 
 @numba.njit(nogil=True, error_model="numpy")
-def newton(
-    function: Any, p: Any, target: Any, sizes: Any, x: Any, values: Any, by_x: Any, by_p: Any, a: Any, b: Any
-) -> Any:
+def newton(function, p, target, sizes, x, values, by_x, by_p, a, b):
     """Move `x` (n,) to the root; `values` (n,), `by_x` (n, n) and `by_p` (n, m) hold the last results of the function.
 
     function(x, p, values, by_x, by_p)  its address
@@ -103,7 +99,7 @@ RESIDUAL, MARGIN, WIDENED = 1e-11, 1e-12, 0.5
 
 
 @PART
-def evaluate_boundaries(function: Any, side: Any, levels: Any, t: Any, x: Any, values: Any, ends: Any) -> None:
+def evaluate_boundaries(function, side, levels, t, x, values, ends):
     """Write q, k and s at both boundaries of each cell of one side to `ends`."""
     size = ends.shape[3]
     for g in range(levels.shape[0]):
@@ -121,7 +117,7 @@ def evaluate_boundaries(function: Any, side: Any, levels: Any, t: Any, x: Any, v
 
 
 @PART
-def widen_ranges(side: Any, ends: Any) -> None:
+def widen_ranges(side, ends):
     """Turn the values at the boundaries into widened ranges; empty ones where s is not positive."""
     for i in range(ends.shape[3]):
         possible = max(ends[side, 2, 0, i], ends[side, 2, 1, i]) > 0.0
@@ -133,7 +129,7 @@ def widen_ranges(side: Any, ends: Any) -> None:
 
 
 @PART
-def find_cells(q: Any, k: Any, ends: Any, cells: Any) -> Any:
+def find_cells(q, k, ends, cells):
     """Write the pairs of cells in whose ranges a solution is possible; how many there are."""
     size, count = ends.shape[3], 0
     for i in range(size):
@@ -151,7 +147,7 @@ def find_cells(q: Any, k: Any, ends: Any, cells: Any) -> Any:
 
 
 @PART
-def newton_steps(q: Any, k: Any, low: Any, high: Any, x: Any, y: Any, values: Any, other_values: Any) -> Any:
+def newton_steps(q, k, low, high, x, y, values, other_values):
     """One step of Newton's method of each lane, limited to a fifth of the range; the largest step."""
     largest, span = 0.0, high - low
     for lane in range(LANES):
@@ -173,7 +169,7 @@ def newton_steps(q: Any, k: Any, low: Any, high: Any, x: Any, y: Any, values: An
 
 
 @PART
-def is_solution(q: Any, k: Any, lane: Any, values: Any, other_values: Any) -> Any:
+def is_solution(q, k, lane, values, other_values):
     """Whether both equations are fulfilled and both s are positive."""
     residual = abs(values[0, lane] + other_values[0, lane] - q)
     other = abs(values[1, lane] + other_values[1, lane] - k)
@@ -184,7 +180,7 @@ def is_solution(q: Any, k: Any, lane: Any, values: Any, other_values: Any) -> An
 
 
 @PART
-def store_new(n: Any, x: Any, y: Any, span: Any, solutions: Any, stored: Any) -> Any:
+def store_new(n, x, y, span, solutions, stored):
     """Store a solution unless it is known; the number of solutions."""
     known = False
     for k in range(min(stored, solutions.shape[1])):
@@ -200,9 +196,9 @@ def store_new(n: Any, x: Any, y: Any, span: Any, solutions: Any, stored: Any) ->
 
 @numba.njit(error_model="numpy", nogil=True)
 def pair_solutions(
-    first: Any, second: Any, low: Any, high: Any, point: Any, wanted_q: Any, wanted_k: Any, levels: Any, solutions: Any,
-    counts: Any, arguments: Any, values: Any, other_values: Any, ends: Any, cells: Any,
-) -> None:  # fmt: skip
+    first, second, low, high, point, wanted_q, wanted_k, levels, solutions, counts, arguments, values, other_values,
+    ends, cells,
+):  # fmt: skip
     """Write up to R solutions of every point (N,) into `solutions` (N, R, 2), and their numbers into `counts` (N,).
 
     first, second  addresses of functions in lanes, (t, x) -> (q, k, dq/dx, dk/dx, s); s > 0 at a solution

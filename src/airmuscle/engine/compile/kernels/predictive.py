@@ -1,7 +1,6 @@
 """A sample of linear predictive control: observer, limits, and the quadratic program by a dual active-set method."""
 
 from math import sqrt
-from typing import Any
 
 import numba
 
@@ -17,7 +16,7 @@ ones up to which it depends on them; what a slope of multipliers must exceed."""
 
 
 @CONTRACTED_PART
-def add_product(row: Any, x: Any, count: Any, value: Any) -> Any:
+def add_product(row, x, count, value):
     """`value` + the product of the first `count` numbers of `row` and `x`."""
     total = value
     for k in range(count):
@@ -26,7 +25,7 @@ def add_product(row: Any, x: Any, count: Any, value: Any) -> Any:
 
 
 @PART
-def extend_factor(m: Any, order: Any, count: Any, row: Any, factor: Any, tolerances: Any) -> Any:
+def extend_factor(m, order, count, row, factor, tolerances):
     """Write row `count` of the Cholesky factor of the products of the active rows; whether `row` is independent."""
     square = add_product(m[row], m[row], m.shape[1], 0.0)
     for j in range(count):
@@ -42,7 +41,7 @@ def extend_factor(m: Any, order: Any, count: Any, row: Any, factor: Any, toleran
 
 
 @PART
-def release(order: Any, count: Any, place: Any, factor: Any, multipliers: Any, active: Any) -> None:
+def release(order, count, place, factor, multipliers, active):
     """Remove the active row at a place, of `count`; rotations make its factor triangular again."""
     active[order[place]] = 0.0
     for k in range(place, count - 1):
@@ -60,7 +59,7 @@ def release(order: Any, count: Any, place: Any, factor: Any, multipliers: Any, a
 
 
 @PART
-def vector_of(m: Any, order: Any, count: Any, multipliers: Any, w: Any) -> None:
+def vector_of(m, order, count, multipliers, w):
     """w = -m^T multipliers of the active rows."""
     for j in range(w.shape[0]):
         w[j] = 0.0
@@ -70,10 +69,7 @@ def vector_of(m: Any, order: Any, count: Any, multipliers: Any, w: Any) -> None:
 
 
 @PART
-def solve_active(
-    m: Any, lower: Any, upper: Any, active: Any, order: Any, count: Any, factor: Any, passes: Any, wanted: Any,
-    rest: Any, w: Any,
-) -> Any:  # fmt: skip
+def solve_active(m, lower, upper, active, order, count, factor, passes, wanted, rest, w):
     """The multipliers with which the active rows have their limits, in one or two passes; the error before the last."""
     error = 0.0
     for k in range(count):
@@ -93,7 +89,7 @@ def solve_active(
 
 
 @PART
-def blocking_place(order: Any, count: Any, active: Any, multipliers: Any, change: Any) -> Any:
+def blocking_place(order, count, active, multipliers, change):
     """Where a multiplier would first change its sign, on the way to multipliers + change (-1: nowhere)."""
     place, least = -1, 1.0
     for k in range(count):
@@ -107,7 +103,7 @@ def blocking_place(order: Any, count: Any, active: Any, multipliers: Any, change
 
 
 @PART
-def worst_row(m: Any, lower: Any, upper: Any, active: Any, w: Any, tolerances: Any) -> Any:
+def worst_row(m, lower, upper, active, w, tolerances):
     """The row whose limit is violated most; -1 where none is."""
     worst = -1
     largest = tolerances[FEASIBLE]
@@ -122,9 +118,7 @@ def worst_row(m: Any, lower: Any, upper: Any, active: Any, w: Any, tolerances: A
 
 
 @PART
-def exchange(
-    m: Any, row: Any, order: Any, count: Any, active: Any, factor: Any, multipliers: Any, change: Any, tolerances: Any
-) -> Any:  # fmt: skip
+def exchange(m, row, order, count, active, factor, multipliers, change, tolerances):
     """Make a row active that depends on the active ones, in place of one of them; whether a point keeps the limits."""
     side = active[row]
     for k in range(count):
@@ -150,7 +144,7 @@ def exchange(
 
 
 @PART
-def append_row(m: Any, row: Any, order: Any, count: Any, factor: Any, multipliers: Any, tolerances: Any) -> Any:
+def append_row(m, row, order, count, factor, multipliers, tolerances):
     """Make a row the last active one, without a multiplier, if it is independent; whether it is."""
     independent = False
     if count < m.shape[1]:
@@ -162,7 +156,7 @@ def append_row(m: Any, row: Any, order: Any, count: Any, factor: Any, multiplier
 
 
 @PART
-def begin_active(m: Any, active: Any, order: Any, factor: Any, multipliers: Any, tolerances: Any) -> Any:
+def begin_active(m, active, order, factor, multipliers, tolerances):
     """Take the rows that were active, without multipliers; how many are independent."""
     count = 0
     for i in range(m.shape[0]):
@@ -176,10 +170,7 @@ def begin_active(m: Any, active: Any, order: Any, factor: Any, multipliers: Any,
 
 
 @PART
-def shortest_vector(
-    m: Any, lower: Any, upper: Any, tolerances: Any, active: Any, order: Any, factor: Any, multipliers: Any,
-    change: Any, rest: Any, w: Any,
-) -> Any:  # fmt: skip
+def shortest_vector(m, lower, upper, tolerances, active, order, factor, multipliers, change, rest, w):
     """The shortest `w` (n,) with lower <= m w <= upper, for rows of `m` (r, n) of length 1; a status.
 
     tolerances  (4,) by FEASIBLE, ACCURATE, DEPENDENT, POSITIVE
@@ -227,9 +218,7 @@ def shortest_vector(
 
 
 @PART
-def find_point(
-    y: Any, r: Any, by_output: Any, gain: Any, predicted: Any, inputs: Any, innovation: Any, point: Any
-) -> None:  # fmt: skip
+def find_point(y, r, by_output, gain, predicted, inputs, innovation, point):
     """The point (N + q + m,): corrected states and disturbances, set points, inputs of the last sample."""
     states, points = predicted.shape[0], r.shape[0]
     for i in range(y.shape[0]):
@@ -243,10 +232,7 @@ def find_point(
 
 
 @PART
-def find_limits(
-    low: Any, high: Any, of_input: Any, scale: Any, fixed_low: Any, fixed_high: Any, by_point: Any, point: Any,
-    lower: Any, upper: Any,
-) -> None:  # fmt: skip
+def find_limits(low, high, of_input, scale, fixed_low, fixed_high, by_point, point, lower, upper):
     """The limits of all rows for a point; those of rows of an input contain its range."""
     for i in range(lower.shape[0]):
         shift = add_product(by_point[i], point, point.shape[0], 0.0)
@@ -259,11 +245,10 @@ def find_limits(
 
 @numba.njit(error_model="numpy", fastmath={"contract", "reassoc"}, nogil=True)
 def predictive_sample(
-    y: Any, r: Any, low: Any, high: Any, by_output: Any, gain: Any, transition: Any, by_input: Any, rest: Any, m: Any,
-    of_input: Any, scale: Any, fixed_low: Any, fixed_high: Any, by_point: Any, plan_by_w: Any, plan_by_point: Any,
-    tolerances: Any, predicted: Any, plan: Any, inputs: Any, active: Any, counts: Any, innovation: Any, point: Any,
-    lower: Any, upper: Any, order: Any, factor: Any, multipliers: Any, change: Any, spare: Any, w: Any,
-) -> Any:  # fmt: skip
+    y, r, low, high, by_output, gain, transition, by_input, rest, m, of_input, scale, fixed_low, fixed_high, by_point,
+    plan_by_w, plan_by_point, tolerances, predicted, plan, inputs, active, counts, innovation, point, lower, upper,
+    order, factor, multipliers, change, spare, w,
+):  # fmt: skip
     """One sample: the inputs in `inputs` (m,), and the memory of the next sample in place; the status of the program.
 
     y, r              measured columns (p,) and set points (q,); low, high: limits of the inputs (m,)

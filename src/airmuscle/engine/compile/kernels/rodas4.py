@@ -6,7 +6,6 @@ within a segment, and meets its end exactly. Exported programs print `single_ste
 """
 
 from math import sqrt
-from typing import Any
 
 import numba
 
@@ -38,7 +37,7 @@ H31, H32, H33, H34, H35 = (
 
 
 @CONTRACTED_PART
-def initial_step(y: Any, f0: Any, relative: Any, absolute: Any, left: Any) -> Any:
+def initial_step(y, f0, relative, absolute, left):
     """The first step of a segment, from the sizes of states and rates; at most `left`."""
     size = 0.0
     rate = 0.0
@@ -53,10 +52,7 @@ def initial_step(y: Any, f0: Any, relative: Any, absolute: Any, left: Any) -> An
 
 
 @CONTRACTED_PART
-def compute_stages(
-    solve: Any, stage: Any, c: Any, factors: Any, y: Any, base: Any, w: Any, moving: Any, t: Any, start: Any, h: Any,
-    f0: Any, ft: Any, u: Any, x: Any, g: Any, k1: Any, k2: Any, k3: Any, k4: Any,
-) -> None:  # fmt: skip
+def compute_stages(solve, stage, c, factors, y, base, w, moving, t, start, h, f0, ft, u, x, g, k1, k2, k3, k4):
     """Stages one to four of a step from `t`; afterwards the inputs `u` are those at its end."""
     n, r = y.shape[0], 1.0 / h
     for i in range(n):
@@ -85,10 +81,7 @@ def compute_stages(
 
 
 @CONTRACTED_PART
-def compute_last_stages(
-    stage: Any, c: Any, factors: Any, y: Any, u: Any, h: Any, x: Any, g: Any,
-    k1: Any, k2: Any, k3: Any, k4: Any, k5: Any, k6: Any,
-) -> None:  # fmt: skip
+def compute_last_stages(stage, c, factors, y, u, h, x, g, k1, k2, k3, k4, k5, k6):
     """Stages five and six, at the end of the step."""
     n, r = y.shape[0], 1.0 / h
     for i in range(n):
@@ -102,7 +95,7 @@ def compute_last_stages(
 
 
 @CONTRACTED_PART
-def finish_step(y: Any, x: Any, k6: Any, relative: Any, absolute: Any, yn: Any) -> Any:
+def finish_step(y, x, k6, relative, absolute, yn):
     """The states `yn` at the end of the step; its error in tolerances, rms over the states."""
     error = 0.0
     for i in range(y.shape[0]):
@@ -113,7 +106,7 @@ def finish_step(y: Any, x: Any, k6: Any, relative: Any, absolute: Any, yn: Any) 
 
 
 @CONTRACTED_PART
-def step_factor(error: Any) -> Any:
+def step_factor(error):
     """The ratio of the next step to this one."""
     ratio = 0.5
     if error < 1e300:
@@ -123,10 +116,9 @@ def step_factor(error: Any) -> Any:
 
 @CONTRACTED_PART
 def take_step(
-    stage: Any, jac: Any, factor: Any, solve: Any, df_dt: Any, c: Any, y: Any, base: Any, w: Any, moving: Any,
-    t: Any, start: Any, end: Any, h: Any, relative: Any, absolute: Any, f0: Any, ft: Any, u: Any, x: Any, g: Any,
-    k1: Any, k2: Any, k3: Any, k4: Any, k5: Any, k6: Any, yn: Any, jacobian: Any, factors: Any,
-) -> Any:  # fmt: skip
+    stage, jac, factor, solve, df_dt, c, y, base, w, moving, t, start, end, h, relative, absolute, f0, ft, u, x, g, k1,
+    k2, k3, k4, k5, k6, yn, jacobian, factors,
+):  # fmt: skip
     """Try steps from `t`, beginning with `h` (0: to be found), until one is accepted; it leads from `y` to `yn`.
 
     Returns a status, the step, the next step, whether it meets `end`, and the number of rejected steps.
@@ -164,7 +156,7 @@ def take_step(
 
 
 @CONTRACTED_PART
-def prepare_dense_output(k1: Any, k2: Any, k3: Any, k4: Any, k5: Any, d2: Any, d3: Any) -> None:
+def prepare_dense_output(k1, k2, k3, k4, k5, d2, d3):
     """The coefficients of the dense output of a step."""
     for i in range(d2.shape[0]):
         d2[i] = H21 * k1[i] + H22 * k2[i] + H23 * k3[i] + H24 * k4[i] + H25 * k5[i]
@@ -172,7 +164,7 @@ def prepare_dense_output(k1: Any, k2: Any, k3: Any, k4: Any, k5: Any, d2: Any, d
 
 
 @CONTRACTED_PART
-def interpolate(y: Any, yn: Any, d2: Any, d3: Any, q: Any, between: Any) -> None:
+def interpolate(y, yn, d2, d3, q, between):
     """The states `between` those before and after a step, `q` of the step after its beginning."""
     p = 1.0 - q
     for i in range(y.shape[0]):
@@ -181,11 +173,9 @@ def interpolate(y: Any, yn: Any, d2: Any, d3: Any, q: Any, between: Any) -> None
 
 @CONTRACTED_PART
 def single_step(
-    stage: Any, jac: Any, factor: Any, solve: Any, df_dt: Any, c: Any, y: Any, base: Any, w: Any, moving: Any,
-    t: Any, start: Any, end: Any, h: Any, relative: Any, nominal: Any, absolute: Any, f0: Any, ft: Any, u: Any, x: Any,
-    g: Any, k1: Any, k2: Any, k3: Any, k4: Any, k5: Any, k6: Any, yn: Any, jacobian: Any, factors: Any,
-    d2: Any, d3: Any,
-) -> Any:  # fmt: skip
+    stage, jac, factor, solve, df_dt, c, y, base, w, moving, t, start, end, h, relative, nominal, absolute, f0, ft, u,
+    x, g, k1, k2, k3, k4, k5, k6, yn, jacobian, factors, d2, d3,
+):  # fmt: skip
     """A step from `y` at `t` to `yn`, with its dense output; the absolute tolerance follows from the nominal states.
 
     Returns a status, the time reached, the step, the next step, and the number of rejected steps.
@@ -203,13 +193,13 @@ def single_step(
 
 
 @CONTRACTED_PART
-def state_between(y: Any, yn: Any, d2: Any, d3: Any, t: Any, h: Any, time: Any, between: Any) -> None:
+def state_between(y, yn, d2, d3, t, h, time, between):
     """The states at a time within the step from `y` at `t` to `yn`."""
     interpolate(y, yn, d2, d3, (time - t) / h, between)
 
 
 @CONTRACTED_PART
-def workspace(work: Any, n: Any, m: Any, jacobian_size: Any) -> Any:
+def workspace(work, n, m, jacobian_size):
     """The arrays f0, ft, x, yn, g, k1 .. k6 (n,), u, w (m,), Jacobian and factors within the workspace."""
     rest = 11 * n + 2 * m
     return (
@@ -222,7 +212,7 @@ def workspace(work: Any, n: Any, m: Any, jacobian_size: Any) -> Any:
 
 
 @CONTRACTED_PART
-def begin_segment(slopes: Any, w: Any, ft: Any) -> Any:
+def begin_segment(slopes, w, ft):
     """Set the slopes `w` of the inputs and the derivative `ft` with respect to time; whether an input changes."""
     moving = False
     for i in range(w.shape[0]):
@@ -234,10 +224,7 @@ def begin_segment(slopes: Any, w: Any, ft: Any) -> Any:
 
 
 @CONTRACTED_PART
-def complete_step(
-    times: Any, row: Any, reached: Any, t: Any, h: Any, y: Any, yn: Any, k1: Any, k2: Any, k3: Any, k4: Any, k5: Any,
-    x: Any, g: Any, rows: Any,
-) -> Any:  # fmt: skip
+def complete_step(times, row, reached, t, h, y, yn, k1, k2, k3, k4, k5, x, g, rows):
     """Write the states at the output times up to `reached` by the dense output, then copy `yn` to `y`; the next row."""
     if row < times.shape[0] and times[row] <= reached:
         prepare_dense_output(k1, k2, k3, k4, k5, x, g)  # x and g are free by now
@@ -251,10 +238,9 @@ def complete_step(
 
 @numba.njit(error_model="numpy", fastmath={"contract", "reassoc"}, nogil=True)
 def rodas4(
-    stage: Any, jac: Any, factor: Any, solve: Any, df_dt: Any, jacobian_size: Any, factor_size: Any,
-    c: Any, y: Any, ends: Any, values: Any, slopes: Any, times: Any, rows: Any,
-    relative: Any, absolute: Any, clock: Any, count: Any, budget: Any, work: Any,
-) -> Any:  # fmt: skip
+    stage, jac, factor, solve, df_dt, jacobian_size, factor_size, c, y, ends, values, slopes, times, rows, relative,
+    absolute, clock, count, budget, work,
+):  # fmt: skip
     """Advance `y` (n,) through the segments, and write the states at `times` into `rows`; a status code.
 
     stage .. df_dt  addresses of the printed functions; `c` what they need of the parameters

@@ -1,7 +1,5 @@
 """Kernel: a sampled loop, from one sampling instant to the next: measure, command, drive the inputs, integrate."""
 
-from typing import Any
-
 import numba
 
 from ....core import Status
@@ -21,7 +19,7 @@ NOTHING, COMMANDS, DRIVERS, INTEGRATION = map(int, Waiting)
 
 
 @PART
-def measure(outputs: Any, y: Any, applied: Any, c: Any, o: Any, measured_at: Any, measured: Any) -> Any:
+def measure(outputs, y, applied, c, o, measured_at, measured):
     """Write the measured columns; DONE, or NOT_FINITE."""
     n, needs_outputs, status = y.shape[0], False, DONE
     for i in range(measured_at.shape[0]):
@@ -39,7 +37,7 @@ def measure(outputs: Any, y: Any, applied: Any, c: Any, o: Any, measured_at: Any
 
 
 @PART
-def limit_commands(command: Any, low: Any, high: Any) -> Any:
+def limit_commands(command, low, high):
     """Limit each command to the range of its input; DONE, or NON_FINITE_COMMAND."""
     status = DONE
     for i in range(command.shape[0]):
@@ -57,9 +55,9 @@ def limit_commands(command: Any, low: Any, high: Any) -> Any:
 
 @PART
 def take_sample(
-    outputs: Any, y: Any, applied: Any, c: Any, o: Any, measured_at: Any, sample: Any, setpoint: Any, low: Any,
-    high: Any, period: Any, parameters: Any, controlled: Any, memory: Any, measured: Any, command: Any, progress: Any,
-) -> Any:  # fmt: skip
+    outputs, y, applied, c, o, measured_at, sample, setpoint, low, high, period, parameters, controlled, memory,
+    measured, command, progress,
+):  # fmt: skip
     """Copy the memory; where the interval is controlled: measure, call the controller, limit its commands; a status.
 
     PAUSED where the controller is called from Python: its commands are limited when the kernel is called again.
@@ -86,10 +84,7 @@ def take_sample(
 
 
 @PART
-def apply_sample(
-    k: Any, measured: Any, samples: Any, command: Any, commands: Any, commanded_at: Any, first: Any, values: Any,
-    progress: Any,
-) -> None:  # fmt: skip
+def apply_sample(k, measured, samples, command, commands, commanded_at, first, values, progress):
     """Write the measurements and the commands of interval `k`, and the commands into its segments."""
     progress[SAMPLES] = k + 1
     for i in range(measured.shape[0]):
@@ -102,9 +97,9 @@ def apply_sample(
 
 @PART
 def drive_inputs(
-    kinds: Any, settings: Any, kept_states: Any, states: Any, columns: Any, counts: Any, scratch: Any, begin: Any,
-    ulp: Any, ends: Any, values: Any, slopes: Any, first: Any, pieces: Any, progress: Any,
-) -> Any:  # fmt: skip
+    kinds, settings, kept_states, states, columns, counts, scratch, begin, ulp, ends, values, slopes, first, pieces,
+    progress,
+):  # fmt: skip
     """Pass an interval's segments through the drivers, if there are any; PAUSED where they are called from Python."""
     status = DONE
     if kinds.shape[0] > 0:
@@ -119,9 +114,8 @@ def drive_inputs(
 
 @PART
 def start_integrator(
-    slots: Any, places: Any, progress: Any, clock: Any, count: Any, begin: Any, at_segment: Any, pieces: Any,
-    at_row: Any, wanted: Any, ends: Any, values: Any, slopes: Any, times: Any, rows: Any,
-) -> None:  # fmt: skip
+    slots, places, progress, clock, count, begin, at_segment, pieces, at_row, wanted, ends, values, slopes, times, rows,
+):  # fmt: skip
     """Give the integrator the segments, output times and rows of an interval, and set its clock and counts."""
     progress[FIRST_SEGMENT], progress[FIRST_ROW] = at_segment, at_row
     progress[SEGMENTS], progress[ROWS] = at_segment + pieces, at_row
@@ -136,7 +130,7 @@ def start_integrator(
 
 
 @PART
-def call_integrator(integrate: Any, slots: Any, progress: Any) -> Any:
+def call_integrator(integrate, slots, progress):
     """Integrate the interval; its status, or PAUSED where it is integrated from Python, and then the status found."""
     status = PAUSED
     if integrate != 0:
@@ -149,7 +143,7 @@ def call_integrator(integrate: Any, slots: Any, progress: Any) -> Any:
 
 
 @PART
-def is_below(y: Any, bounds: Any) -> Any:
+def is_below(y, bounds):
     """Whether a state is below its bound."""
     below = False
     for i in range(y.shape[0]):
@@ -159,9 +153,8 @@ def is_below(y: Any, bounds: Any) -> Any:
 
 @PART
 def end_interval(
-    progress: Any, begin: Any, end: Any, ends: Any, values: Any, slopes: Any, applied: Any, kept_applied: Any,
-    y: Any, kept: Any, memory: Any, states: Any, kept_states: Any,
-) -> None:  # fmt: skip
+    progress, begin, end, ends, values, slopes, applied, kept_applied, y, kept, memory, states, kept_states,
+):  # fmt: skip
     """Keep inputs, state, memory and drivers at the end of an interval."""
     progress[INTERVAL], progress[RUNNING] = progress[INTERVAL] + 1, 0
     last = progress[SEGMENTS] - 1
@@ -180,17 +173,11 @@ def end_interval(
 
 @numba.njit(error_model="numpy", nogil=True)
 def sampled_loop(
-    integrate: Any, slots: Any, places: Any, clock: Any, count: Any, y: Any,
-    outputs: Any, c: Any, o: Any, measured_at: Any,
-    sample: Any, parameters: Any, period: Any, low: Any, high: Any, commanded_at: Any,
-    edges: Any, ulps: Any, first_sample: Any, setpoints: Any,
-    ends: Any, values: Any, slopes: Any, first: Any, grid: Any, grid_row: Any,
-    kinds: Any, settings: Any, states: Any, columns: Any, counts: Any, scratch: Any, begins: Any,
-    bounds: Any, applied: Any, memory: Any, measured: Any, command: Any,
-    kept: Any, kept_applied: Any, kept_states: Any,
-    new_ends: Any, new_values: Any, new_slopes: Any, times: Any, rows: Any, samples: Any, commands: Any,
-    progress: Any, budget: Any,
-) -> Any:  # fmt: skip
+    integrate, slots, places, clock, count, y, outputs, c, o, measured_at, sample, parameters, period, low, high,
+    commanded_at, edges, ulps, first_sample, setpoints, ends, values, slopes, first, grid, grid_row, kinds, settings,
+    states, columns, counts, scratch, begins, bounds, applied, memory, measured, command, kept, kept_applied,
+    kept_states, new_ends, new_values, new_slopes, times, rows, samples, commands, progress, budget,
+):  # fmt: skip
     """Run the intervals until the end, an event, or the step limit of one call; a status.
 
     integrate, slots, places, clock, count, y  entry point of the integrator, its slots, the places in them of ends,
