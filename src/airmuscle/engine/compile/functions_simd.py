@@ -69,7 +69,7 @@ class _RowsBody(FunctionBody):
             place = self._place(array, index + row * self._widths[array])
             self.lines.append(f"  store {ROWS.element} {element}, ptr {place}, align 8")
 
-    def call(self, function: str, x: Sequence[str]) -> str:
+    def call_library(self, function: str, x: Sequence[str]) -> str:
         """A call of the C library for each row; vectorised functions would take longer to compile than they save."""
         result = "poison"
         for row in range(ROWS.lanes):
@@ -80,7 +80,7 @@ class _RowsBody(FunctionBody):
         return result
 
     def power_by_call(self, base: str, exponent: str) -> str:
-        return self.call("pow", (base, exponent))
+        return self.call_library("pow", (base, exponent))
 
     def _element(self, array: str, index: int) -> str:
         return self.put(f"load {ROWS.element}, ptr {self._place(array, index)}, align 8")
@@ -161,20 +161,17 @@ class _Step:
 
     def _moved(self, i: int, row: Sequence[float], slopes: Sequence[Sequence[str]]) -> str:
         """x + h (a1 k1 + a2 k2 + ...)."""
-        x, total = self._load("x", i), ""
+        x, total, combined = self._load("x", i), "", self.block.arithmetic
         for weight, k in zip(row, slopes, strict=True):
             if weight:
-                term = self._combined("fmul", self.block.constant(weight), k[i])
-                total = self._combined("fadd", total, term) if total else term
-        return self._combined("fadd", x, self._combined("fmul", self._load("h", 0), total)) if total else x
+                term = combined("*", self.block.constant(weight), k[i])
+                total = combined("+", total, term) if total else term
+        return combined("+", x, combined("*", self._load("h", 0), total)) if total else x
 
     def _input(self, i: int, node: float) -> str:
         """u + c h w."""
-        u = self._load("u", i)
+        u, combined = self._load("u", i), self.block.arithmetic
         if not node:
             return u
-        way = self._combined("fmul", self.block.constant(node), self._load("h", 0))
-        return self._combined("fadd", u, self._combined("fmul", way, self._load("w", i)))
-
-    def _combined(self, operation: str, a: str, b: str) -> str:
-        return self.block.put(f"{operation} {FLAGS} {self.number.text} {a}, {b}")
+        way = combined("*", self.block.constant(node), self._load("h", 0))
+        return combined("+", u, combined("*", way, self._load("w", i)))

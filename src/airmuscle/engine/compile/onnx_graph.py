@@ -1,19 +1,19 @@
 """ONNX graph of printed functions: each instruction is a node, each array a tensor (elements, count)."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 
-from .ir.emission import FunctionBlock, unknown_operation
-from .ir.instructions import Operand, Operation
+from .ir.emission import FunctionBlock
 
 _NODES = {
-    Operation.ADD: "Add", Operation.SUBTRACT: "Sub", Operation.MULTIPLY: "Mul", Operation.AND: "Mul",
-    Operation.DIVIDE: "Div", Operation.NEGATE: "Neg", Operation.SQRT: "Sqrt", Operation.ABS: "Abs",
-    Operation.FLOOR: "Floor", Operation.EXP: "Exp", Operation.LOG: "Log", Operation.SIN: "Sin", Operation.COS: "Cos",
-    Operation.ATAN: "Atan", Operation.ASIN: "Asin", Operation.ACOS: "Acos", Operation.TANH: "Tanh",
-    Operation.POWER: "Pow", Operation.CONSTANT_POWER: "Pow", Operation.SIGN: "Sign",
-}  # fmt: skip
-_TESTS = {Operation.LESS: "Less", Operation.LESS_EQUAL: "LessOrEqual", Operation.EQUAL: "Equal"}
-_EXTREMES = {Operation.FMIN: "Less", Operation.MINIMUM: "Less", Operation.FMAX: "Greater", Operation.MAXIMUM: "Greater"}
+    "+": "Add",
+    "-": "Sub",
+    "*": "Mul",
+    "/": "Div",
+    "<": "Less",
+    "<=": "LessOrEqual",
+    ">": "Greater",
+    "==": "Equal",
+}
 
 
 class GraphBody(FunctionBlock):
@@ -25,14 +25,13 @@ class GraphBody(FunctionBlock):
     results    elements of the arrays that were computed, which later functions read
     """
 
+    language = "ONNX"
+
     def __init__(self, arrays: Mapping[str, str]) -> None:
         super().__init__()
         self.nodes: list[tuple[str, tuple[str, ...], str]] = []
         self.constants: dict[str, float] = {}
         self.arrays, self.results = dict(arrays), dict[str, dict[int, str]]()
-
-    def assignment(self, name: str, expression: str) -> str:
-        return f"{name} = {expression}"
 
     def node(self, operator: str, *inputs: str) -> str:
         """The output of a node, which is appended unless it exists already."""
@@ -59,34 +58,31 @@ class GraphBody(FunctionBlock):
     def store(self, array: str, index: int, value: str) -> None:
         self.results.setdefault(array, {})[index] = value
 
-    def operate(self, operation: Operation, x: Sequence[str]) -> str:
-        node, one, zero = self.node, self.constant(1.0), self.constant(0.0)
-        if operation in _NODES:
-            return node(_NODES[operation], *x)
-        if operation in _TESTS:
-            return node("Where", node(_TESTS[operation], *x), one, zero)
-        if operation in _EXTREMES:
-            return node("Where", node(_EXTREMES[operation], *x), *x)
-        composed: dict[Operation, Callable[[], str]] = {
-            Operation.ASSIGN: lambda: x[0],
-            Operation.SQUARE: lambda: node("Mul", x[0], x[0]),
-            Operation.TWICE: lambda: node("Add", x[0], x[0]),
-            Operation.INVERSE: lambda: node("Div", one, x[0]),
-            Operation.NOT_EQUAL: lambda: node("Where", node("Equal", *x), zero, one),
-            Operation.NOT: lambda: node("Where", node("Equal", x[0], zero), one, zero),
-            Operation.OR: lambda: node("Where", node("Equal", node("Add", *x), zero), zero, one),
-            Operation.MASK: lambda: node("Where", node("Equal", x[0], zero), zero, x[1]),
-            Operation.SELECT: lambda: node("Where", node("Equal", x[0], zero), x[2], x[1]),
-            Operation.TAN: lambda: node("Div", node("Sin", x[0]), node("Cos", x[0])),
-            Operation.LOG1P: lambda: self._log1p(x[0]),
-            Operation.EXPM1: lambda: self._expm1(x[0]),
-            Operation.SINH: lambda: self._sinh(x[0]),
-            Operation.COSH: lambda: self._half(node("Exp", x[0]), node("Exp", node("Neg", x[0]))),
-            Operation.ASINH: lambda: self._asinh(x[0]),
-        }
-        if operation not in composed:
-            raise unknown_operation(operation, "ONNX")
-        return composed[operation]()
+    def arithmetic(self, operator: str, a: str, b: str) -> str:
+        return self.node(_NODES[operator], a, b)
+
+    def negative(self, a: str) -> str:
+        return self.node("Neg", a)
+
+    def sign(self, x: str) -> str:
+        return self.node("Sign", x)
+
+    def choose(self, comparison: str, a: str, b: str, when_true: str, when_false: str) -> str:
+        if comparison == "!=":
+            return self.choose("==", a, b, when_false, when_true)
+        return self.node("Where", self.node(_NODES[comparison], a, b), when_true, when_false)
+
+    def call(self, function: str, x: Sequence[str]) -> str:
+        """A node, or several for a function that has none."""
+        composed = {"tan": self._tan, "log1p": self._log1p, "expm1": self._expm1, "sinh": self._sinh,
+                    "cosh": self._cosh, "asinh": self._asinh}  # fmt: skip
+        return composed[function](x[0]) if function in composed else self.node(function.capitalize(), *x)
+
+    def _tan(self, x: str) -> str:
+        return self.node("Div", self.node("Sin", x), self.node("Cos", x))
+
+    def _cosh(self, x: str) -> str:
+        return self._half(self.node("Exp", x), self.node("Exp", self.node("Neg", x)))
 
     def _half(self, a: str, b: str) -> str:
         return self.node("Mul", self.constant(0.5), self.node("Add", a, b))
@@ -115,9 +111,3 @@ class GraphBody(FunctionBlock):
         square = node("Mul", x, x)
         root = node("Add", one, node("Sqrt", node("Add", one, square)))
         return node("Mul", node("Sign", x), self._log1p(node("Add", size, node("Div", square, root))))
-
-    def unless_zero(
-        self, gates: Sequence[str], compute: Callable[[], dict[Operand, str]], instead: Mapping[Operand, str]
-    ) -> dict[Operand, str]:
-        inside = compute()
-        return {operand: inside[operand] for operand in instead}

@@ -2,11 +2,11 @@
 
 import re
 import textwrap
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from ...engine.compile.ir.emission import computed
-from ...engine.compile.ir.instructions import Operand, instructions
+from ...engine.compile.ir.emission import FunctionBlock, computed
+from ...engine.compile.ir.instructions import instructions
 from ...engine.compile.text.body import TextBody
 from ...engine.run import Problem
 from .exported_run import ExportedRun
@@ -64,11 +64,11 @@ class ModelicaBody(TextBody):
         name = self._variables[array][index]
         return f"der({name})" if array == "f" else name
 
-    def choose(self, test: str, when_true: str, when_false: str) -> str:
-        left, relation, right = test.split(" ")
-        if relation in ("==", "<>"):  # Modelica has no equality of real numbers in equations
-            test = f"{left} < {right} or {left} > {right}"
-            when_true, when_false = (when_false, when_true) if relation == "==" else (when_true, when_false)
+    def choose(self, comparison: str, a: str, b: str, when_true: str, when_false: str) -> str:
+        test = f"{a} {comparison} {b}"
+        if comparison in ("==", "!="):  # Modelica has no equality of real numbers in equations
+            test = f"{a} < {b} or {a} > {b}"
+            when_true, when_false = (when_false, when_true) if comparison == "==" else (when_true, when_false)
         return self.put(f"noEvent(if {test} then {when_true} else {when_false})")
 
     def call(self, function: str, x: Sequence[str]) -> str:
@@ -83,11 +83,7 @@ class ModelicaBody(TextBody):
             value = f"noEvent(if {domain.format(x[0])} then {value} else {outside})"
         return self.put(f"noEvent({value})" if function in _EVENTS else value)
 
-    def unless_zero(
-        self, gates: Sequence[str], compute: Callable[[], dict[Operand, str]], instead: Mapping[Operand, str]
-    ) -> dict[Operand, str]:
-        inside = compute()  # equations have no branches: a product with the gate is zero
-        return {operand: inside[operand] for operand in instead}
+    unless_zero = FunctionBlock.unless_zero  # equations have no branches
 
 
 def write_modelica(

@@ -6,19 +6,33 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
 from ....core import TraceError
-from .instructions import Code, Instruction, Operand, Operation
+from .instructions import CALLED, Code, Instruction, Operand, Operation
 from .scheduling import ConditionalBlock, Item
 from .skipped_blocks import COMMANDED, STEADY, VARYING, skipping
 
 LEVEL = {"u": COMMANDED, "w": STEADY, "h": STEADY}
 """Arguments that do not depend on the states: inputs, their slopes, and the step size."""
 
+_ARITHMETIC = {
+    Operation.ADD: "+", Operation.SUBTRACT: "-", Operation.MULTIPLY: "*", Operation.DIVIDE: "/", Operation.SQUARE: "*",
+    Operation.TWICE: "+",
+}  # fmt: skip
+"""Operators between the first and the last argument."""
+_FUNCTIONS = {Operation.SQRT: "sqrt", Operation.ABS: "abs", Operation.FLOOR: "floor", **CALLED}
+_COMPARISONS = {Operation.LESS: "<", Operation.LESS_EQUAL: "<=", Operation.EQUAL: "==", Operation.NOT_EQUAL: "!="}
+_EXTREMES = {Operation.FMIN: "<", Operation.FMAX: ">", Operation.MINIMUM: "<", Operation.MAXIMUM: ">"}
+"""Strict comparison, as in the processor's instruction: of two equal values either may be returned."""
+
 
 class FunctionBlock(abc.ABC):
     """The lines of one function under construction, with elimination of common subexpressions.
 
+    A subclass states what its language writes: constants, array elements, arithmetic, calls and choices.
     `needed` are the functions that the target must be given a definition of, with the number of their arguments.
     """
+
+    language: str
+    """Name of the language in messages."""
 
     def __init__(self, scalars: Sequence[str] = ()) -> None:
         self.lines: list[str] = []
@@ -40,9 +54,9 @@ class FunctionBlock(abc.ABC):
         self._named += 1
         return f"v{self._named}"
 
-    @abc.abstractmethod
     def assignment(self, name: str, expression: str) -> str:
         """The line that gives a value its name."""
+        return f"{name} = {expression}"
 
     @abc.abstractmethod
     def constant(self, value: float) -> str:
@@ -57,14 +71,72 @@ class FunctionBlock(abc.ABC):
         """Write a value into an array element."""
 
     @abc.abstractmethod
-    def operate(self, operation: Operation, x: Sequence[str]) -> str:
-        """The value of one operation, whose instructions are appended; raises TraceError for an unknown operation."""
+    def arithmetic(self, operator: str, a: str, b: str) -> str:
+        """The value of a + b, a - b, a * b or a / b."""
 
     @abc.abstractmethod
+    def negative(self, a: str) -> str:
+        """The value of -a."""
+
+    @abc.abstractmethod
+    def call(self, function: str, x: Sequence[str]) -> str:
+        """The value of a function, by its name in C; `abs` is that of numbers."""
+
+    @abc.abstractmethod
+    def choose(self, comparison: str, a: str, b: str, when_true: str, when_false: str) -> str:
+        """`when_true` where a < b, a <= b, a > b, a == b or a != b, as `comparison` states, else `when_false`."""
+
+    def logical(self, operator: str, a: str, b: str) -> str:
+        """The product or the sum of two conditions."""
+        return self.arithmetic(operator, a, b)
+
+    def sign(self, x: str) -> str:
+        """1, 0 or -1, as the sign of a value."""
+        zero = self.constant(0.0)
+        negative = self.choose("<", x, zero, self.constant(-1.0), zero)
+        return self.choose(">", x, zero, self.constant(1.0), negative)
+
+    def operate(self, operation: Operation, x: Sequence[str]) -> str:
+        """The value of one operation, whose instructions are appended; raises TraceError for an unknown operation."""
+        one, zero = self.constant(1.0), self.constant(0.0)
+        if operation in _ARITHMETIC:
+            return self.arithmetic(_ARITHMETIC[operation], x[0], x[-1])
+        if operation in _FUNCTIONS:
+            return self.call(_FUNCTIONS[operation], x)
+        if operation in _COMPARISONS:
+            return self.choose(_COMPARISONS[operation], x[0], x[1], one, zero)
+        if operation in _EXTREMES:
+            return self.choose(_EXTREMES[operation], x[0], x[1], x[0], x[1])
+        match operation:
+            case Operation.ASSIGN:
+                return x[0]
+            case Operation.NEGATE:
+                return self.negative(x[0])
+            case Operation.INVERSE:
+                return self.arithmetic("/", one, x[0])
+            case Operation.SIGN:
+                return self.sign(x[0])
+            case Operation.NOT:
+                return self.choose("==", x[0], zero, one, zero)
+            case Operation.AND:
+                return self.logical("*", x[0], x[1])
+            case Operation.OR:
+                return self.choose("!=", self.logical("+", x[0], x[1]), zero, one, zero)
+            case Operation.MASK | Operation.SELECT:
+                return self.choose("!=", x[0], zero, x[1], x[2] if operation == Operation.SELECT else zero)
+        raise TraceError(
+            f"operation {operation.name} has no {self.language} form; write the law over airmuscle.core.ops."
+        )
+
     def unless_zero(
         self, gates: Sequence[str], compute: Callable[[], dict[Operand, str]], instead: Mapping[Operand, str]
     ) -> dict[Operand, str]:
-        """The results that `compute` appends and returns if a gate is not zero, otherwise those of `instead`."""
+        """The results that `compute` appends and returns if a gate is not zero, otherwise those of `instead`.
+
+        In a language without branches they are computed in any case: their product with the gate is zero.
+        """
+        inside = compute()
+        return {operand: inside[operand] for operand in instead}
 
 
 class TargetLanguage(abc.ABC):
@@ -84,11 +156,6 @@ class TargetLanguage(abc.ABC):
     def preparation(self, name: str, inputs: Sequence[str], outputs: Sequence[str], body: FunctionBlock) -> str:
         """The text of a function that is called once for a set of parameters."""
         return self.function(name, inputs, outputs, body)
-
-
-def unknown_operation(operation: Operation, target: str) -> TraceError:
-    """The error of a language that lacks an operation."""
-    return TraceError(f"operation {operation.name} has no {target} form; write the law over airmuscle.core.ops.")
 
 
 def computed(

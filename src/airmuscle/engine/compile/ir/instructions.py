@@ -73,12 +73,10 @@ _CASADI_NAMES = {
 _OWN = (Operation.SELECT, Operation.MAXIMUM, Operation.MINIMUM)
 _COMPARE = (Operation.LESS_EQUAL, Operation.LESS)
 
-CALLED = frozenset({
-    Operation.EXP, Operation.LOG, Operation.SIN, Operation.COS, Operation.TAN, Operation.ATAN, Operation.SINH,
-    Operation.COSH, Operation.TANH, Operation.ASINH, Operation.ASIN, Operation.ACOS, Operation.LOG1P, Operation.EXPM1,
-    Operation.POWER, Operation.CONSTANT_POWER,
-})  # fmt: skip
-"""The operations for which a function of the C library is called."""
+_OF_ONE = "exp log sin cos tan atan sinh cosh tanh asinh asin acos log1p expm1"
+POWERS = (Operation.POWER, Operation.CONSTANT_POWER)
+CALLED = {Operation[name.upper()]: name for name in _OF_ONE.split()} | dict.fromkeys(POWERS, "pow")
+"""The functions of the C library that are called for operations."""
 
 
 class Instruction(NamedTuple):

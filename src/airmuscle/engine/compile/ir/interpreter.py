@@ -5,16 +5,14 @@ library that Python uses.
 """
 
 import math
+import operator
 import struct
 from collections.abc import Callable, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
-from .emission import FunctionBlock, unknown_operation
-from .instructions import Operand, Operation
-
-Function = Callable[..., float]
+from .emission import FunctionBlock
+from .instructions import Operand
 
 
 def _divided(x: float, y: float) -> float:
@@ -24,46 +22,10 @@ def _divided(x: float, y: float) -> float:
     return math.nan if x == 0.0 or math.isnan(x) else math.copysign(math.inf, sign)
 
 
-_FUNCTIONS: dict[Operation, Function] = {
-    Operation.SQRT: math.sqrt, Operation.EXP: math.exp, Operation.LOG: math.log, Operation.SIN: math.sin,
-    Operation.COS: math.cos, Operation.TAN: math.tan, Operation.ATAN: math.atan, Operation.SINH: math.sinh,
-    Operation.COSH: math.cosh, Operation.TANH: math.tanh, Operation.ASINH: math.asinh, Operation.ASIN: math.asin,
-    Operation.ACOS: math.acos, Operation.LOG1P: math.log1p, Operation.EXPM1: math.expm1, Operation.POWER: math.pow,
-    Operation.CONSTANT_POWER: math.pow, Operation.FLOOR: lambda x: float(math.floor(x)),
+_OPERATORS: dict[str, Callable[[float, float], float]] = {
+    "+": operator.add, "-": operator.sub, "*": operator.mul, "/": _divided, "<": operator.lt, "<=": operator.le,
+    ">": operator.gt, "==": operator.eq, "!=": operator.ne,
 }  # fmt: skip
-_OPERATIONS: dict[Operation, Function] = {
-    Operation.ASSIGN: lambda x: x,
-    Operation.ADD: lambda x, y: x + y,
-    Operation.SUBTRACT: lambda x, y: x - y,
-    Operation.MULTIPLY: lambda x, y: x * y,
-    Operation.AND: lambda x, y: x * y,
-    Operation.DIVIDE: _divided,
-    Operation.INVERSE: lambda x: _divided(1.0, x),
-    Operation.NEGATE: lambda x: -x,
-    Operation.SQUARE: lambda x: x * x,
-    Operation.TWICE: lambda x: x + x,
-    Operation.ABS: abs,
-    Operation.SIGN: lambda x: 1.0 if x > 0 else -1.0 if x < 0 else 0.0,
-    Operation.LESS: lambda x, y: float(x < y),
-    Operation.LESS_EQUAL: lambda x, y: float(x <= y),
-    Operation.EQUAL: lambda x, y: float(x == y),
-    Operation.NOT_EQUAL: lambda x, y: float(x != y),
-    Operation.NOT: lambda x: float(x == 0.0),
-    Operation.OR: lambda x, y: float(x + y != 0.0),
-    Operation.FMIN: lambda x, y: x if x < y else y,
-    Operation.FMAX: lambda x, y: x if x > y else y,
-    Operation.MINIMUM: lambda x, y: x if x < y else y,
-    Operation.MAXIMUM: lambda x, y: x if x > y else y,
-    Operation.MASK: lambda x, y: y if x != 0.0 else 0.0,
-    Operation.SELECT: lambda x, y, z: y if x != 0.0 else z,
-}
-_NOT_FINITE: dict[Operation, Callable[..., Any]] = {
-    Operation.SQRT: np.sqrt, Operation.EXP: np.exp, Operation.LOG: np.log, Operation.SIN: np.sin,
-    Operation.COS: np.cos, Operation.TAN: np.tan, Operation.SINH: np.sinh, Operation.COSH: np.cosh,
-    Operation.ASIN: np.arcsin, Operation.ACOS: np.arccos, Operation.LOG1P: np.log1p, Operation.EXPM1: np.expm1,
-    Operation.POWER: np.power, Operation.CONSTANT_POWER: np.power, Operation.FLOOR: np.floor,
-}  # fmt: skip
-"""Functions for which Python raises an exception where the C library gives infinity or NaN."""
 
 
 def _to_single(value: float) -> float:
@@ -80,14 +42,13 @@ class InterpretedBody(FunctionBlock):
     single  every number is rounded to single precision
     """
 
+    language = "interpreted"
+
     def __init__(self, arrays: Mapping[str, Sequence[float]], single: bool = False) -> None:
         super().__init__()
         self._single = single
         self.stored: dict[tuple[str, int], float] = {}
         self._arrays, self._values = arrays, dict[str, float]()
-
-    def assignment(self, name: str, expression: str) -> str:
-        return f"{name} = {expression}"
 
     def _result(self, value: float) -> str:
         name = self.new_name()
@@ -103,17 +64,22 @@ class InterpretedBody(FunctionBlock):
     def store(self, array: str, index: int, value: str) -> None:
         self.stored[array, index] = self._values[value]
 
-    def operate(self, operation: Operation, x: Sequence[str]) -> str:
+    def arithmetic(self, operator: str, a: str, b: str) -> str:
+        return self._result(_OPERATORS[operator](self._values[a], self._values[b]))
+
+    def negative(self, a: str) -> str:
+        return self._result(-self._values[a])
+
+    def choose(self, comparison: str, a: str, b: str, when_true: str, when_false: str) -> str:
+        return when_true if _OPERATORS[comparison](self._values[a], self._values[b]) else when_false
+
+    def call(self, function: str, x: Sequence[str]) -> str:
         values = [self._values[name] for name in x]
-        if operation in _OPERATIONS:
-            return self._result(_OPERATIONS[operation](*values))
-        if operation not in _FUNCTIONS:
-            raise unknown_operation(operation, "interpreted")
         try:
-            return self._result(_FUNCTIONS[operation](*values))
+            return self._result(float(getattr(math, "fabs" if function == "abs" else function)(*values)))
         except (ValueError, OverflowError):  # of Python; the C library gives infinity or NaN
             with np.errstate(all="ignore"):
-                return self._result(float(_NOT_FINITE[operation](*map(np.float64, values))))
+                return self._result(float(getattr(np, function)(*map(np.float64, values))))
 
     def unless_zero(
         self, gates: Sequence[str], compute: Callable[[], dict[Operand, str]], instead: Mapping[Operand, str]

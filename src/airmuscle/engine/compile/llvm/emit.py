@@ -5,8 +5,8 @@ import functools
 import struct
 from collections.abc import Callable, Mapping, Sequence
 
-from ..ir.emission import FunctionBlock, TargetLanguage, unknown_operation
-from ..ir.instructions import Operand, Operation
+from ..ir.emission import FunctionBlock, TargetLanguage
+from ..ir.instructions import CALLED, POWERS, Operand, Operation
 
 FLAGS = "nsz arcp contract reassoc afn"
 """Fast-math flags without nnan and ninf: a failed step must remain detectable by NaN or infinity."""
@@ -14,17 +14,10 @@ FLAGS = "nsz arcp contract reassoc afn"
 STEADY_POWER = "steadypow"
 """Name of the power with an exponent that depends on parameters alone, in lanes."""
 
-_BINARY = {Operation.ADD: "fadd", Operation.SUBTRACT: "fsub", Operation.MULTIPLY: "fmul", Operation.DIVIDE: "fdiv"}
-_INTRINSICS = {Operation.SQRT: "sqrt", Operation.ABS: "fabs", Operation.FLOOR: "floor"}
-_CALLS = {
-    Operation.EXP: "exp", Operation.LOG: "log", Operation.SIN: "sin", Operation.COS: "cos", Operation.TAN: "tan",
-    Operation.ATAN: "atan", Operation.SINH: "sinh", Operation.COSH: "cosh", Operation.TANH: "tanh",
-    Operation.ASINH: "asinh", Operation.ASIN: "asin", Operation.ACOS: "acos", Operation.LOG1P: "log1p",
-    Operation.EXPM1: "expm1",
-}  # fmt: skip
-_COMPARISONS = {Operation.LESS_EQUAL: "ole", Operation.LESS: "olt", Operation.EQUAL: "oeq", Operation.NOT_EQUAL: "une"}
-_EXTREMES = {Operation.FMIN: "olt", Operation.FMAX: "ogt", Operation.MINIMUM: "olt", Operation.MAXIMUM: "ogt"}
-"""Strict comparison, as in the processor's instruction: of two equal values either may be returned."""
+_INTRINSICS = {"sqrt": "sqrt", "abs": "fabs", "floor": "floor"}
+_ARITHMETIC = {"+": "fadd", "-": "fsub", "*": "fmul", "/": "fdiv"}
+_COMPARISONS = {"<": "olt", "<=": "ole", ">": "ogt", "==": "oeq", "!=": "une", "ordered": "ord"}
+"""Names of comparisons; numbers are ordered where none of them is NaN."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -83,7 +76,7 @@ class LlvmType:
 
 
 DOUBLE = LlvmType()
-_OF_ONE = (*sorted(_CALLS.values()), *(DOUBLE.intrinsic(name) for name in _INTRINSICS.values()))
+_OF_ONE = (*sorted({*CALLED.values()} - {"pow"}), *(DOUBLE.intrinsic(name) for name in _INTRINSICS.values()))
 DECLARED = "".join(f"declare double @{name}(double)\n" for name in _OF_ONE) + "declare double @pow(double, double)\n"
 """Declarations of the functions that printed code may call."""
 
@@ -140,12 +133,14 @@ class FunctionBody(FunctionBlock):
         self.lines.append(f"  store {self.number.text} {value}, ptr {place}, align {self.number.alignment}")
 
     def choose(self, comparison: str, a: str, b: str, when_true: str, when_false: str) -> str:
-        """`when_true` where `a comparison b`, else `when_false`."""
         number = self.number
-        test = self.put(f"fcmp {comparison} {number.text} {a}, {b}")
+        test = self.put(f"fcmp {_COMPARISONS[comparison]} {number.text} {a}, {b}")
         return self.put(f"select {number.mask} {test}, {number.text} {when_true}, {number.text} {when_false}")
 
     def call(self, function: str, x: Sequence[str]) -> str:
+        return self.intrinsic(_INTRINSICS[function], x) if function in _INTRINSICS else self.call_library(function, x)
+
+    def call_library(self, function: str, x: Sequence[str]) -> str:
         """Call of a function of the C library, or of its vectorised replacement in lanes."""
         number = self.number
         arguments = ", ".join(f"{number.text} {a}" for a in x)
@@ -168,18 +163,18 @@ class FunctionBody(FunctionBlock):
         result, square, left = self.constant(1.0), base, int(abs(value))
         while left:
             if left % 2:
-                result = self.put(f"fmul {FLAGS} {self.number.text} {result}, {square}")
-            square, left = self.put(f"fmul {FLAGS} {self.number.text} {square}, {square}"), left // 2
+                result = self.arithmetic("*", result, square)
+            square, left = self.arithmetic("*", square, square), left // 2
         if abs(value) % 1:
-            result = self.put(f"fmul {FLAGS} {self.number.text} {result}, {self.intrinsic('sqrt', (base,))}")
-        return result if value >= 0 else self.put(f"fdiv {FLAGS} {self.number.text} {self.constant(1.0)}, {result}")
+            result = self.arithmetic("*", result, self.intrinsic("sqrt", (base,)))
+        return result if value >= 0 else self.arithmetic("/", self.constant(1.0), result)
 
     def power_by_call(self, base: str, exponent: str) -> str:
         """base**exponent by a function."""
         if self.number == DOUBLE or (exponent not in self._constants and exponent not in self._steady):
-            return self.call("pow", (base, exponent))
+            return self.call_library("pow", (base, exponent))
         self.needed["pow"] = 2  # for arguments beyond the range of the shorter form
-        return self.call(STEADY_POWER, (base, exponent))
+        return self.call_library(STEADY_POWER, (base, exponent))
 
     def unless_zero(
         self, gates: Sequence[str], compute: Callable[[], dict[Operand, str]], instead: Mapping[Operand, str]
@@ -213,46 +208,17 @@ class FunctionBody(FunctionBlock):
             self.lines.append(f"  {joined[operand]} = phi {number.text} {ways}")
         return joined
 
+    def arithmetic(self, operator: str, a: str, b: str) -> str:
+        return self.put(f"{_ARITHMETIC[operator]} {FLAGS} {self.number.text} {a}, {b}")
+
+    def logical(self, operator: str, a: str, b: str) -> str:
+        return self.put(f"{_ARITHMETIC[operator]} {self.number.text} {a}, {b}")
+
+    def negative(self, a: str) -> str:
+        return self.put(f"fneg {FLAGS} {self.number.text} {a}")
+
     def operate(self, operation: Operation, x: Sequence[str]) -> str:
-        """The value of one operation, whose instructions are appended; raises TraceError for an unknown operation."""
-        if operation in _BINARY:
-            return self.put(f"{_BINARY[operation]} {FLAGS} {self.number.text} {x[0]}, {x[1]}")
-        if operation in _INTRINSICS:
-            return self.intrinsic(_INTRINSICS[operation], x[:1])
-        if operation in _CALLS:
-            return self.call(_CALLS[operation], x[:1])
-        if operation in _COMPARISONS:
-            return self.choose(_COMPARISONS[operation], x[0], x[1], self.constant(1.0), self.constant(0.0))
-        if operation in _EXTREMES:
-            return self.choose(_EXTREMES[operation], x[0], x[1], x[0], x[1])
-        if operation not in _OTHERS:
-            raise unknown_operation(operation, "LLVM")
-        return _OTHERS[operation](self, x, self.constant(0.0))
-
-    def sign(self, x: str, zero: str) -> str:
-        """1, 0 or -1, as the sign of a value."""
-        negative = self.choose("olt", x, zero, self.constant(-1.0), zero)
-        return self.choose("ogt", x, zero, self.constant(1.0), negative)
-
-
-_OTHERS: dict[Operation, Callable[[FunctionBody, Sequence[str], str], str]] = {
-    Operation.NEGATE: lambda to, x, zero: to.put(f"fneg {FLAGS} {to.number.text} {x[0]}"),
-    Operation.SQUARE: lambda to, x, zero: to.put(f"fmul {FLAGS} {to.number.text} {x[0]}, {x[0]}"),
-    Operation.TWICE: lambda to, x, zero: to.put(f"fadd {FLAGS} {to.number.text} {x[0]}, {x[0]}"),
-    Operation.INVERSE: lambda to, x, zero: to.put(f"fdiv {FLAGS} {to.number.text} {to.constant(1.0)}, {x[0]}"),
-    Operation.POWER: lambda to, x, zero: to.power(x[0], x[1]),
-    Operation.CONSTANT_POWER: lambda to, x, zero: to.power(x[0], x[1]),
-    Operation.NOT: lambda to, x, zero: to.choose("oeq", x[0], zero, to.constant(1.0), zero),
-    Operation.AND: lambda to, x, zero: to.put(f"fmul {to.number.text} {x[0]}, {x[1]}"),
-    Operation.OR: lambda to, x, zero: to.choose(
-        "une", to.put(f"fadd {to.number.text} {x[0]}, {x[1]}"), zero, to.constant(1.0), zero
-    ),
-    Operation.MASK: lambda to, x, zero: to.choose("une", x[0], zero, x[1], zero),
-    Operation.SELECT: lambda to, x, zero: to.choose("une", x[0], zero, x[1], x[2]),
-    Operation.SIGN: lambda to, x, zero: to.sign(x[0], zero),
-    Operation.ASSIGN: lambda to, x, zero: x[0],
-}  # fmt: skip
-"""The operations that are neither one instruction of two values nor a call, of arguments and zero."""
+        return self.power(x[0], x[1]) if operation in POWERS else super().operate(operation, x)
 
 
 @dataclasses.dataclass(frozen=True)

@@ -32,8 +32,8 @@ class _Functions(ExactBody):
 
     def exponential(self, x: str, low: str | None = None) -> str:
         """e**(x + low) with low of the order of the rounding error of x: 2**n e**r, |r| <= ln 2 / 2, Taylor series."""
-        x = self.choose("ogt", x, self.constant(720.0), self.constant(720.0), x)
-        x = self.choose("olt", x, self.constant(-760.0), self.constant(-760.0), x)
+        x = self.choose(">", x, self.constant(720.0), self.constant(720.0), x)
+        x = self.choose("<", x, self.constant(-760.0), self.constant(-760.0), x)
         n = self.rounded(self.times(x, self.constant(1 / math.log(2))))
         back = self.negative(n)
         r = self.fused(back, self.constant(LN2_HIGH), x)
@@ -47,8 +47,8 @@ class _Functions(ExactBody):
     def logarithm(self, x: str) -> tuple[str, str]:
         """ln x in two parts: x = 2**n m with m from sqrt(1/2) to sqrt(2), ln m = 2 artanh((m - 1)/(m + 1))."""
         scaled = self.times(x, self.constant(2.0**54))
-        bits = self.bits(self.choose("olt", x, self.constant(LEAST_NORMAL), scaled, x))
-        offset = self.choose("olt", x, self.constant(LEAST_NORMAL), self.constant(-54.0), self.constant(0.0))
+        bits = self.bits(self.choose("<", x, self.constant(LEAST_NORMAL), scaled, x))
+        offset = self.choose("<", x, self.constant(LEAST_NORMAL), self.constant(-54.0), self.constant(0.0))
         exponent = self.shifted("ashr", self.on_bits("sub", bits, math.sqrt(0.5)))
         m = self.from_bits(self.on_bits("sub", bits, self.shifted("shl", exponent)))
         n = self.subtract(self.from_bits(self.on_bits("add", exponent, self.rounder)), self.constant(self.rounder))
@@ -83,10 +83,10 @@ class _Functions(ExactBody):
     def _at_the_ends(self, x: str, high: str, low: str) -> tuple[str, str]:
         """The logarithm with its values at 0, infinity, negative arguments and NaN."""
         zero, infinity = self.constant(0.0), self.constant(math.inf)
-        high = self.choose("olt", x, infinity, high, x)
-        high = self.choose("oeq", x, zero, self.constant(-math.inf), high)
-        high = self.choose("olt", x, zero, self.constant(math.nan), high)
-        return high, self.choose("olt", self.size_of(high), infinity, low, zero)
+        high = self.choose("<", x, infinity, high, x)
+        high = self.choose("==", x, zero, self.constant(-math.inf), high)
+        high = self.choose("<", x, zero, self.constant(math.nan), high)
+        return high, self.choose("<", self.size_of(high), infinity, low, zero)
 
     def power_by_logarithm(self, x: str, y: str) -> str:
         """x**y = e**(y ln|x|), with the sign and the exceptions of IEEE 754."""
@@ -95,18 +95,18 @@ class _Functions(ExactBody):
         high, low = self.logarithm(size)
         product = self.times(y, high)
         lost = self.fused(y, low, self.fused(y, high, self.negative(product)))
-        lost = self.choose("olt", self.size_of(product), self.constant(1e3), lost, zero)
+        lost = self.choose("<", self.size_of(product), self.constant(1e3), lost, zero)
         value = self.exponential(product, lost)
-        value = self.choose("oeq", size, one, self.choose("ord", y, y, one, y), value)
+        value = self.choose("==", size, one, self.choose("ordered", y, y, one, y), value)
         half = self.times(y, self.constant(0.5))
-        whole = self.choose("oeq", self.rounded(y), y, one, zero)
-        even = self.choose("oeq", self.rounded(half), half, one, zero)
+        whole = self.choose("==", self.rounded(y), y, one, zero)
+        even = self.choose("==", self.rounded(half), half, one, zero)
         signed = self.intrinsic("copysign", (value, x), "")
-        value = self.choose("ogt", whole, even, signed, value)
-        undefined = self.choose("oeq", whole, one, value, self.constant(math.nan))
-        value = self.choose("olt", x, zero, self.choose("olt", size, infinity, undefined, value), value)
-        value = self.choose("oeq", y, zero, one, value)
-        return self.choose("oeq", x, one, one, value)
+        value = self.choose(">", whole, even, signed, value)
+        undefined = self.choose("==", whole, one, value, self.constant(math.nan))
+        value = self.choose("<", x, zero, self.choose("<", size, infinity, undefined, value), value)
+        value = self.choose("==", y, zero, one, value)
+        return self.choose("==", x, one, one, value)
 
     def sine(self, x: str, quarters: float) -> str:
         """sin(x + quarters pi/2) for |x| up to LARGEST_ANGLE: reduction by multiples of pi/2, then Taylor series."""

@@ -7,21 +7,8 @@ import re
 from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import ClassVar, NamedTuple
 
-from ..ir.emission import FunctionBlock, TargetLanguage, unknown_operation
-from ..ir.instructions import Operand, Operation
-
-_BINARY = {
-    Operation.ADD: "+", Operation.SUBTRACT: "-", Operation.MULTIPLY: "*", Operation.DIVIDE: "/", Operation.AND: "*",
-}  # fmt: skip
-FUNCTIONS = {
-    Operation.SQRT: "sqrt", Operation.ABS: "abs", Operation.FLOOR: "floor", Operation.EXP: "exp",
-    Operation.LOG: "log", Operation.SIN: "sin", Operation.COS: "cos", Operation.TAN: "tan", Operation.ATAN: "atan",
-    Operation.SINH: "sinh", Operation.COSH: "cosh", Operation.TANH: "tanh", Operation.ASINH: "asinh",
-    Operation.ASIN: "asin", Operation.ACOS: "acos", Operation.LOG1P: "log1p", Operation.EXPM1: "expm1",
-    Operation.POWER: "pow", Operation.CONSTANT_POWER: "pow",
-}  # fmt: skip
-"""Operations that are calls of a function, under the usual names."""
-
+from ..ir.emission import FunctionBlock, TargetLanguage
+from ..ir.instructions import Operand
 
 _NUMBERED = re.compile(r"\bv\d+\b")
 _DEFINED = re.compile(r"^\s*(?:const )?(?:\w+ )?(v\d+) = ")
@@ -46,8 +33,6 @@ class TextBody(FunctionBlock, abc.ABC):
     by name, `sizes` the lengths of the arrays that are written.
     """
 
-    language: str
-    """Name of the language in messages."""
     equal, unequal, either = "==", "!=", "||"
     margin, end = "  ", ";"
     """What stands before and after every statement."""
@@ -67,13 +52,19 @@ class TextBody(FunctionBlock, abc.ABC):
         """An array element as an expression."""
         return f"{array}[{index}]"
 
-    def choose(self, test: str, when_true: str, when_false: str) -> str:
+    def arithmetic(self, operator: str, a: str, b: str) -> str:
+        return self.put(f"{a} {operator} {b}")
+
+    def negative(self, a: str) -> str:
+        return self.put(f"-{a}")
+
+    def choose(self, comparison: str, a: str, b: str, when_true: str, when_false: str) -> str:
+        relation = {"==": self.equal, "!=": self.unequal}.get(comparison, comparison)
+        return self.conditional(f"{a} {relation} {b}", when_true, when_false)
+
+    def conditional(self, test: str, when_true: str, when_false: str) -> str:
         """The name of one of two values, by a test."""
         return self.put(f"({test}) ? {when_true} : {when_false}")
-
-    @abc.abstractmethod
-    def call(self, function: str, x: Sequence[str]) -> str:
-        """The name of the value of a function of FUNCTIONS."""
 
     @abc.abstractmethod
     def remark(self, text: str) -> str:
@@ -136,38 +127,6 @@ class TextBody(FunctionBlock, abc.ABC):
         remark = names[found[1]].remark if found and found[1] in names else ""
         text = _NUMBERED.sub(lambda value: names[value[0]].name if value[0] in names else value[0], line)
         return f"{text}  {self.remark(remark)}" if remark else text
-
-    def operate(self, operation: Operation, x: Sequence[str]) -> str:
-        if operation in _BINARY:
-            return self.put(f"{x[0]} {_BINARY[operation]} {x[1]}")
-        if operation in FUNCTIONS:
-            return self.call(FUNCTIONS[operation], x)
-        one, zero = self.constant(1.0), self.constant(0.0)
-        simple = {
-            Operation.ASSIGN: lambda: x[0],
-            Operation.NEGATE: lambda: self.put(f"-{x[0]}"),
-            Operation.SQUARE: lambda: self.put(f"{x[0]} * {x[0]}"),
-            Operation.TWICE: lambda: self.put(f"{x[0]} + {x[0]}"),
-            Operation.INVERSE: lambda: self.put(f"{one} / {x[0]}"),
-            Operation.LESS: lambda: self.choose(f"{x[0]} < {x[1]}", one, zero),
-            Operation.LESS_EQUAL: lambda: self.choose(f"{x[0]} <= {x[1]}", one, zero),
-            Operation.EQUAL: lambda: self.choose(f"{x[0]} {self.equal} {x[1]}", one, zero),
-            Operation.NOT_EQUAL: lambda: self.choose(f"{x[0]} {self.unequal} {x[1]}", one, zero),
-            Operation.NOT: lambda: self.choose(f"{x[0]} {self.equal} {zero}", one, zero),
-            Operation.OR: lambda: self.choose(f"{self.put(f'{x[0]} + {x[1]}')} {self.unequal} {zero}", one, zero),
-            Operation.FMIN: lambda: self.choose(f"{x[0]} < {x[1]}", x[0], x[1]),
-            Operation.FMAX: lambda: self.choose(f"{x[0]} > {x[1]}", x[0], x[1]),
-            Operation.MINIMUM: lambda: self.choose(f"{x[0]} < {x[1]}", x[0], x[1]),
-            Operation.MAXIMUM: lambda: self.choose(f"{x[0]} > {x[1]}", x[0], x[1]),
-            Operation.MASK: lambda: self.choose(f"{x[0]} {self.unequal} {zero}", x[1], zero),
-            Operation.SELECT: lambda: self.choose(f"{x[0]} {self.unequal} {zero}", x[1], x[2]),
-            Operation.SIGN: lambda: self.choose(
-                f"{x[0]} > {zero}", one, self.choose(f"{x[0]} < {zero}", self.constant(-1.0), zero)
-            ),
-        }
-        if operation not in simple:
-            raise unknown_operation(operation, self.language)
-        return simple[operation]()
 
     def unless_zero(
         self, gates: Sequence[str], compute: Callable[[], dict[Operand, str]], instead: Mapping[Operand, str]

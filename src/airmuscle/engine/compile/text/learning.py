@@ -1,10 +1,9 @@
 """Text of printed functions for learning: PyTorch functions of tensors, and Warp kernels, a thread a column."""
 
 import dataclasses
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 
 from ..ir.emission import FunctionBlock
-from ..ir.instructions import Operand
 from .body import TextBody, TextLanguage
 
 _OWN = ("asinh", "log1p", "expm1")
@@ -21,7 +20,7 @@ class TorchBody(TextBody):
     def remark(self, text: str) -> str:
         return f"# {text}"
 
-    def choose(self, test: str, when_true: str, when_false: str) -> str:
+    def conditional(self, test: str, when_true: str, when_false: str) -> str:
         """A choice; two constants have the type of the tensors, not the default one of PyTorch."""
         if (when_true, when_false) == (self.constant(1.0), self.constant(0.0)):
             return self.put(f"({test}).to(like.dtype)")
@@ -35,11 +34,7 @@ class TorchBody(TextBody):
     def begin_branch(self, test: str) -> str:
         return f"    if {test}:"
 
-    def unless_zero(
-        self, gates: Sequence[str], compute: Callable[[], dict[Operand, str]], instead: Mapping[Operand, str]
-    ) -> dict[Operand, str]:
-        inside = compute()  # without a branch: a product with the gate is zero, but its derivative by the gate is not
-        return {operand: inside[operand] for operand in instead}
+    unless_zero = FunctionBlock.unless_zero  # a product with the gate is zero, but its derivative by the gate is not
 
 
 @dataclasses.dataclass(frozen=True)
@@ -77,7 +72,7 @@ class WarpBody(TextBody):
     def element(self, array: str, index: int) -> str:
         return f"{array}[{index}, column]"
 
-    def choose(self, test: str, when_true: str, when_false: str) -> str:
+    def conditional(self, test: str, when_true: str, when_false: str) -> str:
         return self.put(f"wp.where({test}, {when_true}, {when_false})")
 
     def call(self, function: str, x: Sequence[str]) -> str:

@@ -129,7 +129,7 @@ class MatlabBody(TextBody):
     def element(self, array: str, index: int) -> str:
         return f"{array}({index + 1})"
 
-    def choose(self, test: str, when_true: str, when_false: str) -> str:
+    def conditional(self, test: str, when_true: str, when_false: str) -> str:
         key = f"({test}) ? {when_true} : {when_false}"
         if key not in self._known:
             name = self.new_name()
