@@ -14,7 +14,7 @@ from airmuscle.engine.compile import Printer
 from airmuscle.engine.compile.ir.instructions import Operation
 from airmuscle.engine.compile.llvm import emit, vector_math
 from airmuscle.engine.compile.llvm.emit import LlvmType
-from airmuscle.engine.compile.llvm.jit import jit_compile
+from airmuscle.engine.compile.llvm.jit import engine_of, object_code
 from airmuscle.engine.run.batch.lanes import aligned_arrays
 from airmuscle.errors import TraceError
 
@@ -33,7 +33,7 @@ def run(number, expressions, *columns):
     printer.add("f", {"x": symbols}, {"y": casadi.densify(outputs)})
     parts = [vector_math.definition(name, count, number) for name, count in printer.needed.items()]
     text = "\n".join([vector_math.declarations({number}), *parts, printer.module()])
-    return call(jit_compile(text), number, columns, outputs.numel())
+    return call(engine_of(object_code(text)), number, columns, outputs.numel())
 
 
 def call(engine, number, columns, results):
@@ -132,7 +132,7 @@ def test_the_printers_own_operations_choose_lane_by_lane(number):
         ]
     ):
         block.store("y", i, block.operate(operation, operands))
-    engine = jit_compile(emit.function("f", ["x", "y"], block))
+    engine = engine_of(object_code(emit.function("f", ["x", "y"], block)))
     kind = np.float64 if number.bits == 64 else np.float32
     x, y = (
         column.astype(kind) for column in ([0.0, 1.0, 0.0, -2.0] * 5, np.arange(20.0)) for column in [np.array(column)]
@@ -202,7 +202,7 @@ def steady_power(number, x, y):
     block.store("y", 0, block.power(block.load("x", 0), block.load("c", 0)))
     parts = [vector_math.definition(name, count, number) for name, count in block.needed.items()]
     text = emit.function("f", ["x", "c", "y"], block)
-    engine = jit_compile("\n".join([vector_math.declarations({number}), *parts, text]))
+    engine = engine_of(object_code("\n".join([vector_math.declarations({number}), *parts, text])))
     function = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 3)(engine.get_function_address("f"))
     kind, found = np.float64 if number.bits == 64 else np.float32, []
     arrays = aligned_arrays((1, 1, 1), number.lanes, kind)

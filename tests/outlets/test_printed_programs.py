@@ -18,7 +18,7 @@ import pytest
 from airmuscle.engine.compile import compile_system, derivatives, functions
 from airmuscle.engine.compile.ir.instructions import Operation
 from airmuscle.engine.compile.ir.interpreter import InterpretedBody
-from airmuscle.engine.compile.llvm.jit import jit_compile
+from airmuscle.engine.compile.llvm.jit import engine_of, object_code
 from airmuscle.engine.compile.text.programs import DEFINITION, CLanguage, JavaScriptLanguage, MatlabLanguage
 from airmuscle.errors import TraceError
 
@@ -163,7 +163,7 @@ def every_operation(language):
 @pytest.fixture(scope="module")
 def operation_values():
     """The values of every operation at every point, by the machine code of the library."""
-    engine = jit_compile(every_operation(functions.LLVM))
+    engine = engine_of(object_code(every_operation(functions.LLVM)))
     function = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(engine.get_function_address("f"))
     rows = np.empty((len(POINTS), len(EVERY)))
     for row, point in zip(rows, POINTS, strict=True):

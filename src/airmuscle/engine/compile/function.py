@@ -1,8 +1,8 @@
 """Expressions as compiled functions of arrays, rates with disturbances, partial derivatives, and event indicators."""
 
 import dataclasses
+import functools
 import math
-import weakref
 from collections.abc import Sequence
 from typing import Any
 
@@ -11,62 +11,39 @@ import numpy as np
 from ...core import Array
 from .cache.kernel import evaluate
 from .cache.store import load_module
-from .functions import PARAMETERS, Printer, TracedSystem
+from .functions import PARAMETERS, POINT, Printer, TracedSystem
 from .ir import emission, jacobian
-from .ir.instructions import Code, Instruction, Operand, Operation, finished, recorded
+from .ir.instructions import ZERO, Code, Instruction, Operand, Operation, finished, recorded
 from .ir.interpreter import InterpretedBody
-from .ir.jacobian import ZERO, Tape
+from .ir.jacobian import Tape
 from .llvm import vector_math
 from .llvm.emit import LlvmLanguage, LlvmType
 from .program import CompiledSystem, Program, prepare_function
+
+LANES = 8
+"""Points of one call of a function in lanes: the widest register (chosen)."""
 
 
 class Function:
     """CasADi expressions of vectors, compiled: `address` is that of a function of the inputs' and outputs' arrays.
 
-    A matrix is written row by row. The machine code lives as long as this object.
-    """
-
-    def __init__(self, inputs: dict[str, Any], outputs: dict[str, Any]) -> None:
-        import casadi
-
-        rows = {name: casadi.densify(casadi.vec(casadi.SX(value).T)) for name, value in outputs.items()}
-        printer = Printer()
-        printer.add("function", inputs, rows)
-        self._engine = load_module(printer.module())
-        self.address = int(self._engine.get_function_address("function"))
-
-
-LANES = 8
-"""Points of one call: the widest register (chosen)."""
-_ALIGNMENT = 64
-
-
-class LanesFunction:
-    """CasADi expressions of vectors, compiled for several points at once; `address`: f(inputs..., outputs...).
-
-    Element i of an input or output is a row of `lanes` numbers, in arrays that `lanes_array` gives for LANES points.
+    A matrix is written row by row. With `lanes` above 1 the function computes so many points at once: each element of
+    an input or output is a row of so many numbers, in arrays that are aligned as vectors must be (`aligned_array`).
     The machine code lives as long as this object.
     """
 
-    def __init__(self, inputs: dict[str, Any], outputs: dict[str, Any], lanes: int = LANES) -> None:
+    def __init__(self, inputs: dict[str, Any], outputs: dict[str, Any], lanes: int = 1) -> None:
         import casadi
 
         number = LlvmType(lanes=lanes)
+        rows = {name: casadi.densify(casadi.vec(casadi.SX(value).T)) for name, value in outputs.items()}
         printer = Printer(LlvmLanguage(number))
-        printer.add("function", inputs, {name: casadi.densify(casadi.SX(value)) for name, value in outputs.items()})
+        printer.add("function", inputs, rows)
         parts = [vector_math.definition(name, count, number) for name, count in printer.needed.items()]
-        text = "\n".join([vector_math.declarations({number}), *parts, printer.module()])
-        self._engine = load_module(text)
+        if lanes > 1:
+            parts.insert(0, vector_math.declarations({number}))
+        self._engine = load_module("\n".join([*parts, printer.module()]))
         self.address = int(self._engine.get_function_address("function"))
-
-
-def lanes_array(*shape: int) -> Array:
-    """An array of zeros whose last dimension has LANES numbers, aligned as vectors must be."""
-    count = int(np.prod(shape)) * LANES
-    raw = np.zeros(count + _ALIGNMENT // 8)
-    start = (-raw.ctypes.data % _ALIGNMENT) // 8
-    return raw[start : start + count].reshape(*shape, LANES)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -135,9 +112,6 @@ def states_and_outputs(functions: AugmentedRates, count: int, states: Array, inp
     return np.hstack([states[:, :count], values])
 
 
-_functions: weakref.WeakKeyDictionary[Program, Any] = weakref.WeakKeyDictionary()
-
-
 @dataclasses.dataclass(frozen=True, eq=False)
 class Derivatives:
     """Rates f (n,) and outputs o (k,), and their slopes by state x and input u."""
@@ -157,15 +131,14 @@ def derivatives(ready: CompiledSystem, state: Sequence[float], inputs: Sequence[
     return Derivatives(f[:, 0], o.reshape(-1), *slopes)
 
 
+@functools.cache
 def _function(program: Program) -> Any:
     """(x, u, p) -> (f, o, df/dx, df/du, do/dx, do/du), differentiated once for a structure."""
-    if program not in _functions:
-        import casadi
+    import casadi
 
-        t = program.traced
-        slopes = [casadi.jacobian(value, by) for value in (t.f, t.o) for by in (t.x, t.u)]
-        _functions[program] = casadi.Function("derivatives", [t.x, t.u, t.p], [t.f, t.o, *slopes])
-    return _functions[program]
+    t = program.traced
+    slopes = [casadi.jacobian(value, by) for value in (t.f, t.o) for by in (t.x, t.u)]
+    return casadi.Function("derivatives", [t.x, t.u, t.p], [t.f, t.o, *slopes])
 
 
 Place = tuple[int, int]
@@ -181,23 +154,19 @@ class Partials:
 
     def extend(self, printer: Printer) -> None:
         """Print `partials(x, u, c, D)`, whose result D has one value for each place."""
-        printer.add_code("partials", ["x", "u", PARAMETERS], self.code, ["D"])
+        printer.add_code("partials", POINT, self.code, ["D"])
 
 
 def partials(t: TracedSystem) -> Partials:
     """The partial derivatives of a traced system."""
     code = recorded([t.x, t.u, t.p], [t.f, t.o])
     n, m = t.x.numel(), t.u.numel()
-    tape, operands = Tape(code.body), {(k, index): operand for k, index, operand in code.outputs}
-    results = [operands.get((0, i), ZERO) for i in range(n)] + [operands.get((1, i), ZERO) for i in range(t.o.numel())]
-    columns = [("in", 0, j) for j in range(n)] + [("in", 1, j) for j in range(m)]
-    rows = jacobian.derivatives(tape, results, columns)
-    values = {(i, j): row[x] for i, row in enumerate(rows) for j, x in enumerate(columns) if x in row}
+    tape, results = Tape(code.body), code.results(0, n) + code.results(1, t.o.numel())
+    values = jacobian.nonzeros(tape, results, [*(("in", 0, j) for j in range(n)), *(("in", 1, j) for j in range(m))])
     outputs = tuple((0, k, operand) for k, operand in enumerate(values.values()))
     return Partials(finished(Code(tuple(tape.body), outputs)), tuple(values))
 
 
-ARGUMENTS = ["x", "u", PARAMETERS]
 _COMPARISONS = frozenset({
     Operation.LESS, Operation.LESS_EQUAL, Operation.FMIN, Operation.FMAX, Operation.MINIMUM, Operation.MAXIMUM,
 })  # fmt: skip
@@ -217,12 +186,12 @@ class EventIndicators:
 
     def extend(self, printer: Printer) -> None:
         """Print `indicators(x, u, c, z)`, whose result z has one value for each."""
-        printer.add_code("indicators", ARGUMENTS, self.code, ["z"])
+        printer.add_code("indicators", POINT, self.code, ["z"])
 
     def values(self, x: Array, u: Array, p: Array) -> list[float]:
         """The event indicators at a state under inputs, by interpretation of the instructions."""
-        block = InterpretedBody(dict(zip(ARGUMENTS, (x.tolist(), u.tolist(), p.tolist()), strict=True)))
-        for (_, index), value in emission.computed(block, self.code, ARGUMENTS, {}, {}).items():
+        block = InterpretedBody(dict(zip(POINT, (x.tolist(), u.tolist(), p.tolist()), strict=True)))
+        for (_, index), value in emission.computed(block, self.code, POINT, {}, {}).items():
             block.store("z", index, value)
         return [block.stored["z", i] for i in range(self.count)]
 
@@ -252,7 +221,7 @@ def event_indicators(t: TracedSystem) -> EventIndicators:
             if line.operation in _COMPARISONS:
                 pairs.setdefault(frozenset(line.arguments), (line.arguments[0], line.arguments[1]))
             elif line.operation in _OF_ZERO:
-                pairs.setdefault(frozenset({line.arguments[0], ("c", 0.0)}), (line.arguments[0], ("c", 0.0)))
+                pairs.setdefault(frozenset({line.arguments[0], ZERO}), (line.arguments[0], ZERO))
     body += [Instruction(Operation.SUBTRACT, ("t", "z", i), pair) for i, pair in enumerate(pairs.values())]
     outputs = tuple((0, i, ("t", "z", i)) for i in range(len(pairs)))
     return EventIndicators(finished(Code(tuple(body), outputs)), len(pairs))

@@ -9,7 +9,7 @@ from ...core import System, TraceError, autodiff
 from .ir import emission
 from .ir.emission import FunctionBlock, TargetLanguage
 from .ir.instructions import Code, Operand, finished, hoisted, instructions, recorded
-from .ir.jacobian import ZERO, Tape, derivatives
+from .ir.jacobian import Tape, nonzeros
 from .ir.sparse_lu import Factors
 from .llvm.emit import LlvmLanguage
 from .text.body import NO_LABEL
@@ -17,6 +17,8 @@ from .text.body import NO_LABEL
 LLVM = LlvmLanguage()
 PARAMETERS = "p"
 """The argument of a traced function that holds parameters; it is replaced by what `prepare` left in `c`."""
+POINT = ("x", "u", PARAMETERS)
+"""The arguments that rates and outputs depend on."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -30,6 +32,11 @@ class TracedSystem:
     f: Any
     o: Any
     output_names: tuple[str, ...]
+
+    @property
+    def point(self) -> dict[str, Any]:
+        """What rates and outputs depend on, by the names of the arguments."""
+        return dict(zip(POINT, (self.x, self.u, self.p), strict=True))
 
 
 def trace_system(system: System) -> TracedSystem:
@@ -158,12 +165,8 @@ Extension = Callable[[Printer], None]
 """What adds further functions to a module; they share its `prepare`."""
 
 
-def no_extension(printer: Printer) -> None:
-    """The functions of the module alone."""
-
-
 def implicit_module(
-    t: TracedSystem, language: TargetLanguage = LLVM, extend: Extension = no_extension
+    t: TracedSystem, language: TargetLanguage = LLVM, extend: Extension | None = None
 ) -> tuple[str, ArraySizes]:
     """What an implicit method needs: rhs, jac, factor, solve, stage, df_dt and outputs.
 
@@ -183,8 +186,7 @@ def implicit_module(
     lu = Factors(places, slots, size)
     a, g, b = (casadi.SX.sym(n, k) for n, k in (("A", lu.values.numel()), ("g", size), ("b", size)))
     stage, solve = lu.solved(a, [t.f[i] + g[i] for i in range(size)]), lu.solved(a, [b[i] for i in range(size)])
-    point = {"x": t.x, "u": t.u, PARAMETERS: t.p}
-    printer = Printer(language)
+    printer, point = Printer(language), t.point
     printer.quantities = point, t.o
     printer.add_code("rhs", list(point), finished(code), ["f"])
     printer.add_code("jac", list(point), slopes, ["f", "J"])
@@ -194,30 +196,30 @@ def implicit_module(
     df_dt = casadi.densify(casadi.jtimes(t.f, t.u, t.w) if t.u.numel() else casadi.SX(size, 1))
     printer.add("df_dt", {**point, "w": t.w}, {"f": df_dt})
     printer.add("outputs", point, {"o": t.o})
-    extend(printer)
+    if extend is not None:
+        extend(printer)
     sizes = ArraySizes(size, t.u.shape[0], t.p.shape[0], printer.held, lu.j.numel(), lu.values.numel(), t.o.shape[0])
     return printer.module(), sizes
 
 
 def rates_module(
-    t: TracedSystem, language: TargetLanguage = LLVM, extend: Extension = no_extension
+    t: TracedSystem, language: TargetLanguage = LLVM, extend: Extension | None = None
 ) -> tuple[str, ArraySizes]:
     """What a caller with an integrator of its own needs: rhs and outputs, as in `implicit_module`."""
-    printer, point = Printer(language), {"x": t.x, "u": t.u, PARAMETERS: t.p}
+    printer, point = Printer(language), t.point
     printer.quantities = point, t.o
     printer.add("rhs", point, {"f": t.f})
     printer.add("outputs", point, {"o": t.o})
-    extend(printer)
+    if extend is not None:
+        extend(printer)
     sizes = ArraySizes(t.x.numel(), t.u.numel(), t.p.numel(), printer.held, 0, 0, t.o.numel())
     return printer.module(), sizes
 
 
 def _rates_and_slopes(t: TracedSystem, code: Code) -> tuple[Code, tuple[tuple[int, int], ...], tuple[int, ...]]:
     """The rates and the distinct non-zeros of their Jacobian; its places, and which non-zero stands in each."""
-    tape, by_index = Tape(code.body), {index: operand for _, index, operand in code.outputs}
-    rates = [by_index.get(i, ZERO) for i in range(t.x.numel())]
-    rows = derivatives(tape, rates, [("in", 0, j) for j in range(t.x.numel())])
-    slopes = {(i, j): row[x] for i, row in enumerate(rows) for j in range(len(rows)) if (x := ("in", 0, j)) in row}
+    tape, rates = Tape(code.body), code.results(0, t.x.numel())
+    slopes = nonzeros(tape, rates, [("in", 0, j) for j in range(len(rates))])
     distinct = list(dict.fromkeys(slopes.values()))
     outputs = [(k, i, operand) for k, operands in enumerate((rates, distinct)) for i, operand in enumerate(operands)]
     slots = tuple(distinct.index(operand) for operand in slopes.values())
@@ -239,5 +241,5 @@ def explicit_module(t: TracedSystem, a: Sequence[Sequence[float]], b: Sequence[f
         slopes.append(rates(t.x + h * increment if row else t.x, t.u + sum(row) * h * t.w, t.p))
     step = t.x + h * sum((weight * k for weight, k in zip(b, slopes, strict=True) if weight), casadi.SX(0))
     printer = Printer()
-    printer.add("step", {"x": t.x, "u": t.u, PARAMETERS: t.p, "w": t.w, "h": h}, {"y": step}, ["h"])
+    printer.add("step", {**t.point, "w": t.w, "h": h}, {"y": step}, ["h"])
     return printer.module(), printer.held

@@ -2,14 +2,12 @@
 
 from collections.abc import Mapping, Sequence
 
-from .functions import PARAMETERS, Extension, Printer, TracedSystem
+from .functions import POINT, Extension, Printer, TracedSystem
 from .ir import emission
 from .ir.instructions import Code, Operand, instructions
 from .llvm import emit, vector_math
 from .llvm.emit import FLAGS, FunctionBody, LlvmLanguage, LlvmType
 
-POINT = ("x", "u", PARAMETERS)
-"""The arguments that rates and outputs depend on."""
 AT_ONCE = 64
 """Bytes of one value in the step: the widest register (measured; values of two do not fit the registers)."""
 
@@ -32,12 +30,10 @@ def row_outputs(t: TracedSystem) -> Extension:
 
     x, u, o   (W, n), (W, m), (W, k), one row after the other
     """
-    point = dict(zip(POINT, (t.x, t.u, t.p), strict=True))
 
     def add(printer: Printer) -> None:
         block = _RowsBody({"x": t.x.numel(), "u": t.u.numel(), "o": t.o.numel()})
-        code = instructions(list(point.values()), [t.o])
-        for (_, index), value in printer.compute(block, code, list(point)).items():
+        for (_, index), value in printer.compute(block, instructions([t.x, t.u, t.p], [t.o]), POINT).items():
             block.store("o", index, value)
         text = emit.function("row_outputs", ["x", "u", "c", "o"], block)
         printer.text.append(vector_math.declarations({ROWS}) + text)
@@ -99,7 +95,7 @@ def lanes_module(
     prepare(p, c)            what both need of the parameters
     """
     printer = Printer(LlvmLanguage(number))
-    point = dict(zip(POINT, (t.x, t.u, t.p), strict=True))
+    point = t.point
     code, held = printer.without_parameters(point, {"f": t.f})
     step = _Step(t, code, held, number)
     text = step.printed(a, b)

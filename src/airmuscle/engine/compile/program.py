@@ -7,7 +7,7 @@ import math
 import threading
 import weakref
 from collections.abc import Callable, Hashable, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -79,15 +79,6 @@ INPUT_TOLERANCE = 1e-9
 _FUNCTIONS = ("rhs", "jac", "factor", "solve", "stage", "df_dt", "outputs")
 
 
-class _ExplicitStep(NamedTuple):
-    """The address of a compiled step, its `prepare`, how many values that gives, and the owner of the machine code."""
-
-    address: int
-    prepare: Callable[[Array, int], Array]
-    size: int
-    engine: Any
-
-
 class Program:
     """The compiled functions of one structure; it owns the machine code and cannot be pickled."""
 
@@ -101,7 +92,7 @@ class Program:
         else:
             self._form = functions.trace_system(system)
             rows = rows_at_once(self._form)
-            extend = row_outputs(self._form) if rows > 1 else functions.no_extension
+            extend = row_outputs(self._form) if rows > 1 else None
             text, self.sizes = functions.implicit_module(self._form, extend=extend)
         self.output_names = self._form.output_names
         self._engine = load_module(text)
@@ -110,7 +101,7 @@ class Program:
         self.outputs_at_rows = at_rows, rows
         """The address of the function that computes the outputs at rows, and at how many at once."""
         self._prepare = prepare_function(self._engine)
-        self._steps: dict[Any, _ExplicitStep] = {}
+        self._steps: dict[Tableau, tuple[Any, int, Callable[[Array, int], Array], int]] = {}
         self._lane_modules: dict[Any, tuple[Any, int]] = {}
         self._compiling = threading.Lock()  # of two threads that need a step, one compiles it: an engine must stay
 
@@ -130,9 +121,9 @@ class Program:
                 text, size = self._step_module(tableau)
                 engine = load_module(text)
                 address = int(engine.get_function_address("step"))
-                self._steps[tableau] = _ExplicitStep(address, prepare_function(engine), size, engine)
-        step = self._steps[tableau]
-        return step.address, step.prepare(parameters, step.size)
+                self._steps[tableau] = engine, address, prepare_function(engine), size
+        _, address, prepare, size = self._steps[tableau]
+        return address, prepare(parameters, size)
 
     def _step_module(self, tableau: Tableau) -> tuple[str, int]:
         if isinstance(self._form, sensitivities.TangentSystem):

@@ -11,15 +11,12 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ...core import SensitivitySystem
-from .functions import PARAMETERS, ArraySizes, Printer, TracedSystem, trace_system
-from .ir.instructions import Code, Operand, finished, recorded
-from .ir.jacobian import ZERO, Tape, derivatives
+from .functions import PARAMETERS, POINT, ArraySizes, Printer, TracedSystem, trace_system
+from .ir.instructions import ZERO, Code, Operand, finished, recorded
+from .ir.jacobian import Tape, derivatives
 from .ir.sparse_lu import Factors
 from .llvm.emit import FunctionBody
 from .llvm.exact import LlvmValue, loaded, packed
-
-POINT = ("x", "u", PARAMETERS)
-"""The arguments that rates and outputs depend on."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -70,10 +67,8 @@ class Values:
     dv = (dv/dx) S + (dv/du) V + dv/dtheta."""
 
     def __init__(self, t: TangentSystem, expressions: Any, further: Sequence[Any] = ()) -> None:
-        code = recorded([*(getattr(t.inner, name) for name in POINT), *further], [expressions])
-        self.t, self.tape = t, Tape(code.body)
-        by_index = {index: operand for _, index, operand in code.outputs}
-        self.results = [by_index.get(i, ZERO) for i in range(expressions.numel())]
+        code = recorded([*t.inner.point.values(), *further], [expressions])
+        self.t, self.tape, self.results = t, Tape(code.body), code.results(0, expressions.numel())
 
     def along(self, results: Sequence[Operand]) -> "DirectionalDerivative":
         """The derivatives of some operands of the tape."""

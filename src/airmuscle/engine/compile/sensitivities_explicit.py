@@ -2,13 +2,13 @@
 
 from collections.abc import Sequence
 
-from .functions import PARAMETERS, Printer
+from .functions import POINT, Printer
 from .ir import emission
 from .ir.instructions import Code, Instruction, Operand, finished
 from .ir.scheduling import Item
 from .llvm.emit import FunctionBody
 from .llvm.exact import LlvmValue, loaded
-from .sensitivities import POINT, DirectionalDerivative, TangentSystem, Values, stored
+from .sensitivities import DirectionalDerivative, TangentSystem, Values, stored
 
 
 class _Stage:
@@ -104,5 +104,5 @@ def explicit_module(t: TangentSystem, a: Sequence[Sequence[float]], b: Sequence[
     stage.at.run(stage.second)
     columns.append(stage.columns(_after(rows[-1], s, columns, h)))
     stored(_after(b, states, slopes, h) + _after(b, s, columns, h), "y")
-    printer.end("step", ["x", "u", PARAMETERS, "w", "h"], ["y"], block)
+    printer.end("step", [*POINT, "w", "h"], ["y"], block)
     return printer.module(), printer.held

@@ -10,25 +10,25 @@ from typing import Any
 import numpy as np
 
 from ...core import Array, TraceError, autodiff, tree
-from ..compile.function import Function, LanesFunction
+from ..compile.function import Function
 from ..loop import ControlLaw, Measurement
 
 _ARGUMENTS = ("measured", "setpoints", "memory", "minimum", "maximum", "sample_time", "parameters")
 UNLIMITED = (-math.inf, math.inf)
 """Range of an input that a measurement does not contain."""
-_functions: dict[tree.Structure, Function] = {}
-_lanes: dict[tuple[tree.Structure, int], LanesFunction] = {}
+_functions: dict[tuple[tree.Structure, int], Function] = {}
 
 
-def compiled_sample(law: ControlLaw) -> Function:
-    """A function (measured, setpoints, memory, minimum, maximum, sample time, parameters, commands, memory).
+def compiled_sample(law: ControlLaw, lanes: int = 1) -> Function:
+    """A function (measured, setpoints, memory, minimum, maximum, sample time, parameters, commands, memory), with
+    `lanes` above 1 of so many loops at once, one a lane.
 
     Control laws of one structure share it. Raises TraceError if the law cannot be traced.
     """
-    structure = tree.structure(law)
-    if structure not in _functions:
-        _functions[structure] = Function(*_arguments(law))
-    return _functions[structure]
+    key = tree.structure(law), lanes
+    if key not in _functions:
+        _functions[key] = Function(*_arguments(law), lanes)
+    return _functions[key]
 
 
 class LawSample:
@@ -65,14 +65,6 @@ class LawSample:
         self._call(*[start + offset for offset in self._offsets])
         commands = dict(zip(self._inputs, given[self._ends[6] : self._ends[7]], strict=True))
         return commands, tuple(given[self._ends[7] :])
-
-
-def sample_in_lanes(law: ControlLaw, lanes: int) -> LanesFunction:
-    """The same function for so many loops at once, one a lane. Raises TraceError if the law cannot be traced."""
-    key = tree.structure(law), lanes
-    if key not in _lanes:
-        _lanes[key] = LanesFunction(*_arguments(law), lanes)
-    return _lanes[key]
 
 
 def parameters_of(law: ControlLaw) -> Array:

@@ -45,7 +45,7 @@ class ExportedSystem:
         """The functions `prepare`, `rhs` and `outputs` of arrays; with `implicit` also those of a Rosenbrock step."""
         module = implicit_module if implicit else rates_module
         language = dataclasses.replace(language, labels=self._labels)  # type: ignore[type-var]
-        return module(self.traced, language, extend) if extend else module(self.traced, language)
+        return module(self.traced, language, extend)
 
     @property
     def _labels(self) -> Labels:

@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core import Array, ArrayProgram, ParameterError, Value, Values, make_program
-from ...engine.compile.cache.kernel import Kernel
-from ...engine.compile.function import LANES, LanesFunction, lanes_array
+from ...engine.compile.cache.kernel import Kernel, aligned_array
+from ...engine.compile.function import LANES, Function
 from ..muscle import ElasticSeriesElement, Muscle
 from ..plant.plant import Plant
 from ..pneumatics.gas import absolute_pressure
@@ -83,13 +83,13 @@ class TracedRow:
         return [row.reshape(broadcast[0].shape) for row in table]
 
     @functools.cached_property
-    def compiled(self) -> LanesFunction:
+    def compiled(self) -> Function:
         """The first five QUANTITIES of a muscle, up to the tension, compiled for several points at once."""
         import casadi
 
         angle, pressure = casadi.SX.sym("angle"), casadi.SX.sym("pressure")
         values = self.function(angle, pressure)[: QUANTITIES.index("tension") + 1]
-        return LanesFunction({"angle": angle, "pressure": pressure}, {"values": values.T})
+        return Function({"angle": angle, "pressure": pressure}, {"values": values}, LANES)
 
 
 Functions = Sequence[TracedRow]
@@ -224,7 +224,7 @@ def general_candidates(limited: Functions, pressures: Range, angle: Array, torqu
     levels = np.linspace(*pressures, CELLS + 1)
     padded = np.append(levels, np.full(-levels.size % LANES, levels[-1])).reshape(-1, LANES)
     counts, room = np.zeros(angle.size, dtype=np.int64), ROOM
-    work = lanes_array(3), lanes_array(5), lanes_array(5), np.zeros((2, 3, 2, CELLS))
+    work = *(aligned_array((size, LANES)) for size in (3, 5, 5)), np.zeros((2, 3, 2, CELLS))
     cells, points = np.zeros(CELLS**2 + LANES, dtype=np.int64), [np.array(v) for v in (angle, torque, stiffness)]
     while True:
         pairs = np.full((angle.size, room, 2), np.nan)

@@ -31,6 +31,18 @@ def address_of(array: Any) -> int:
     return _address(_view(array)) if array.size else 0
 
 
+ALIGNMENT = 64
+"""Alignment of vectors in memory, in bytes."""
+
+
+def aligned_array(shape: tuple[int, ...], dtype: Any = np.float64) -> Any:
+    """An array of zeros that begins at a multiple of ALIGNMENT bytes."""
+    size = math.prod(shape) * np.dtype(dtype).itemsize
+    room = np.zeros(size + ALIGNMENT, np.uint8)
+    begin = -room.ctypes.data % ALIGNMENT
+    return room[begin : begin + size].view(dtype).reshape(shape)
+
+
 def _kind(argument: Any) -> str:
     """The kind of an argument: "q", "d", or the letter of an array's items with its dimensions."""
     if type(argument) is float:

@@ -10,6 +10,8 @@ from ....core import TraceError, instructions_of
 
 Operand = tuple[Any, ...]
 """("t", k) the result of instruction k, ("c", value) a constant, ("in", argument, index) an input."""
+ZERO: Operand = ("c", 0.0)
+ONE: Operand = ("c", 1.0)
 
 
 class Operation(enum.IntEnum):
@@ -93,6 +95,11 @@ class Code:
 
     body: tuple[Instruction, ...]
     outputs: tuple[tuple[int, int, Operand], ...]
+
+    def results(self, output: int, size: int) -> list[Operand]:
+        """The operands of the elements of an output."""
+        operands = {index: operand for number, index, operand in self.outputs if number == output}
+        return [operands.get(i, ZERO) for i in range(size)]
 
 
 @functools.cache
@@ -182,16 +189,16 @@ def _extreme_of_zero(line: Instruction, by_result: Mapping[Operand, Instruction]
 
     NaN is treated as by the mask: if the comparison is false, the second operand is selected.
     """
-    (condition, masked), zero = line.arguments, ("c", 0.0)
+    condition, masked = line.arguments
     test, product = by_result.get(condition), by_result.get(masked)
     opposite = test is not None and test.operation == Operation.NOT
     if test is not None and opposite:
         test = by_result.get(test.arguments[0])
-    if test is None or test.operation not in _COMPARE or zero not in test.arguments:
+    if test is None or test.operation not in _COMPARE or ZERO not in test.arguments:
         return [line]
-    number = test.arguments[test.arguments[0] == zero]
-    larger = (test.arguments[0] == zero) != opposite
-    pair = (zero, number) if opposite else (number, zero)
+    number = test.arguments[test.arguments[0] == ZERO]
+    larger = (test.arguments[0] == ZERO) != opposite
+    pair = (ZERO, number) if opposite else (number, ZERO)
     extreme = Instruction(Operation.MAXIMUM if larger else Operation.MINIMUM, line.result, pair)
     if number == masked:
         return [extreme]

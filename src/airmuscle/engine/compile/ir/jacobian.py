@@ -11,11 +11,11 @@ import heapq
 from collections.abc import Callable, Iterable, Sequence
 
 from ....core import TraceError
-from .instructions import Instruction, Operand, Operation
+from .instructions import ONE, ZERO, Instruction, Operand, Operation
 
 Row = dict[Operand, Operand]
 """The derivatives of one result with respect to the inputs on which it depends."""
-ZERO, ONE, LESS, TWO, HALF = (("c", value) for value in (0.0, 1.0, -1.0, 2.0, 0.5))
+LESS, TWO, HALF = (("c", value) for value in (-1.0, 2.0, 0.5))
 _COMMUTE = (Operation.ADD, Operation.MULTIPLY)
 _CONDITIONS = (
     Operation.LESS_EQUAL,
@@ -148,6 +148,12 @@ def derivatives(tape: Tape, results: Sequence[Operand], inputs: Sequence[Operand
     best = min((0, 1), key=lambda i: len(tries[i].body))
     tape.take(tries[best])
     return candidates[best]
+
+
+def nonzeros(tape: Tape, results: Sequence[Operand], inputs: Sequence[Operand]) -> dict[tuple[int, int], Operand]:
+    """The derivatives of results with respect to inputs that are not zero, by row and column."""
+    rows = derivatives(tape, results, inputs)
+    return {(i, j): row[x] for i, row in enumerate(rows) for j, x in enumerate(inputs) if x in row}
 
 
 def _eliminated(tape: Tape, results: Sequence[Operand], inputs: Sequence[Operand], sign: int) -> list[Row]:

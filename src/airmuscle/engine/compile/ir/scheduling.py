@@ -5,10 +5,9 @@ import heapq
 from collections.abc import Iterable, Sequence
 
 from ....core import TraceError
-from .instructions import CALLED, Code, Instruction, Operand
+from .instructions import CALLED, ZERO, Code, Instruction, Operand
 
 Gates = tuple[Operand, ...]
-ZERO = ("c", 0.0)
 
 
 @dataclasses.dataclass(frozen=True)

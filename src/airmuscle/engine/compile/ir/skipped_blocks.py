@@ -12,10 +12,9 @@ with zero would be NaN and is zero here.
 import dataclasses
 from collections.abc import Callable, Iterable, Mapping, Sequence
 
-from .instructions import Code, Instruction, Operand, Operation
+from .instructions import ONE, ZERO, Code, Instruction, Operand, Operation
 from .scheduling import Gates, IndependentGroup, Item, in_order
 
-ZERO, ONE = ("c", 0.0), ("c", 1.0)
 STEADY, COMMANDED, VARYING = range(3)
 """Dependence of a value: on parameters only, on commands (and parameters) only, or on states."""
 WORTH, WORTH_OF_CHOICES = 8, 30

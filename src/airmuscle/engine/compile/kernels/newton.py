@@ -93,7 +93,7 @@ def newton(function, p, target, sizes, x, values, by_x, by_p, a, b):
 
 
 LANES, ITERATIONS = 8, 30
-"""Points of one call of a function, as in `LanesFunction`; iterations of Newton's method."""
+"""Points of one call of a function, as in `function.LANES`; iterations of Newton's method."""
 RESIDUAL, MARGIN, WIDENED = 1e-11, 1e-12, 0.5
 """Relative residual of a solution; part of the range by which rounding may exceed it; widening of a cell's range."""
 

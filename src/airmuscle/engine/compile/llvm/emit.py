@@ -88,6 +88,8 @@ class FunctionBody(FunctionBlock):
     `needed`, whose definitions `vector_math` prints.
     """
 
+    language = "LLVM"
+
     def __init__(self, scalars: Sequence[str] = (), number: LlvmType = DOUBLE) -> None:
         super().__init__(scalars)
         self.number = number

@@ -63,11 +63,6 @@ def engine_of(code: bytes) -> Any:
     return engine
 
 
-def jit_compile(text: str) -> Any:
-    """An engine with the machine code of LLVM text, for modules that are not stored."""
-    return engine_of(object_code(text))
-
-
 @functools.cache
 def _target() -> Any:
     import llvmlite.binding as llvm

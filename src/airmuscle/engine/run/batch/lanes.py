@@ -9,13 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from ....core import ParameterError, Status
-from ...compile.cache.kernel import lanes
+from ...compile.cache.kernel import aligned_array, lanes
 from ...compile.llvm.emit import LlvmType
 from ..integrators import ExplicitRungeKutta
 from .job import BatchJob, Queue
-
-ALIGNMENT = 64
-"""Alignment of vectors in memory, in bytes."""
 
 
 class LaneBlock:
@@ -29,7 +26,7 @@ class LaneBlock:
         self.addresses, precomputed = job.compiled.program.lanes(job.integrator.tableau(), number)
         n, m, width = sizes.states, sizes.inputs, number.lanes
         lengths = (sizes.parameters, precomputed, n, n, m, m, m, 1, sizes.outputs)
-        self.arrays = aligned_arrays(lengths, width, self.dtype)
+        self.arrays = [aligned_array((length, width), self.dtype) for length in lengths]
         self.bounded = np.flatnonzero(np.isfinite(job.lower_bounds)).astype(np.int64)
         """States with a lower bound; their rows are checked after the run and not stored."""
         self.kept = np.concatenate([job.kept, self.bounded])
@@ -68,17 +65,6 @@ def load_plants(job: BatchJob, arrays: Sequence[npt.NDArray[Any]], lane: npt.NDA
     arrays[0][:] = job.compiled.parameters[:, None]
     arrays[0][job.variations.places] = job.variations.values[lane].T
     arrays[2][:] = job.initial_states[lane].T
-
-
-def aligned_arrays(lengths: tuple[int, ...], width: int, dtype: Any) -> list[npt.NDArray[Any]]:
-    """Arrays (length, width), each at a multiple of ALIGNMENT bytes; empty ones have an address too."""
-    size = np.dtype(dtype).itemsize
-    room = np.zeros((sum(lengths) + len(lengths)) * width * size + ALIGNMENT * (len(lengths) + 1), np.uint8)
-    place, arrays = -room.ctypes.data % ALIGNMENT, []
-    for length in lengths:
-        arrays.append(room[place : place + length * width * size].view(dtype).reshape(length, width))
-        place += -(-length * width * size // ALIGNMENT) * ALIGNMENT
-    return arrays
 
 
 class SegmentTable:

@@ -4,13 +4,13 @@ import numpy as np
 import numpy.typing as npt
 
 from ....core import Array, Status, tree
-from ...compile.cache.kernel import loop_lanes
+from ...compile.cache.kernel import aligned_array, loop_lanes
 from ...loop.control_law import ControlLaw
-from ..compiled_law import parameters_of, sample_in_lanes
+from ..compiled_law import compiled_sample, parameters_of
 from ..integrators import ExplicitRungeKutta
 from ..sampled_loop import intervals_of
 from .job import BatchJob
-from .lanes import Double, aligned_arrays, load_plants, retry_alone
+from .lanes import Double, load_plants, retry_alone
 from .loops import LoopBatch
 
 NUMBER = Double().number
@@ -51,13 +51,13 @@ class LoopLaneBlock:
         addresses, held = job.compiled.program.lanes(job.integrator.tableau(), NUMBER)
         law, self.prepared = loops.loops[0].controller, loops.prepared(loops.loops[0])
         assert isinstance(law, ControlLaw)
-        self.sample = sample_in_lanes(law, width)
+        self.sample = compiled_sample(law, width)
         self.addresses = *addresses, self.sample.address
         n, m, outputs, memory = sizes.states, sizes.inputs, sizes.outputs, len(law.initial_memory)
         k, s, c = len(law.measured_columns), len(law.setpoints), len(law.inputs)
         of_law = (parameters_of(law).size, memory, memory, k, s, c, c, c, 1)
         lengths = (sizes.parameters, held, n, n, m, m, m, 1, outputs, *of_law)
-        self.arrays = aligned_arrays(lengths, width, np.float64)
+        self.arrays = [aligned_array((length, width)) for length in lengths]
         known = job.compiled.description
         columns = (*known.state_names, *known.output_names)
         self.measured_at = np.array([columns.index(name) for name in law.measured_columns], dtype=np.int64)

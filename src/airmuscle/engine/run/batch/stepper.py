@@ -9,11 +9,11 @@ import numpy.typing as npt
 
 from ....core import ParameterError, System
 from ....core.system import check_system
-from ...compile.cache.kernel import lane_blocks
+from ...compile.cache.kernel import aligned_array, lane_blocks
 from ...compile.program import compile_system
 from ...processes import available_cores
 from ..integrators import ExplicitRungeKutta
-from .lanes import ALIGNMENT, Double, Precision
+from .lanes import Double, Precision
 
 Columns = npt.NDArray[Any]
 """An array (B, k, W) of B blocks of W lanes, in the precision of the batch."""
@@ -80,12 +80,9 @@ class BatchStepper:
         self.prepare()
 
     def _columns(self, length: int, blocks: int | None = None) -> Columns:
-        """An array (B, length, W) whose blocks begin at multiples of ALIGNMENT bytes."""
+        """An array (B, length, W) whose blocks begin at multiples of the size of a vector."""
         shape = (self.blocks if blocks is None else blocks, max(length, 1), self.width)
-        size = int(np.prod(shape)) * np.dtype(self.dtype).itemsize
-        room = np.zeros(size + ALIGNMENT, np.uint8)
-        place = -room.ctypes.data % ALIGNMENT
-        columns: Columns = room[place : place + size].view(self.dtype).reshape(shape)
+        columns: Columns = aligned_array(shape, self.dtype)
         return columns
 
     def _bind(self, functions: list[int], span: npt.NDArray[np.int64], length: float) -> Any:
