@@ -217,11 +217,7 @@ class CombinedSignal(InputSignal):
         inner, other = (signal.segments(inputs, start, duration) for signal in (self.inner, self.other))
         own = self.inner.names or ()
         columns = [(inner if name in own else other).column(i) for i, name in enumerate(inputs)]
-        if not columns:
-            return other
-        ends, values, slopes = merge_columns(columns, start)
-        shape = (len(ends), len(inputs))
-        return PiecewiseLinear(np.array(ends), np.array(values).reshape(shape), np.array(slopes).reshape(shape))
+        return merge_columns(columns, start) if columns else other
 
 
 def _milliseconds(seconds: float) -> str:

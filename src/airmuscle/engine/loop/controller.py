@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 from ...core import Parameter, Value, parameters, parts_of
+from ...core.declaration import forwarded
 
 RELATIVE = ("u", "y", "u/y", "u/s")
 """Units of a controller's parameters that follow from the loop: u is the unit of the commanded input, y that of the
@@ -97,17 +98,9 @@ class MultivariableController(Controller):
     controlled: tuple[str, ...]
     commanded: tuple[str, ...]
 
-    @property
-    def measured_columns(self) -> tuple[str, ...]:
-        return self.measured
-
-    @property
-    def setpoints(self) -> tuple[str, ...]:
-        return self.controlled
-
-    @property
-    def inputs(self) -> tuple[str, ...]:
-        return self.commanded
+    measured_columns = forwarded("measured")
+    setpoints = forwarded("controlled")
+    inputs = forwarded("commanded")
 
 
 def failure_notes(owner: str, program: str, failures: int) -> tuple[str, ...]:

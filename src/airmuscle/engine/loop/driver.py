@@ -11,9 +11,8 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from ...core import INFINITY, ParameterError, ShortRepr, abridged, model, parameter
+from ...core.declaration import forwarded
 from ..compile.kernel_text.source import plain_kernels
 from .inputs import InputSignal, PiecewiseLinear, Segment, check_input_names, check_input_signal, merge_columns
 
@@ -155,6 +154,8 @@ class WithDrivers(ShortRepr, InputSignal):
     inner: InputSignal
     drivers: Mapping[str, Driver | tuple[Driver, ...]]
 
+    names = forwarded("inner.names")
+
     def __post_init__(self) -> None:
         check_input_signal(self.inner)
         if not isinstance(self.drivers, Mapping):
@@ -167,10 +168,6 @@ class WithDrivers(ShortRepr, InputSignal):
                     raise ParameterError(
                         f"the driver of '{name}' is {abridged(driver)}; write SolenoidDriver(...), PWM(...) or several."
                     )
-
-    @property
-    def names(self) -> tuple[str, ...] | None:
-        return self.inner.names
 
     @property
     def chains(self) -> dict[str, tuple[Driver, ...]]:
@@ -189,11 +186,7 @@ class WithDrivers(ShortRepr, InputSignal):
         command = self.inner.segments(inputs, start, duration)
         columns = [command.column(i) for i in range(len(inputs))]
         later = apply_drivers(self.chains, states, columns, {name: inputs.index(name) for name in self.drivers}, start)
-        if not self.drivers:
-            return command, later
-        ends, values, slopes = merge_columns(columns, start)
-        shape = (len(ends), len(inputs))
-        return PiecewiseLinear(np.array(ends), np.array(values).reshape(shape), np.array(slopes).reshape(shape)), later
+        return merge_columns(columns, start) if self.drivers else command, later
 
     def segments(self, inputs: Sequence[str], start: float, duration: float) -> PiecewiseLinear:
         return self.step(self.init(start), inputs, start, duration)[0]

@@ -11,6 +11,7 @@ from typing import ClassVar
 import numpy as np
 
 from ...core import FEW, Array, ParameterError, ShortRepr, abridged, all_finite, as_float, check_known, one_line
+from ...core.declaration import forwarded
 
 FEW_SEGMENTS = 16
 """Segments up to which they are gone through one by one, which is faster (measured)."""
@@ -102,17 +103,15 @@ def _rising(times: Array) -> bool:
     return all(map(operator.lt, listed, listed[1:]))
 
 
-def merge_columns(columns: Sequence[Sequence[Segment]], start: float) -> tuple[list[float], list[float], list[float]]:
-    """One list of segments for several inputs, split wherever one of them is: ends, values and slopes row by row."""
-    if max(map(len, columns)) == 1:
-        single = [column[0] for column in columns]
-        return [single[0][0]], [value + 0.0 * slope for _, value, slope in single], [slope for _, _, slope in single]
-    breaks = {start}
-    for column in columns:
-        breaks.update(end for end, _, _ in column[:-1])
-    starts = sorted(breaks)
-    values, slopes = [0.0] * (len(starts) * len(columns)), [0.0] * (len(starts) * len(columns))
+def merge_columns(columns: Sequence[Sequence[Segment]], start: float) -> PiecewiseLinear:
+    """Common segments for several inputs, one or more: split wherever one of them is."""
     width = len(columns)
+    if max(map(len, columns)) == 1:
+        ends, levels, rates = zip(*(column[0] for column in columns), strict=True)
+        values = [value + 0.0 * slope for value, slope in zip(levels, rates, strict=True)]
+        return PiecewiseLinear(np.array(ends[:1]), np.array([values]), np.array([rates]))
+    starts = sorted({start, *(end for column in columns for end, _, _ in column[:-1])})
+    values, slopes = [0.0] * (len(starts) * width), [0.0] * (len(starts) * width)
     for i, column in enumerate(columns):
         begin, k, last = start, 0, len(column) - 1
         for row, time in enumerate(starts):
@@ -122,7 +121,9 @@ def merge_columns(columns: Sequence[Sequence[Segment]], start: float) -> tuple[l
             _, value, slope = column[k]
             values[row * width + i] = value + (time - begin) * slope
             slopes[row * width + i] = slope
-    return [*starts[1:], columns[0][-1][0]], values, slopes
+    shape = len(starts), width
+    table, rising = np.array(values).reshape(shape), np.array(slopes).reshape(shape)
+    return PiecewiseLinear(np.array([*starts[1:], columns[0][-1][0]]), table, rising)
 
 
 MAX_INSTANTS = 10_000_000
@@ -255,14 +256,12 @@ class Periodic(InputSignal):
     inner: InputSignal
     period: float
 
+    names = forwarded("inner.names")
+
     def __post_init__(self) -> None:
         check_input_signal(self.inner)
         if not 0 < as_float("Periodic.period", self.period) < np.inf:
             raise ParameterError(f"Periodic.period is {self.period!r} s; it must be positive and finite.")
-
-    @property
-    def names(self) -> tuple[str, ...] | None:
-        return self.inner.names
 
     def segments(self, inputs: Sequence[str], start: float, duration: float) -> PiecewiseLinear:
         once, end = self.inner.segments(inputs, 0.0, self.period), start + duration

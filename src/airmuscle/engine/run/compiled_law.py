@@ -2,10 +2,9 @@
 
 import array
 import ctypes
-import dataclasses
 import itertools
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,7 +12,6 @@ from ...core import Array, TraceError, autodiff, tree
 from ..compile.function import Function
 from ..loop import ControlLaw, Measurement
 
-_ARGUMENTS = ("measured", "setpoints", "memory", "minimum", "maximum", "sample_time", "parameters")
 UNLIMITED = (-math.inf, math.inf)
 """Range of an input that a measurement does not contain."""
 _functions: dict[tuple[tree.Structure, int], Function] = {}
@@ -73,8 +71,7 @@ def parameters_of(law: ControlLaw) -> Array:
     return parameters if len(parameters) else np.zeros(1)
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class TracedSample:
+class TracedSample(NamedTuple):
     """A sample of a control law as expressions; the arguments are vectors in the order of the names of the law."""
 
     measured: Any
@@ -90,9 +87,8 @@ class TracedSample:
 
 def _arguments(law: ControlLaw) -> tuple[dict[str, Any], dict[str, Any]]:
     """Inputs and outputs of the function of a sample, as expressions."""
-    sample = trace_sample(law)
-    inputs = {name: getattr(sample, name) for name in _ARGUMENTS}
-    return inputs, {"commands": sample.commands, "later": sample.later}
+    known = trace_sample(law)._asdict()
+    return known, {name: known.pop(name) for name in ("commands", "later")}
 
 
 def trace_sample(law: ControlLaw) -> TracedSample:

@@ -9,11 +9,12 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from ...core import Array, ParameterError, System, Value, autodiff, check_known, model, ops, suggestion, tree
+from ...core import Array, ParameterError, System, Value, autodiff, check_known, model, suggestion, tree
+from ...core.declaration import forwarded
 from ...recording.recording import Recording
 from ..loop import SETPOINT, ControlLaw, ControlLoop, Measurement, Memory, Sampled
-from .compiled_law import TracedSample, trace_sample
-from .with_sensitivities import WithSensitivities, sensitivity
+from .compiled_law import trace_sample
+from .with_sensitivities import WithSensitivities, evaluated, sensitivity
 
 CONTROLLER = "controller."
 """Prefix of the paths of a controller's parameters."""
@@ -141,13 +142,11 @@ class LawWithSensitivities(ControlLaw):
     def _with_derivatives(self, names: tuple[str, ...]) -> tuple[str, ...]:
         return (*names, *(sensitivity(name, k) for name in names for k in range(len(self.columns))))
 
+    setpoints = forwarded("law.setpoints")
+
     @property
     def measured_columns(self) -> tuple[str, ...]:
         return self._with_derivatives(self.law.measured_columns)
-
-    @property
-    def setpoints(self) -> tuple[str, ...]:
-        return self.law.setpoints
 
     @property
     def inputs(self) -> tuple[str, ...]:
@@ -197,7 +196,7 @@ class LawWithSensitivities(ControlLaw):
             )
             variables = casadi.vertcat(sample.measured, sample.memory, sample.parameters)
             parts.append(casadi.jtimes(results, variables, seed))
-        columns = _evaluated(casadi.horzcat(*parts), sample, self.law, memory, measurement, dt)
+        columns = evaluated(casadi.horzcat(*parts), sample[:-2], self._point(memory, measurement, dt))
         count = len(law.inputs)
         commands = dict(zip(law.inputs, columns[0], strict=False))
         later = dict(zip(remembered, columns[0][count:], strict=True))
@@ -206,27 +205,15 @@ class LawWithSensitivities(ControlLaw):
             later |= {sensitivity(name, k): column[count + i] for i, name in enumerate(remembered)}
         return commands, later
 
-
-def _evaluated(
-    matrix: Any, sample: TracedSample, law: ControlLaw, memory: Mapping[str, Value], measurement: Measurement, dt: Value
-) -> list[list[Any]]:
-    """The columns of a matrix of expressions of a sample at these values, which may be symbols themselves."""
-    import casadi
-
-    ranges = [measurement.ranges[name] for name in law.inputs]
-    values = [
-        *(measurement.columns[name] for name in law.measured_columns),
-        *(measurement.setpoints[name] for name in law.setpoints),
-        *(memory[name] for name in law.initial_memory),
-        *(low for low, _ in ranges),
-        *(high for _, high in ranges),
-        dt,
-        *(leaf.value for leaf in tree.leaves(law)),
-    ]
-    free = casadi.vertcat(
-        sample.measured, sample.setpoints, sample.memory, sample.minimum, sample.maximum, sample.sample_time,
-        sample.parameters,
-    )  # fmt: skip
-    values_along = casadi.substitute(casadi.cse(matrix), free, casadi.vertcat(*values))
-    columns = [[values_along[i, k] for i in range(values_along.shape[0])] for k in range(values_along.shape[1])]
-    return columns if ops.is_symbol(*values) else [[float(v) for v in column] for column in columns]
+    def _point(self, memory: Memory, measurement: Measurement, dt: Value) -> list[Value]:
+        """The values of the variables of a `TracedSample` of the law."""
+        law, ranges = self.law, [measurement.ranges[name] for name in self.law.inputs]
+        return [
+            *(measurement.columns[name] for name in law.measured_columns),
+            *(measurement.setpoints[name] for name in law.setpoints),
+            *(memory[name] for name in law.initial_memory),
+            *(low for low, _ in ranges),
+            *(high for _, high in ranges),
+            dt,
+            *(leaf.value for leaf in tree.leaves(law)),
+        ]

@@ -1,11 +1,12 @@
 """Forward sensitivities: a system extended by the derivatives of its states with respect to chosen parameters."""
 
 import itertools
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, ClassVar
 
-from ...core import ParameterError, Value, autodiff, check_known, model, ops, parameter, tree
+from ...core import ParameterError, Value, check_known, model, ops, parameter, tree
 from ...core.system import Input, SensitivitySystem, StateVariable, System
+from ..compile.functions import TracedSystem, trace_system
 
 TOLERANCE_FACTOR = 10.0
 """How much more a derivative times its scale may err than the state. Chosen: without any control derivatives are lost
@@ -47,8 +48,8 @@ class WithSensitivities(SensitivitySystem):
         known = [leaf.path for leaf in tree.leaves(self.inner)]
         check_known(f"{type(self.inner).__name__} has no parameter", itertools.chain(*self.columns), known)
         check_known(f"{type(self.inner).__name__} has no input", self.dependent_inputs, self.inner.inputs)
-        values = _Symbols(self.inner).call("outputs") if self.observed else {}
-        check_known(f"{type(self.inner).__name__} has no state or output", self.observed, values)
+        names = self._all_names if self.observed else ()
+        check_known(f"{type(self.inner).__name__} has no state or output", self.observed, names)
 
     @property
     def parameter_indices(self) -> tuple[tuple[int, ...], ...]:
@@ -64,7 +65,12 @@ class WithSensitivities(SensitivitySystem):
     @property
     def observed_names(self) -> tuple[str, ...]:
         """Names of the observed quantities."""
-        return self.observed or tuple(_Symbols(self.inner).call("outputs"))
+        return self.observed or self._all_names
+
+    @property
+    def _all_names(self) -> tuple[str, ...]:
+        """Names of the states and outputs of the inner system."""
+        return (*(s.name for s in self.inner.states), *trace_system(self.inner).output_names)
 
     @property
     def output_names(self) -> tuple[str, ...]:
@@ -112,50 +118,42 @@ class WithSensitivities(SensitivitySystem):
 
     def rates(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> dict[str, Value]:
         """The inner rates, and the variational equation of every column."""
-        rates, along = self._differentiated("rates", state, inputs)
-        order = [s.name for s in self.inner.states]
-        further = {sensitivity(n, k): column[n] for k, column in enumerate(along) for n in order}
-        return {**{n: rates[n] for n in order}, **further}
+        t, names = trace_system(self.inner), [s.name for s in self.inner.states]
+        rates, *along, _ = self._differentiated(t, names, t.f, state, inputs)
+        return rates | {sensitivity(n, k): column[n] for k, column in enumerate(along) for n in names}
 
     def outputs(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> dict[str, Value]:
         """The observed quantities, their derivatives by every column, and their slopes in time (`pressure.rate`)."""
-        values, along = self._differentiated("outputs", state, inputs)
-        slopes, names = self._slopes(state, inputs), self.observed_names
+        import casadi
+
+        t, names = trace_system(self.inner), self.observed_names
+        every = [*(s.name for s in self.inner.states), *t.output_names]
+        values, *along, slopes = self._differentiated(t, every, casadi.vertcat(t.x, t.o), state, inputs)
         further = {sensitivity(n, k): column[n] for n in names for k, column in enumerate(along)}
         return {n: values[n] for n in names} | further | {f"{n}.rate": slopes[n] for n in names}
 
     def _differentiated(
-        self, method: str, state: Mapping[str, Value], inputs: Mapping[str, Value]
-    ) -> tuple[dict[str, Value], list[dict[str, Value]]]:
-        """The result of `inner.method`, and its total derivative along every column."""
+        self, t: TracedSystem, names: Sequence[str], values: Any, state: Mapping[str, Value],
+        inputs: Mapping[str, Value],
+    ) -> list[dict[str, Value]]:  # fmt: skip
+        """Values of the traced inner system by names, their total derivatives along every column, and their slopes."""
         import casadi
 
-        traced = _Symbols(self.inner)
-        values = traced.call(method)
-        vector = casadi.vertcat(*(casadi.SX(v) for v in values.values()))
-        by_state, by_leaf = casadi.jacobian(vector, traced.x), casadi.jacobian(vector, traced.p)
-        by_input = casadi.jacobian(vector, traced.u)[:, list(self.input_indices)]
-        place = {leaf.path: i for i, leaf in enumerate(tree.leaves(self.inner))}
+        by_state, by_leaf = casadi.jacobian(values, t.x), casadi.jacobian(values, t.p)
+        by_input = casadi.jacobian(values, t.u)[:, list(self.input_indices)]
         directions = [
-            casadi.mtimes(by_state, casadi.vertcat(*(state[sensitivity(n, k)] for n in traced.names)))
+            casadi.mtimes(by_state, casadi.vertcat(*(state[sensitivity(s.name, k)] for s in self.inner.states)))
             + casadi.mtimes(
                 by_input, casadi.vertcat(casadi.SX(0, 1), *(inputs[sensitivity(n, k)] for n in self.dependent_inputs))
             )
-            + sum((by_leaf[:, place[path]] for path in group), casadi.SX(vector.numel(), 1))
-            for k, group in enumerate(self.columns)
+            + sum((by_leaf[:, i] for i in indices), casadi.SX(values.numel(), 1))
+            for k, indices in enumerate(self.parameter_indices)
         ]
-        derivatives = traced.put_in(casadi.horzcat(vector, *directions), state, inputs, self.inner)
-        columns = [dict(zip(values, derivatives[k], strict=True)) for k in range(len(derivatives))]
-        return columns[0], columns[1:]
-
-    def _slopes(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> dict[str, Value]:
-        import casadi
-
-        traced = _Symbols(self.inner)
-        rates, values = traced.call("rates"), traced.call("outputs")
-        vector = casadi.vertcat(*(casadi.SX(v) for v in values.values()))
-        slope = casadi.jtimes(vector, traced.x, casadi.vertcat(*(casadi.SX(rates[n]) for n in traced.names)))
-        return dict(zip(values, traced.put_in(slope, state, inputs, self.inner)[0], strict=True))
+        slope = casadi.jtimes(values, t.x, t.f)
+        point = [state[s.name] for s in self.inner.states] + [inputs[n] for n in self.inner.inputs]
+        point += [leaf.value for leaf in tree.leaves(self.inner)]
+        columns = evaluated(casadi.horzcat(values, *directions, slope), t.point.values(), point)
+        return [dict(zip(names, column, strict=True)) for column in columns]
 
 
 def sensitivity(name: str, column: int) -> str:
@@ -163,33 +161,10 @@ def sensitivity(name: str, column: int) -> str:
     return f"d {name}/d {column}"
 
 
-class _Symbols:
-    """A system's model over symbols of its own, and the way back to the values that it is asked at."""
+def evaluated(matrix: Any, variables: Iterable[Any], values: Sequence[Value]) -> list[list[Any]]:
+    """The columns of a matrix of expressions at these values of their variables, which may be symbols themselves."""
+    import casadi
 
-    def __init__(self, inner: System) -> None:
-        import casadi
-
-        self.model, self.p = autodiff.symbolic(inner)
-        self.names = [s.name for s in inner.states]
-        self.input_names = inner.inputs
-        self.x, self.u = casadi.SX.sym("x", len(self.names)), casadi.SX.sym("u", len(self.input_names))
-
-    def call(self, method: str) -> dict[str, Any]:
-        """`rates` of the model, or its `outputs` with the states among them."""
-        state = {name: self.x[i] for i, name in enumerate(self.names)}
-        inputs = {name: self.u[i] for i, name in enumerate(self.input_names)}
-        values = dict(getattr(self.model, method)(state, inputs))
-        return values if method == "rates" else {**state, **values}
-
-    def put_in(
-        self, matrix: Any, state: Mapping[str, Value], inputs: Mapping[str, Value], inner: System
-    ) -> list[list[Any]]:
-        """The columns of a matrix of expressions at these values, which may be symbols themselves."""
-        import casadi
-
-        values = [state[n] for n in self.names] + [inputs[n] for n in self.input_names]
-        values += [leaf.value for leaf in tree.leaves(inner)]
-        free = casadi.vertcat(self.x, self.u, self.p)
-        evaluated = casadi.substitute(casadi.cse(matrix), free, casadi.vertcat(*values))
-        columns = [[evaluated[i, k] for i in range(evaluated.shape[0])] for k in range(evaluated.shape[1])]
-        return columns if ops.is_symbol(*values) else [[float(v) for v in column] for column in columns]
+    at = casadi.substitute(casadi.cse(matrix), casadi.vertcat(*variables), casadi.vertcat(*values))
+    columns = [[at[i, k] for i in range(at.shape[0])] for k in range(at.shape[1])]
+    return columns if ops.is_symbol(*values) else [[float(v) for v in column] for column in columns]
