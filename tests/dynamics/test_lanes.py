@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 
 from airmuscle.engine.compile import Printer
+from airmuscle.engine.compile.cache.kernel import aligned_array
 from airmuscle.engine.compile.ir.instructions import Operation
 from airmuscle.engine.compile.llvm import emit, vector_math
 from airmuscle.engine.compile.llvm.emit import LlvmType
 from airmuscle.engine.compile.llvm.jit import engine_of, object_code
-from airmuscle.engine.run.batch.lanes import aligned_arrays
 from airmuscle.errors import TraceError
 
 NUMBERS = {"16 doubles": LlvmType(64, 16), "8 doubles": LlvmType(64, 8), "32 singles": LlvmType(32, 32)}
@@ -38,7 +38,7 @@ def run(number, expressions, *columns):
 
 def call(engine, number, columns, results):
     kind = np.float64 if number.bits == 64 else np.float32
-    x, y = aligned_arrays((len(columns), results), number.lanes, kind)
+    x, y = (aligned_array((count, number.lanes), kind) for count in (len(columns), results))
     function = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(engine.get_function_address("f"))
     size, found = len(columns[0]), []
     for at in range(0, size, number.lanes):
@@ -205,7 +205,7 @@ def steady_power(number, x, y):
     engine = engine_of(object_code("\n".join([vector_math.declarations({number}), *parts, text])))
     function = ctypes.CFUNCTYPE(None, *[ctypes.c_void_p] * 3)(engine.get_function_address("f"))
     kind, found = np.float64 if number.bits == 64 else np.float32, []
-    arrays = aligned_arrays((1, 1, 1), number.lanes, kind)
+    arrays = [aligned_array((1, number.lanes), kind) for _ in range(3)]
     for at in range(0, x.size, number.lanes):
         rows = np.minimum(np.arange(at, at + number.lanes), x.size - 1)
         arrays[0][0], arrays[1][0] = x[rows], y[rows]

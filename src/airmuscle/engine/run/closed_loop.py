@@ -8,9 +8,7 @@ inputs are then the same, and so is the kernel with its arrays.
 from collections.abc import Hashable
 from typing import Any
 
-import numpy as np
-
-from ...core import Array, Diagnostic, DiagnosticCode, Status, tree
+from ...core import Diagnostic, DiagnosticCode, Status, tree
 from ...recording.columns import column_units
 from ..loop import ControlLaw, ControlLoop, ControlLoopState, Schedule
 from .compiled_law import parameters_of
@@ -58,18 +56,10 @@ def _solution(problem: Problem, run: CompiledRun) -> Solution:
     control_state = run.control_state
     notes = loop.controller.notes(control_state.controller)
     remarks = (remark, *(Diagnostic(DiagnosticCode.CONTROLLER, remark.subject, text) for text in notes))
-    more = _controller_columns(run, times[: raw.reached])
+    reached = times[: raw.reached]
+    at, setpoints = run.prepared.at(reached) if loop.drivers else run.prepared.at_times  # drivers add rows
+    more = run.columns(at[: reached.size], setpoints[: reached.size])
     return make_solution(problem, raw, table, times, (run.time, run.state), more, remarks, control_state)
-
-
-def _controller_columns(run: CompiledRun, times: Array) -> dict[str, Array]:
-    """Set points in time; measurements and commands of the last sample at every row."""
-    prepared, count = run.prepared, times.size
-    at, setpoints = prepared.at(times) if prepared.loop.drivers else prepared.at_times  # drivers add rows
-    intervals, setpoints = np.minimum(at[:count], max(len(run.measured) - 1, 0)), setpoints[:count]
-    measured, commanded = (values.take(intervals, axis=0) for values in (run.measured, run.commanded))
-    columns = (*setpoints.T, *measured.T, *commanded.T)
-    return dict(zip(prepared.loop.column_names, columns, strict=True))
 
 
 MAX_KEPT_ROWS = 100_000

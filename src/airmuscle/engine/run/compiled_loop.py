@@ -7,6 +7,7 @@ program pause at each sample.
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from ...core import Array, Status, flat_view
 from ..compile.cache import kernel
@@ -41,16 +42,10 @@ class CompiledLoop:
         measured_at = np.array([columns.index(name) for name in controller.measured_columns], dtype=np.int64)
         commanded_at = np.array(prepared.commanded, dtype=np.int64)
         limits = np.array([prepared.ranges[name] for name in controller.inputs], dtype=float).reshape(-1, 2)
-        self.edges = prepared.instants
+        self.edges = edges = prepared.instants
         self.measuring = compiled.address["outputs"], measured_at
-        low, high = np.ascontiguousarray(limits[:, 0]), np.ascontiguousarray(limits[:, 1])
-        self.commanding = np.array([loop.sample_time]), low, high, commanded_at
-        self.intervals = (
-            self.edges, np.spacing(np.abs(self.edges)), 0 if prepared.sampled else 1,
-            prepared.setpoint_values,
-        )  # fmt: skip
-        self.offsets = prepared.first_segments
-        self.grid = prepared.times, prepared.first_rows
+        self.commanding = np.array([loop.sample_time]), *map(np.ascontiguousarray, limits.T), commanded_at
+        self.intervals = edges, np.spacing(np.abs(edges)), 0 if prepared.sampled else 1, prepared.setpoint_values
 
     def memory_of(self, state: ControlLoopState) -> list[float]:
         """The memory of the control law as numbers; none of a controller that is called."""
@@ -69,12 +64,11 @@ class CompiledRun:
         self, loop: CompiledLoop, compiled: CompiledSystem, integrator: Integrator, initial_state: Array,
         control_state: ControlLoopState, parameters: Array | None = None,
     ) -> None:  # fmt: skip
-        self.loop, self.prepared, self._begin_state = loop, loop.prepared, control_state
+        self.loop, self.prepared = loop, loop.prepared
         self._integrator, self._precomputed = integrator, compiled.precomputed
         self.bound = integrator.bind(compiled)
-        self.bound.state[:] = initial_state
-        self.status, self.stopped_at = Status.DONE, float(loop.edges[0])
         self._drivers = DriverTable(loop.prepared, control_state, loop.capacity, loop.called_drivers)
+        self._take_beginning(control_state)
         self._make_arrays(compiled.sizes.states, compiled.sizes.inputs)
         self._parameters = loop.parameters.copy() if parameters is None else parameters
         arguments = self._arguments(compiled, self._parameters)
@@ -82,7 +76,7 @@ class CompiledRun:
         self._columns = next(i for i, each in enumerate(arguments) if each is self._drivers.columns)
         self._kernel = kernel.sampled_loop.bind(*arguments)
         self._controller = None if loop.law is not None else CalledController(loop.prepared)
-        self._forget_samples()
+        self._begin(initial_state)
 
     def restart(
         self, compiled: CompiledSystem, initial_state: Array, parameters: Array,
@@ -94,20 +88,26 @@ class CompiledRun:
         alone. Everything that was returned by this run is overwritten.
         """
         if control_state is not None:
-            self._begin_state, self._begin_memory = control_state, self.loop.memory_of(control_state)
+            self._take_beginning(control_state)
         self.bound.rebind(self._integrator.binding(compiled))
         self._precomputed[:], self._parameters[:] = compiled.precomputed, parameters
-        state, inputs = self._begin_state, self.prepared.inputs
+        self._kernel.replace(self._budget, INTERRUPT_CHECK_STEPS)
+        self._drivers.restart()
+        self._begin(initial_state)
+
+    def _take_beginning(self, state: ControlLoopState) -> None:
+        self._begin_state, self._begin_memory = state, self.loop.memory_of(state)
+
+    def _begin(self, initial_state: Array) -> None:
+        """Write what the kernel finds at the beginning; no sample has been taken yet."""
+        state = self._begin_state
         self.bound.state[:] = self.state[:] = initial_state
         self.bound.count[:] = 0
         self.progress.fill(0)
-        self._kernel.replace(self._budget, INTERRUPT_CHECK_STEPS)
         self._memory[:] = self._begin_memory
-        self._forget_samples()
         self._measured[:], self._command[:] = state.measured, state.commanded
-        self._applied[:] = state.applied_inputs or inputs.values[0]
-        self._kept_inputs[:] = self._applied
-        self._drivers.restart()
+        self._applied[:] = self._kept_inputs[:] = state.applied_inputs or self.prepared.inputs.values[0]
+        self._memories, self._called_at = [state.controller] * 2, -1
         self.status, self.stopped_at = Status.DONE, float(self.loop.edges[0])
 
     @property
@@ -119,11 +119,10 @@ class CompiledRun:
         prepared, state = self.prepared, self._begin_state
         inputs, intervals = prepared.inputs, self.loop.edges.size - 1
         self.progress = np.zeros(len(Progress), dtype=np.int64)
-        self._begin_memory = self.loop.memory_of(state)
-        self._memory = np.array([self._begin_memory] * 2, dtype=float)
-        self._measured, self._command = np.array(state.measured, dtype=float), np.array(state.commanded, dtype=float)
-        self._applied = np.array(state.applied_inputs or inputs.values[0], dtype=float)
-        self.state, self._kept_inputs = self.bound.state.copy(), self._applied.copy()
+        self._memory = np.empty((2, len(self._begin_memory)))
+        self._measured, self._command = np.empty(len(state.measured)), np.empty(len(state.commanded))
+        self._views = flat_view(self._measured), flat_view(self._command)
+        self._applied, self._kept_inputs, self.state = np.empty(m), np.empty(m), np.empty(n)
         """The state (n,) at the end of the last completed interval."""
         self._samples = np.empty((intervals, self._measured.size))
         self._commands = np.empty((intervals, self._command.size))
@@ -137,16 +136,16 @@ class CompiledRun:
             self._times, self._rows = prepared.times, np.empty((prepared.times.size, n))
 
     def _arguments(self, compiled: CompiledSystem, parameters: Array) -> tuple[Any, ...]:
-        loop, bound, drivers = self.loop, self.bound, self._drivers
+        loop, prepared, bound, drivers = self.loop, self.prepared, self.bound, self._drivers
         outputs, measured_at = loop.measuring
         return (
             bound.entry_address or 0, bound.slots, bound.places, bound.clock, bound.count, bound.state,
             outputs, compiled.precomputed, np.empty(max(compiled.sizes.outputs, 1)), measured_at,
-            loop.sample_address, parameters, *loop.commanding, *loop.intervals, *self._inputs, loop.offsets,
-            *loop.grid, drivers.kinds, drivers.settings, drivers.states, drivers.columns, drivers.counts,
-            drivers.scratch, drivers.begins, compiled.description.lower_bounds, self._applied, self._memory,
-            self._measured, self._command, self.state, self._kept_inputs, drivers.kept, *self._segments, self._times,
-            self._rows, self._samples, self._commands, self.progress, INTERRUPT_CHECK_STEPS,
+            loop.sample_address, parameters, *loop.commanding, *loop.intervals, *self._inputs, prepared.first_segments,
+            prepared.times, prepared.first_rows, drivers.kinds, drivers.settings, drivers.states, drivers.columns,
+            drivers.counts, drivers.scratch, drivers.begins, compiled.description.lower_bounds, self._applied,
+            self._memory, self._measured, self._command, self.state, self._kept_inputs, drivers.kept, *self._segments,
+            self._times, self._rows, self._samples, self._commands, self.progress, INTERRUPT_CHECK_STEPS,
         )  # fmt: skip
 
     def integrate(self) -> None:
@@ -159,7 +158,7 @@ class CompiledRun:
                     self._answer(flags[_WAITING], flags[_INTERVAL])
                 elif flags[Progress.FULL]:
                     self._extend()
-                elif self._takes_too_many_steps():
+                elif flags[Progress.RUNNING] and self.bound.count[2] - flags[Progress.STEPS_BEFORE] >= MAX_STEPS:
                     break
                 status = run()
         except KeyboardInterrupt:
@@ -169,11 +168,6 @@ class CompiledRun:
             self.stopped_at = float(self.bound.clock[0])
         if self.status == Status.INTERRUPTED:
             self._discard_interval()
-
-    def _forget_samples(self) -> None:
-        """No sample has been taken yet by a controller that is called."""
-        self._memories, self._called_at = [self._begin_state.controller] * 2, -1
-        self._views = flat_view(self._measured), flat_view(self._command)
 
     def _answer(self, waiting: int, interval: int) -> None:
         """Give the kernel what it awaits."""
@@ -204,10 +198,6 @@ class CompiledRun:
         self._called_at = interval
         for i, value in enumerate(commands):
             command[i] = value
-
-    def _takes_too_many_steps(self) -> bool:
-        running = self.progress[Progress.RUNNING]
-        return bool(running and self.bound.count[2] - self.progress[Progress.STEPS_BEFORE] >= MAX_STEPS)
 
     def _extend(self) -> None:
         """Longer buffers for the segments and rows of driven inputs."""
@@ -255,6 +245,14 @@ class CompiledRun:
         """Times (N,) and states (N, n) of the rows that were reached."""
         count = int(self.progress[Progress.ROWS])
         return self._times[:count], self._rows[:count]
+
+    def columns(self, intervals: npt.NDArray[np.int64], setpoints: Array) -> dict[str, Array]:
+        """Set points, and measurements and commands of the last sample, at rows in these intervals (R,), whose set
+        points (R, s) are given."""
+        intervals = np.minimum(intervals, max(len(self.measured) - 1, 0))
+        measured, commanded = (values.take(intervals, axis=0) for values in (self.measured, self.commanded))
+        columns = *setpoints.T, *measured.T, *commanded.T
+        return dict(zip(self.prepared.loop.column_names, columns, strict=True))
 
     def raw(self, rows: Array) -> RawSolution:
         """The result of the integrator, of which these rows (N, n) are taken."""

@@ -26,7 +26,7 @@ NOT_RUN = -1
 """Status of a plant that has not been run yet."""
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
+@dataclasses.dataclass(eq=False)
 class BatchJob:
     """N plants to be simulated: initial states (N, n), segments of the inputs of each, rows and columns to be stored.
 
@@ -42,14 +42,20 @@ class BatchJob:
     start_time: float
     duration: float
     times: Array
-    columns: dict[str, npt.NDArray[Any]]
-    final: Array
-    status: npt.NDArray[np.int64]
-    reached: npt.NDArray[np.int64]
     reasons: dict[int, str]
-    nominal: Array
     loops: LoopBatch | None = None
+    columns: dict[str, npt.NDArray[Any]] = dataclasses.field(default_factory=dict)
     _recorders: list[RowRecorder] = dataclasses.field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        count = len(self.initial_states)
+        self.final, self.status = np.full(self.initial_states.shape, np.nan), np.full(count, NOT_RUN)
+        self.reached = np.zeros(count, dtype=np.int64)
+
+    @functools.cached_property
+    def nominal(self) -> Array:
+        """Nominal size (N, n) of each state of each plant."""
+        return self.variations.nominal()
 
     @functools.cached_property
     def names(self) -> tuple[str, ...]:
@@ -85,7 +91,8 @@ class BatchJob:
         if run.prepared.loop.drivers:  # there may be further rows
             at = np.searchsorted(times, self.times - 1e-9 * loops.template.duration)
             rows = rows[at[at < times.size]]
-        more = loops.columns(index, self.columns, run, len(rows)) if len(run.measured) else {}
+        at, setpoints = run.prepared.at_times
+        more = run.columns(at[: len(rows)], setpoints[: len(rows)]) if len(run.measured) else {}
         self._write(index, one, self._truncate(run.raw(rows)), run.signal, more)
         loops.release(run)
 
@@ -231,35 +238,22 @@ def hidden_progress() -> Iterator[None]:
 @contextlib.contextmanager
 def progress(what: str, total: int) -> Iterator[Callable[[int], None]]:
     """A function that takes the number of items done and draws a bar on a terminal once that takes long."""
-    started, bar = time.monotonic(), _Bar(what, total)
+    started, bar = time.monotonic(), None
 
     def advanced(done: int) -> None:
+        nonlocal bar
         if time.monotonic() - started > BAR_DELAY and sys.stderr.isatty() and not _hidden.get():
-            bar.show(done)
+            from rich.console import Console
+            from rich.progress import Progress
+
+            if bar is None:
+                bar = Progress(console=Console(stderr=True), transient=True)
+                bar.add_task(what, total=total)
+                bar.start()
+            bar.update(bar.task_ids[0], completed=done)
 
     try:
         yield advanced
     finally:
-        bar.close()
-
-
-class _Bar:
-    """A bar of rich, which is imported only when it is drawn."""
-
-    def __init__(self, what: str, total: int) -> None:
-        self.what, self.total = what, total
-        self._drawn: Any = None
-
-    def show(self, done: int) -> None:
-        from rich.console import Console
-        from rich.progress import Progress
-
-        if self._drawn is None:
-            self._drawn = Progress(console=Console(stderr=True), transient=True)
-            self._task = self._drawn.add_task(self.what, total=self.total)
-            self._drawn.start()
-        self._drawn.update(self._task, completed=done)
-
-    def close(self) -> None:
-        if self._drawn is not None:
-            self._drawn.stop()
+        if bar is not None:
+            bar.stop()

@@ -49,15 +49,11 @@ class LaneBlock:
             return
         for j, column in enumerate(job.columns.values()):
             column[plants] = self.rows[j, : plants.size]
-        job.final[plants] = self.final[: plants.size]
-        job.status[plants], job.reached[plants] = self.status[: plants.size], job.times.size
-        bounds = job.lower_bounds
-        below: npt.NDArray[np.bool_] = np.any(job.final[plants] < bounds, axis=1)
+        below = (self.final < job.lower_bounds).any(axis=1)
         for rows, i in zip(self.rows[len(job.columns) :], self.bounded, strict=True):
-            below |= np.any(rows[: plants.size] < bounds[i], axis=1)
-        for index, negative in zip(plants, below, strict=True):
-            if negative or job.status[index]:
-                retry_alone(job, int(index), self.dtype, Status.NEGATIVE_AIR_MASS if negative else Status.NOT_FINITE)
+            below |= (rows < job.lower_bounds[i]).any(axis=1)
+        self.status[below] = Status.NEGATIVE_AIR_MASS
+        finish_block(job, plants, self.final, self.status)
 
 
 def load_plants(job: BatchJob, arrays: Sequence[npt.NDArray[Any]], lane: npt.NDArray[np.intp]) -> None:
@@ -102,12 +98,21 @@ def block_workers(
     return queue, [worker(block) for block in (first, *(make() for _ in range(min(cores, count) - 1)))], first.width
 
 
-def retry_alone(job: BatchJob, index: int, dtype: Any, status: Status) -> None:
-    """Simulate a plant that failed in its lane again, alone: for its rows, the time of failure and the reason."""
-    job.run_single(index)
-    if job.status[index] == Status.DONE:
-        where = "in single precision, but not in double" if dtype == np.float32 else "in its lane, but not alone"
-        job.mark_not_run(index, status, f"{status.message} {where}")
+def finish_block(
+    job: BatchJob, plants: npt.NDArray[np.intp], final: npt.NDArray[Any], status: npt.NDArray[np.int64]
+) -> None:
+    """Write the final states (W, n) and the status (W,) of the plants of a block.
+
+    A plant that failed in its lane is simulated again, alone: for its rows, the time of failure and the reason.
+    """
+    job.final[plants] = final[: plants.size]
+    job.status[plants], job.reached[plants] = status[: plants.size], job.times.size
+    where = "in single precision, but not in double" if final.dtype == np.float32 else "in its lane, but not alone"
+    for i in np.flatnonzero(status[: plants.size]):
+        index, failure = int(plants[i]), Status(int(status[i]))
+        job.run_single(index)
+        if job.status[index] == Status.DONE:
+            job.mark_not_run(index, failure, f"{failure.message} {where}")
 
 
 def check_precision(precision: "Precision", integrator: object, *, loops: bool) -> None:

@@ -8,9 +8,8 @@ from ...compile.cache.kernel import aligned_array, loop_lanes
 from ...loop.control_law import ControlLaw
 from ..compiled_law import compiled_sample, parameters_of
 from ..integrators import ExplicitRungeKutta
-from ..sampled_loop import intervals_of
 from .job import BatchJob
-from .lanes import Double, load_plants, retry_alone
+from .lanes import Double, finish_block, load_plants
 from .loops import LoopBatch
 
 NUMBER = Double().number
@@ -107,14 +106,11 @@ class LoopLaneBlock:
     def _write(self, plants: npt.NDArray[np.intp]) -> None:
         """Write the results of a block; a loop that failed is run again alone, for its rows and its reason."""
         job, kept = self.job, iter(self.rows)
-        at = np.minimum(intervals_of(job.times, self.prepared.instants), len(self.samples) - 1)
+        at = np.minimum(self.prepared.at_times[0], len(self.samples) - 1)
         for name, place in zip(job.columns, job.kept.tolist(), strict=True):
             column = job.columns[name]
             column[plants] = next(kept)[: plants.size] if place < self.plain else self._of_loop(name, at, plants)
-        job.final[plants] = self.arrays[2].T[: plants.size]
-        job.status[plants], job.reached[plants] = self.status[: plants.size], job.times.size
-        for i in np.flatnonzero(self.status[: plants.size]):
-            retry_alone(job, int(plants[i]), np.float64, Status(int(self.status[i])))
+        finish_block(job, plants, self.arrays[2].T, self.status)
 
     def _of_loop(self, name: str, at: npt.NDArray[np.intp], plants: npt.NDArray[np.intp]) -> Array:
         """A column (R, T) of the set points, measurements or commands of plants."""
@@ -122,4 +118,4 @@ class LoopLaneBlock:
         kind, index = loops.place_of(name)
         if kind:
             return np.asarray((self.samples if kind == 1 else self.commands)[at, index, : plants.size].T)
-        return np.array([loops.setpoints_of(loops.loop_of(int(plant)))[:, index] for plant in plants])
+        return np.array([loops.prepared(loops.loop_of(int(plant))).at_times[1][:, index] for plant in plants])

@@ -2,19 +2,17 @@
 
 import dataclasses
 import threading
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
-import numpy as np
 import numpy.typing as npt
 
 from ....core import Array, ParameterError, System
 from ...compile.program import CompiledSystem, Pool
 from ...loop import ControlLaw, ControlLoop, designed_loop
 from ..compiled_loop import CompiledLoop, CompiledRun
-from ..integrators import Integrator
 from ..problem import Problem
-from ..sampled_loop import SampledLoop, first_rows_of, intervals_of, prepare_loop
+from ..sampled_loop import SampledLoop, first_rows_of, prepare_loop
 from .variations import Variations, variations_of
 
 CONTROLLER = "controller."
@@ -25,9 +23,10 @@ CONTROLLER = "controller."
 class LoopBatch:
     """The control loops of N plants.
 
-    template  a problem with the plant, for which loops are prepared; its output times are the rows
+    template  a problem with the plant, for which loops are prepared
     loops     one for all plants, or one for each
     laws      the controllers, where their parameters differ
+    times     (T,) of the rows
     """
 
     template: Problem
@@ -37,17 +36,6 @@ class LoopBatch:
     _prepared: dict[int, CompiledLoop] = dataclasses.field(default_factory=dict)
     _preparing: Any = dataclasses.field(default_factory=threading.Lock)
     _idle: Pool = dataclasses.field(default_factory=Pool)
-    _at_rows: dict[int, tuple[npt.NDArray[np.intp], Array]] = dataclasses.field(default_factory=dict)
-
-    @classmethod
-    def of(
-        cls, plant: System, loops: tuple[ControlLoop, ...], laws: Variations | None, span: tuple[float, float],
-        times: Array, integrator: Integrator,
-    ) -> "LoopBatch":  # fmt: skip
-        """The loops of plants that are simulated over a span (start, duration) [s] with rows at `times` (N,)."""
-        start, duration = span
-        template = Problem(plant, loops[0], duration, start_time=start, integrator=integrator)
-        return cls(template, loops, laws, times)
 
     def loop_of(self, index: int) -> ControlLoop:
         """The loop of one plant."""
@@ -62,18 +50,6 @@ class LoopBatch:
         signals = self.loops[0].signals
         prefix = next(each for each in signals if column.startswith(each))
         return list(signals).index(prefix), signals[prefix].index(column.removeprefix(prefix))
-
-    def setpoints_of(self, loop: ControlLoop) -> Array:
-        """Set points (T, s) of a loop at the rows."""
-        return self._rows_of(loop, self.prepared(loop))[1]
-
-    def _rows_of(self, loop: ControlLoop, prepared: SampledLoop) -> tuple[npt.NDArray[np.intp], Array]:
-        """The interval of each row (T,), and the set points (T, s) there."""
-        key = id(loop)
-        if key not in self._at_rows:
-            at = intervals_of(self.times, prepared.instants)
-            self._at_rows[key] = at, prepared.setpoint_signal.inputs_at(self.times, self.template.start_time)
-        return self._at_rows[key]
 
     def run(self, index: int, compiled: CompiledSystem, state: Array) -> CompiledRun:
         """The loop of one plant, integrated from its initial state (n,)."""
@@ -103,13 +79,6 @@ class LoopBatch:
                 prepared = dataclasses.replace(prepared, times=self.times, first_rows=rows)
                 self._prepared[id(loop)] = CompiledLoop(problem.compiled, prepared)
         return self._prepared[id(loop)]
-
-    def columns(self, index: int, wanted: Collection[str], run: CompiledRun, count: int) -> dict[str, Array]:
-        """The wanted ones of set points, measurements and commands at the first rows (R,) of one plant."""
-        intervals, setpoints = self._rows_of(self.loop_of(index), run.prepared)
-        intervals = np.minimum(intervals[:count], max(len(run.measured) - 1, 0))
-        columns = (*setpoints[:count].T, *run.measured[intervals].T, *run.commanded[intervals].T)
-        return {n: column for n, column in zip(self.loops[0].column_names, columns, strict=True) if n in wanted}
 
 
 def loops_of(given: Any, system: System) -> tuple[ControlLoop, ...] | None:

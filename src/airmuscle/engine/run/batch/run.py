@@ -14,8 +14,8 @@ from ...processes import available_cores
 from ..bound_integrator import MAX_STEPS
 from ..integrators import ExplicitRungeKutta, Integrator, default_integrator
 from ..output_times import output_times as times_of
-from ..problem import check_input_range
-from .job import NOT_RUN, BatchJob, Queue, progress, run_workers
+from ..problem import Problem, check_input_range
+from .job import BatchJob, Queue, progress, run_workers
 from .lanes import Double, LaneBlock, Precision, SegmentTable, block_workers, check_precision
 from .loop_lanes import LoopLaneBlock, run_in_lanes
 from .loops import LoopBatch, loops_of, vary
@@ -73,11 +73,12 @@ def simulate_batch(
     shared = segments[0].ends if isinstance(input, InputSignal) else None
     times = _times(output_times, start_time, duration, shared, keep)
     states, reasons = _initial_states(varied, initial_states, count)
-    batch = LoopBatch.of(plant, loops, laws, (start_time, duration), times, integrator) if loops else None
-    job, storage = _job(
-        compiled, varied, integrator, states, segments, start_time, duration, times, reasons, keep, into, precision,
-        batch,
-    )  # fmt: skip
+    batch = None
+    if loops:
+        template = Problem(plant, loops[0], duration, start_time=start_time, integrator=integrator)
+        batch = LoopBatch(template, loops, laws, times)
+    job = BatchJob(compiled, varied, integrator, states, segments, start_time, duration, times, reasons, batch)
+    storage = _storage(job, keep, into, precision)
     try:
         _run(job, precision, cores or available_cores())
         return _solution(job, storage, precision)
@@ -178,27 +179,16 @@ def _initial_states(
         return default_states(varied, advanced)
 
 
-def _job(
-    compiled: CompiledSystem, varied: Variations, integrator: Integrator, states: Array,
-    segments: tuple[PiecewiseLinear, ...], start: float, duration: float, times: Array, reasons: dict[int, str],
-    keep: Sequence[str] | None, into: str | Path | None, precision: Precision, loops: LoopBatch | None,
-) -> tuple[BatchJob, InMemory]:  # fmt: skip
-    count, n = states.shape
-    by_lanes = isinstance(integrator, ExplicitRungeKutta) and loops is None
-    nominal = np.empty((count, n)) if by_lanes else varied.nominal()
-    final, status, reached = np.full((count, n), np.nan), np.full(count, NOT_RUN), np.zeros(count, dtype=np.int64)
-    given = (compiled, varied, integrator, states, segments, start, duration, times)
-    job = BatchJob(*given, {}, final, status, reached, reasons, nominal, loops)
-    names = job.names if keep is None else _kept(keep, job.names)
-    shape = (names, count, times.size, precision.dtype)
+def _storage(job: BatchJob, keep: Sequence[str] | None, into: str | Path | None, precision: Precision) -> InMemory:
+    """The place of the columns of a job, into which it writes them."""
+    names: tuple[str, ...] = job.names
+    if keep is not None:
+        check_known("keep: no column", keep, names)
+        names = (keep,) if isinstance(keep, str) else tuple(dict.fromkeys(keep))
+    shape = (names, len(job.initial_states), job.times.size, precision.dtype)
     storage = InMemory(*shape) if into is None else OnDisk(into, *shape)
     job.columns.update(storage.columns)
-    return job, storage
-
-
-def _kept(keep: Sequence[str], names: Sequence[str]) -> tuple[str, ...]:
-    check_known("keep: no column", keep, names)
-    return (keep,) if isinstance(keep, str) else tuple(dict.fromkeys(keep))
+    return storage
 
 
 def _run(job: BatchJob, precision: Precision, cores: int) -> None:
