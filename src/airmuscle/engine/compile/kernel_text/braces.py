@@ -2,12 +2,10 @@
 
 import abc
 import ast
-import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 
 from .printer import KernelPrinter
-from .source import KernelSource
 from .types import ElementType, TypedKernel, pairs, stored_names
 
 _JAVASCRIPT_KEYWORDS = """
@@ -26,24 +24,29 @@ class BraceKernels(KernelPrinter):
 
     counter: str
     """How the counter of a loop is declared."""
+    joins_results = False
+    """Whether several results of a function are assigned at once."""
 
     @abc.abstractmethod
     def declaration(self, name: str, constant: bool) -> str:
         """What stands before the first assignment of a variable, which is the only one of a constant."""
 
     def begin(self) -> None:
-        self._places = declarations(self.source, self.kernel)
-
-    @property
-    def early(self) -> list[str]:
+        """Find where local variables are declared: at the first assignment, if its block contains every use."""
+        source = self.source
+        stored = list(stored_names(source.body))
+        loops = {ast.unparse(node.target) for node in ast.walk(source.node) if isinstance(node, ast.For)}
+        local = [name for name in dict.fromkeys(stored) if name not in source.arguments and name not in loops]
+        self._places = {name: _place(name, source.body) for name in local}
+        self.early = [name for name, node in self._places.items() if node is None]
         """The variables that are declared at the beginning of the function."""
-        return list(self._places.early)
+        self._once = {name for name in local if stored.count(name) == 1}
 
     def declared(self, target: ast.expr, node: ast.stmt, *, constant: bool = True) -> str:
         """The declaration of a target in a statement; empty where it is declared elsewhere."""
-        if not isinstance(target, ast.Name) or self._places.at.get(target.id) is not node:
+        if not isinstance(target, ast.Name) or self._places.get(target.id) is not node:
             return ""
-        return self.declaration(target.id, constant and target.id in self._places.constant)
+        return self.declaration(target.id, constant and target.id in self._once)
 
     def element(self, array: ast.Name, at: Sequence[ast.expr]) -> str:
         return self.name(array.id) + "".join(f"[{self.expression(index)}]" for index in at)
@@ -58,6 +61,12 @@ class BraceKernels(KernelPrinter):
             return [f"{left}++;" if counts else f"{left} = {self.expression(value)};"]
         return [f"{self.declared(target, node)}{left} = {self.expression(value)};"]
 
+    def call_lines(self, call: ast.Call, targets: Sequence[ast.expr], node: ast.stmt) -> list[str]:
+        [line] = super().call_lines(call, targets, node)
+        early = targets if self.joins_results and len(targets) > 1 else targets[1:]
+        before = [f"{text}{self.expression(t)};" for t in early if (text := self.declared(t, node, constant=False))]
+        return [*before, "".join(self.declared(t, node) for t in targets[: len(targets) - len(early)]) + line]
+
     def invoke(self, name: str, given: Sequence[ast.expr], results: int) -> str:
         return f"{self.prefix}{name}({self.joined(given)});"
 
@@ -67,31 +76,6 @@ class BraceKernels(KernelPrinter):
 
     def branch(self, word: str, test: str) -> str:
         return f"{word} ({test}) {{"
-
-
-@dataclasses.dataclass(frozen=True)
-class Declarations:
-    """Places of declarations.
-
-    at        the assignment that declares a variable, by name
-    early     variables that are declared at the beginning of the function
-    constant  variables that are assigned once
-    """
-
-    at: Mapping[str, ast.stmt]
-    early: Sequence[str]
-    constant: frozenset[str]
-
-
-def declarations(source: KernelSource, kernel: TypedKernel) -> Declarations:
-    """The declarations of the local variables: at the first assignment, if its block contains every use."""
-    stored = list(stored_names(source.body))
-    loops = {ast.unparse(node.target) for node in ast.walk(source.node) if isinstance(node, ast.For)}
-    local = [name for name in dict.fromkeys(stored) if name not in source.arguments and name not in loops]
-    places = {name: _place(name, source.body) for name in local}
-    at = {name: node for name, node in places.items() if node is not None}
-    once = frozenset(name for name in at if stored.count(name) == 1)
-    return Declarations(at, [name for name in local if name not in at], once)
 
 
 def _mentions(name: str, node: ast.AST) -> bool:
@@ -199,19 +183,6 @@ class CKernels(BraceKernels):
         a, b = (self.expression(each, 5) for each in arguments)
         return f"({a} {'<' if name == 'min' else '>'} {b} ? {a} : {b})"
 
-    def call_lines(self, call: ast.Call, targets: Sequence[ast.expr], node: ast.stmt) -> list[str]:
-        called = self.kernel.calls.get(ast.unparse(call.func))
-        if called is None:
-            raise self.source.unprintable(call, f"the function {ast.unparse(call.func)}")
-        for target, kind in zip(targets, called.returns, strict=False):
-            if self.kernel.of(target) != kind:
-                raise self.source.unprintable(call, "a result of another type than its variable")
-        before = [f"{self.declared(t, node, constant=False)}{self.expression(t)};"
-                  for t in targets[1:] if self.declared(t, node)]  # fmt: skip
-        given = [*map(self.expression, called.given(call).values()), *(f"&{self.expression(t)}" for t in targets[1:])]
-        left = f"{self.declared(targets[0], node)}{self.expression(targets[0])} = " if targets else ""
-        return [*before, f"{left}{called.source.name}({', '.join(given)});"]
-
     def called_with(self, kernel: TypedKernel, given: Mapping[str, str], results: Sequence[str]) -> str:
         values = [given.get(name, name) for name in kernel.arguments] + [f"&{name}" for name in results[1:]]
         return f"{f'{results[0]} = ' if results else ''}{kernel.source.name}({', '.join(values)});"
@@ -232,6 +203,7 @@ class JavaScriptKernels(BraceKernels):
     spelling: dict[type, str] = {ast.Eq: "===", ast.NotEq: "!=="}  # noqa: RUF012
 
     counter = "let"
+    joins_results = True
 
     def declaration(self, name: str, constant: bool) -> str:
         return "const " if constant else "let "
@@ -261,18 +233,9 @@ class JavaScriptKernels(BraceKernels):
         usual = "Math.trunc" if name == "int" else f"Math.{name.removeprefix('np.')}"
         return f"{name if name in self.kernel.calls else usual}({self.joined(arguments)})"
 
-    def call_lines(self, call: ast.Call, targets: Sequence[ast.expr], node: ast.stmt) -> list[str]:
-        called = self.kernel.calls.get(ast.unparse(call.func))
-        given = called.given(call).values() if called else call.args
-        text = f"{ast.unparse(call.func)}({self.joined(list(given))});"
-        if len(targets) < 2:
-            return [f"{self.declared(t, node)}{self.expression(t)} = {text}" for t in targets] or [text]
-        before = [f"let {self.expression(target)};" for target in targets if self.declared(target, node)]
-        return [*before, f"[{self.joined(targets)}] = {text}"]
-
     def called_with(self, kernel: TypedKernel, given: Mapping[str, str], results: Sequence[str]) -> str:
         values = ", ".join(given.get(name, name) for name in kernel.arguments)
-        left = f"[{', '.join(results)}] = " if results else ""
+        left = f"[{', '.join(results)}] = " if len(results) > 1 else "".join(f"{result} = " for result in results)
         return f"{left}{kernel.source.name}({values});"
 
     def workspace(self, arrays: Mapping[str, Sequence[str]]) -> str:

@@ -111,24 +111,12 @@ class MatlabKernels(KernelPrinter):
             left += "(:)"
         return f"{left} = {self.expression(value)};"
 
-    def call_lines(self, call: ast.Call, targets: Sequence[ast.expr], node: ast.stmt) -> list[str]:
-        called = self.kernel.calls.get(ast.unparse(call.func))
-        if called is None:
-            raise self.source.unprintable(call, f"the function {ast.unparse(call.func)}")
-        given = called.given(call)
-        text = f"{called.source.name}({self.joined(list(given.values()))});"
-        return [self._results_of([*targets, *(given[name] for name in called.changed)]) + text]
-
-    def _results_of(self, targets: Sequence[ast.expr]) -> str:
-        """The left side of an assignment of results."""
-        return self._left(list(map(self.expression, targets)))
-
     @staticmethod
     def _left(names: Sequence[str]) -> str:
         return (names[0] if len(names) == 1 else f"[{', '.join(names)}]") + " = " if names else ""
 
     def invoke(self, name: str, given: Sequence[ast.expr], results: int) -> str:
-        return f"{self._results_of(given[-results:])}{name}({self.joined(given[:-results])});"
+        return f"{self._left(list(map(self.expression, given[-results:])))}{name}({self.joined(given[:-results])});"
 
     # Operations on whole arrays
 

@@ -86,7 +86,7 @@ class KernelPrinter(ExpressionPrinter):
 
     @abc.abstractmethod
     def called_with(self, kernel: TypedKernel, given: Mapping[str, str], results: Sequence[str]) -> str:
-        """The statement of `bound_call`."""
+        """The statement of a call; arguments and results as of `bound_call`."""
 
     @abc.abstractmethod
     def workspace(self, arrays: Mapping[str, Sequence[str]]) -> str:
@@ -111,10 +111,6 @@ class KernelPrinter(ExpressionPrinter):
     @abc.abstractmethod
     def assign(self, target: ast.expr, value: ast.expr, node: ast.stmt) -> list[str]:
         """The lines that assign a value."""
-
-    @abc.abstractmethod
-    def call_lines(self, call: ast.Call, targets: Sequence[ast.expr], node: ast.stmt) -> list[str]:
-        """The lines of a call of a printed function as a statement, with the targets of its results."""
 
     @abc.abstractmethod
     def invoke(self, name: str, given: Sequence[ast.expr], results: int) -> str:
@@ -179,6 +175,16 @@ class KernelPrinter(ExpressionPrinter):
             case ast.Continue():
                 return [self.word("continue")]
         raise self.source.unprintable(node, f"the statement {type(node).__name__}")
+
+    def call_lines(self, call: ast.Call, targets: Sequence[ast.expr], node: ast.stmt) -> list[str]:
+        """The lines of a call of a printed function as a statement, with the targets of its results."""
+        called = self.kernel.calls.get(ast.unparse(call.func))
+        if called is None:
+            raise self.source.unprintable(call, f"the function {ast.unparse(call.func)}")
+        if any(self.kernel.of(target) != kind for target, kind in zip(targets, called.returns, strict=False)):
+            raise self.source.unprintable(call, "a result of another type than its variable")
+        given = {name: self.expression(value) for name, value in called.given(call).items()}
+        return [self.called_with(called, given, list(map(self.expression, targets)))]
 
     def word(self, word: str) -> str:
         """A statement of one word."""
