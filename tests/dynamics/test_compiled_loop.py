@@ -153,7 +153,7 @@ def test_pauses_and_short_buffers_change_nothing(drivers, monkeypatch):
     whole = solve(problem)
     monkeypatch.setattr(compiled_loop, "INTERRUPT_CHECK_STEPS", 3)
     monkeypatch.setattr(compiled_loop, "FIRST_SEGMENTS", 1)
-    monkeypatch.setattr("airmuscle.engine.run.bound_integrator.INTERRUPT_CHECK_STEPS", 1)
+    monkeypatch.setattr("airmuscle.engine.run.integrators.INTERRUPT_CHECK_STEPS", 1)
     assert_identical(solve(dataclasses.replace(problem)), whole)
 
 

@@ -24,7 +24,7 @@ from airmuscle.engine import (
     solve,
 )
 from airmuscle.engine.compile import compile_system
-from airmuscle.engine.run import bound_integrator
+from airmuscle.engine.run import integrators
 from airmuscle.errors import AirmuscleError, SimulationError
 from airmuscle.physics import (
     EnergyBalance,
@@ -260,7 +260,7 @@ def test_a_part_of_another_kind_is_named(make, message):
 
 def test_a_run_ends_soon_after_its_state_has_become_impossible(monkeypatch):
     """Beyond the model the steps can become endlessly many: a thrown load is not followed to the end of its run."""
-    monkeypatch.setattr(bound_integrator, "INTERRUPT_CHECK_STEPS", 200)
+    monkeypatch.setattr(integrators, "INTERRUPT_CHECK_STEPS", 200)
     start = {**STATE, "speed": 100.0}
     problem = Problem(isothermal(), Schedule({}), 1.0, start, output_times=[1.0], integrator=RungeKutta4(1e-5))
     solution = solve(problem)

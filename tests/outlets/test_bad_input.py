@@ -22,7 +22,7 @@ from airmuscle import advance, load, load_data, read_csv, simulate
 from airmuscle.core import ABSOLUTE, atomic_folder, check_writable, model, parameter
 from airmuscle.engine import SampledSignal, Schedule
 from airmuscle.engine.compile.cache.kernel import BoundKernel, fixed_step
-from airmuscle.engine.run import bound_integrator
+from airmuscle.engine.run import integrators
 from airmuscle.errors import FileError, ParameterError, SolveError, UnitError
 from airmuscle.files import list_laws
 from airmuscle.files.library import read_toml
@@ -439,7 +439,7 @@ def test_an_interrupted_simulation_keeps_what_it_has(tmp_path: Path, monkeypatch
     )
     bind = fixed_step.bind
     monkeypatch.setattr(fixed_step, "bind", lambda *arguments: Interrupted(bind(*arguments)))
-    monkeypatch.setattr(bound_integrator, "INTERRUPT_CHECK_STEPS", 100)
+    monkeypatch.setattr(integrators, "INTERRUPT_CHECK_STEPS", 100)
     result = airmuscle("simulate", tmp_path / "run.toml", "--out", tmp_path / "run")
     assert result.exit_code == 130
     lines = [line for line in result.stderr.splitlines() if not line.startswith(COMPILING)]

@@ -1,5 +1,5 @@
-from .bound_integrator import BoundIntegrator as BoundIntegrator
 from .compiled_law import LawSample as LawSample
+from .integrators import BoundIntegrator as BoundIntegrator
 from .integrators import DormandPrince8 as DormandPrince8
 from .integrators import ExplicitRungeKutta as ExplicitRungeKutta
 from .integrators import Integrator as Integrator

@@ -6,19 +6,21 @@ inputs are then the same, and so is the kernel with its arrays.
 """
 
 from collections.abc import Hashable
-from typing import Any
 
 from ...core import Diagnostic, DiagnosticCode, Status, tree
 from ...recording.columns import column_units
-from ..loop import ControlLaw, ControlLoop, ControlLoopState, Schedule
+from ..loop import ControlLaw, ControlLoop, Schedule
 from .compiled_law import parameters_of
 from .compiled_loop import CompiledLoop, CompiledRun
 from .problem import Problem
 from .sampled_loop import prepare_loop
 from .solution import Solution, make_solution, recorded_rows, truncate_at_invalid_row
 
+MAX_KEPT_ROWS = 100_000
+"""Rows up to which a run is kept (chosen)."""
 
-def solve_closed_loop(problem: Problem) -> Solution:
+
+def solve_closed_loop(problem: Problem, loop: ControlLoop) -> Solution:
     """The solution of a problem with a ControlLoop, and the state from which the run can be continued.
 
     The recording also has `setpoint.`, `measured.` and `command.` columns: the set points in time, and the controller's
@@ -26,25 +28,27 @@ def solve_closed_loop(problem: Problem) -> Solution:
     the command of the same instant: an output that jumps with an input has not jumped yet. Split at a sampling instant
     and continued, a run equals the run in one, to the last bit; split between two, to the integrator's tolerance.
     """
-    loop, form = problem.input, form_of(problem)
-    control_state = problem.control_state or loop.init(problem.start_time)  # type: ignore[union-attr]
-    run = kept_run(problem, form, control_state)
+    compiled, form, law = problem.compiled, form_of(problem), loop.controller
+    control_state = problem.control_state or loop.init(problem.start_time)
+    pool = compiled.description.cache.loops
+    run: CompiledRun | None = pool.borrow(form)
     if run is None:
         assert problem.integrator is not None
-        prepared = CompiledLoop(problem.compiled, prepare_loop(problem, control_state))
-        run = CompiledRun(prepared, problem.compiled, problem.integrator, problem.initial_vector, control_state)
+        prepared = CompiledLoop(compiled, prepare_loop(problem, control_state))
+        run = CompiledRun(prepared, compiled, problem.integrator, problem.initial_vector, control_state)
+    else:
+        assert isinstance(law, ControlLaw)
+        run.restart(compiled, problem.initial_vector, parameters_of(law), control_state)
     run.integrate()
-    solution = _solution(problem, run)
-    if form is not None and run.status == Status.DONE:
-        keep_run(problem, form, run)
+    solution = _solution(problem, loop, run)
+    if form is not None and run.status == Status.DONE and run.room <= MAX_KEPT_ROWS:
+        pool.give_back(form, run)  # it holds the signals, which the form names by their identity
     return solution
 
 
-def _solution(problem: Problem, run: CompiledRun) -> Solution:
+def _solution(problem: Problem, loop: ControlLoop, run: CompiledRun) -> Solution:
     """The rows of all intervals as one solution."""
-    compiled, loop = problem.compiled, problem.input
-    assert isinstance(loop, ControlLoop)
-    segments, (times, states) = run.signal, run.rows
+    compiled, segments, (times, states) = problem.compiled, run.signal, run.rows
     times, states = times.copy(), states.copy()  # the next run may be in the same arrays
     raw = run.raw(states)
     table = recorded_rows(compiled, states, times, segments, problem.start_time)
@@ -60,10 +64,6 @@ def _solution(problem: Problem, run: CompiledRun) -> Solution:
     at, setpoints = run.prepared.at(reached) if loop.drivers else run.prepared.at_times  # drivers add rows
     more = run.columns(at[: reached.size], setpoints[: reached.size])
     return make_solution(problem, raw, table, times, (run.time, run.state), more, remarks, control_state)
-
-
-MAX_KEPT_ROWS = 100_000
-"""Rows up to which a run is kept (chosen)."""
 
 
 def form_of(problem: Problem) -> Hashable | None:
@@ -85,19 +85,3 @@ def form_of(problem: Problem) -> Hashable | None:
     except TypeError:  # a driver or an integrator that can change
         return None
     return form
-
-
-def kept_run(problem: Problem, form: Hashable | None, state: ControlLoopState) -> CompiledRun | None:
-    """A run of this form that nothing else uses, at its beginning; None where none is kept."""
-    run: CompiledRun | None = problem.compiled.description.cache.loops.borrow(form)
-    if run is None:
-        return None
-    law: Any = problem.input.controller  # type: ignore[union-attr]
-    run.restart(problem.compiled, problem.initial_vector, parameters_of(law), state)
-    return run
-
-
-def keep_run(problem: Problem, form: Hashable, run: CompiledRun) -> None:
-    """Keep a run whose results have been copied. The form names signals by their identity, so the run holds them."""
-    if run.room <= MAX_KEPT_ROWS:
-        problem.compiled.description.cache.loops.give_back(form, run)

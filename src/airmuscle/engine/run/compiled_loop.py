@@ -14,10 +14,9 @@ from ..compile.cache import kernel
 from ..compile.kernel_layout import Progress, Waiting
 from ..compile.program import CompiledSystem
 from ..loop import ControlLaw, ControlLoopState, PiecewiseLinear
-from .bound_integrator import INTERRUPT_CHECK_STEPS, MAX_STEPS, RawSolution
 from .compiled_law import compiled_sample, parameters_of
 from .driver_table import DriverTable, are_called, greatest_capacity
-from .integrators import Integrator
+from .integrators import INTERRUPT_CHECK_STEPS, MAX_STEPS, Integrator, RawSolution
 from .sampled_loop import CalledController, SampledLoop
 
 FIRST_SEGMENTS = 4096
@@ -158,7 +157,7 @@ class CompiledRun:
                     self._answer(flags[_WAITING], flags[_INTERVAL])
                 elif flags[Progress.FULL]:
                     self._extend()
-                elif flags[Progress.RUNNING] and self.bound.count[2] - flags[Progress.STEPS_BEFORE] >= MAX_STEPS:
+                elif self._takes_too_many_steps():
                     break
                 status = run()
         except KeyboardInterrupt:
@@ -168,6 +167,10 @@ class CompiledRun:
             self.stopped_at = float(self.bound.clock[0])
         if self.status == Status.INTERRUPTED:
             self._discard_interval()
+
+    def _takes_too_many_steps(self) -> bool:
+        running = self.progress[Progress.RUNNING]
+        return bool(running and self.bound.count[2] - self.progress[Progress.STEPS_BEFORE] >= MAX_STEPS)
 
     def _answer(self, waiting: int, interval: int) -> None:
         """Give the kernel what it awaits."""

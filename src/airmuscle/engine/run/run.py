@@ -12,18 +12,10 @@ from ...core.system import check_system, state_vector
 from ...recording import Recording
 from ..compile.program import CompiledSystem, compile_system
 from ..loop import ControlLoop, InputSignal, PiecewiseLinear, Schedule
-from .bound_integrator import INTERRUPT_CHECK_STEPS, BoundIntegrator, RawSolution
 from .closed_loop import solve_closed_loop
-from .integrators import Integrator, default_integrator
+from .integrators import INTERRUPT_CHECK_STEPS, BoundIntegrator, Integrator, RawSolution, default_integrator
 from .problem import Problem, check_input_range, plain_numbers
-from .solution import (
-    Solution,
-    early_end,
-    make_solution,
-    recorded_rows,
-    status_of_state,
-    truncate_at_invalid_row,
-)
+from .solution import Solution, early_end, make_solution, recorded_rows, status_of_state, truncate_at_invalid_row
 
 _AT_POSSIBLE_STATE = {Status.DONE, Status.INTERRUPTED, Status.TOO_MANY_STEPS}
 """How a run ends at a possible state."""
@@ -33,7 +25,8 @@ INSTANTS = 1000
 
 def solve(problem: Problem) -> Solution:
     """The solution of a problem; a run that ended early is returned as far as it was computed, with its status."""
-    return solve_closed_loop(problem) if isinstance(problem.input, ControlLoop) else _solve_open_loop(problem)
+    loop = problem.input
+    return solve_closed_loop(problem, loop) if isinstance(loop, ControlLoop) else _solve_open_loop(problem)
 
 
 def _solve_open_loop(problem: Problem) -> Solution:

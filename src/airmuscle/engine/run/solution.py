@@ -18,8 +18,7 @@ from ..compile.cache.kernel import record
 from ..compile.program import CompiledSystem
 from ..loop.control_loop import ControlLoopState
 from ..loop.inputs import PiecewiseLinear
-from .bound_integrator import RawSolution
-from .integrators import Integrator
+from .integrators import Integrator, RawSolution
 from .problem import Problem
 
 if TYPE_CHECKING:

@@ -10,8 +10,7 @@ from ....core import Array, IdentificationError, ParameterError, Status, System,
 from ....engine.compile.cache.kernel import evaluate
 from ....engine.compile.program import CompiledSystem, compile_system
 from ....engine.loop.inputs import InputSignal
-from ....engine.run.bound_integrator import BoundIntegrator
-from ....engine.run.integrators import Integrator
+from ....engine.run.integrators import BoundIntegrator, Integrator
 from ....engine.run.with_sensitivities import WithSensitivities
 from .experiment import CommandInstant, Experiment, InitialValue, StartTime, Unknown, with_command_instants
 from .initial_conditions import TimeGrid, compile_conditions, make_time_grid, solve_initial_state

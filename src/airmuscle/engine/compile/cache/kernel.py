@@ -55,11 +55,8 @@ def _kind(argument: Any) -> str:
 def _array_at(address: int, shape: tuple[int, ...]) -> Any:
     """The array of float64 at an address."""
     count = math.prod(shape)
-    return (
-        np.ctypeslib.as_array((ctypes.c_double * count).from_address(address)).reshape(shape)
-        if count
-        else np.empty(shape)
-    )
+    numbers = np.ctypeslib.as_array((ctypes.c_double * count).from_address(address)) if count else np.empty(0)
+    return numbers.reshape(shape)
 
 
 class Kernel:

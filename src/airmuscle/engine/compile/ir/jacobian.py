@@ -18,14 +18,9 @@ Row = dict[Operand, Operand]
 LESS, TWO, HALF = (("c", value) for value in (-1.0, 2.0, 0.5))
 _COMMUTE = (Operation.ADD, Operation.MULTIPLY)
 _CONDITIONS = (
-    Operation.LESS_EQUAL,
-    Operation.LESS,
-    Operation.EQUAL,
-    Operation.NOT_EQUAL,
-    Operation.NOT,
-    Operation.AND,
+    Operation.LESS_EQUAL, Operation.LESS, Operation.EQUAL, Operation.NOT_EQUAL, Operation.NOT, Operation.AND,
     Operation.OR,
-)
+)  # fmt: skip
 
 
 class Tape:

@@ -14,10 +14,9 @@ import numpy as np
 import numpy.typing as npt
 
 from ....core import Array, Status
-from ...compile.program import CompiledSystem
+from ...compile.program import CompiledSystem, Pool
 from ...loop.inputs import PiecewiseLinear
-from ..bound_integrator import RawSolution
-from ..integrators import Integrator
+from ..integrators import Integrator, RawSolution
 from ..solution import RowRecorder
 from .loops import LoopBatch
 from .variations import Variations
@@ -45,7 +44,7 @@ class BatchJob:
     reasons: dict[int, str]
     loops: LoopBatch | None = None
     columns: dict[str, npt.NDArray[Any]] = dataclasses.field(default_factory=dict)
-    _recorders: list[RowRecorder] = dataclasses.field(default_factory=list)
+    _recorders: Pool = dataclasses.field(default_factory=Pool)
 
     def __post_init__(self) -> None:
         count = len(self.initial_states)
@@ -137,19 +136,11 @@ class BatchJob:
 
     def _outputs_and_inputs(self, one: CompiledSystem, states: Array, segments: PiecewiseLinear) -> tuple[Array, Array]:
         """Outputs and inputs at the first rows (R, n) of a plant."""
-        recorder = self._recorder(one)
-        table = recorder.evaluate(states, self.times[: len(states)], segments, self.start_time)
-        self._recorders.append(recorder)
-        return table.outputs, table.inputs
-
-    def _recorder(self, one: CompiledSystem) -> RowRecorder:
-        """A recorder that no thread uses at present, for this plant."""
-        try:
-            recorder = self._recorders.pop()
-        except IndexError:
-            return RowRecorder(one)
+        recorder: RowRecorder = self._recorders.borrow(None) or RowRecorder(one)
         recorder.adopt(one)
-        return recorder
+        table = recorder.evaluate(states, self.times[: len(states)], segments, self.start_time)
+        self._recorders.give_back(None, recorder)
+        return table.outputs, table.inputs
 
     def _reason(self, raw: RawSolution) -> str:
         states = self.compiled.system.states

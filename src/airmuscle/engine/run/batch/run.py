@@ -11,8 +11,7 @@ from ....core.system import check_system
 from ...compile.program import CompiledSystem, compile_system
 from ...loop import ControlLoop, InputSignal, PiecewiseLinear
 from ...processes import available_cores
-from ..bound_integrator import MAX_STEPS
-from ..integrators import ExplicitRungeKutta, Integrator, default_integrator
+from ..integrators import MAX_STEPS, ExplicitRungeKutta, Integrator, default_integrator
 from ..output_times import output_times as times_of
 from ..problem import Problem, check_input_range
 from .job import BatchJob, Queue, progress, run_workers
@@ -70,8 +69,7 @@ def simulate_batch(
     count = len(varied.values)
     compiled = compile_system(plant)
     segments = () if loops else _segments(compiled, input, count, start_time, duration)  # type: ignore[arg-type]
-    shared = segments[0].ends if isinstance(input, InputSignal) else None
-    times = _times(output_times, start_time, duration, shared, keep)
+    times = _times(output_times, start_time, duration, input, segments, keep)
     states, reasons = _initial_states(varied, initial_states, count)
     batch = None
     if loops:
@@ -88,14 +86,14 @@ def simulate_batch(
 
 
 def _times(
-    given: float | npt.ArrayLike | None, start: float, duration: float, instants: Array | None,
-    keep: Sequence[str] | None,
+    given: float | npt.ArrayLike | None, start: float, duration: float, input: object,
+    segments: tuple[PiecewiseLinear, ...], keep: Sequence[str] | None,
 ) -> Array:  # fmt: skip
     """The times of the rows, with the instants of the input that all plants share; the end if no column is stored."""
     end = np.array([start + duration])
     if keep is not None and len(keep) == 0:
         return end
-    return times_of(given, start, duration, end if instants is None else instants)
+    return times_of(given, start, duration, segments[0].ends if isinstance(input, InputSignal) else end)
 
 
 def _check_time(duration: float, start_time: float, integrator: Integrator) -> None:
