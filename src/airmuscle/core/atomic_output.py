@@ -7,7 +7,7 @@ import shutil
 import socket
 import tempfile
 import threading
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from pathlib import Path
 
 from .errors import FileError, FolderInUseError
@@ -71,7 +71,7 @@ def atomic_folder(folder: Path | str) -> Iterator[Path]:
             _remove_abandoned(target)
             staging = Path(tempfile.mkdtemp(prefix=f"{_UNFINISHED}{os.getpid()}-", dir=target))
         try:
-            with _raise_where_full(target):
+            with _raise_file_errors(target, FULL):
                 yield staging
             with _raise_file_errors(target):
                 _move_files(staging, target)
@@ -174,24 +174,16 @@ def _hold(target: Path, created: list[Path]) -> None:
 
 
 @contextlib.contextmanager
-def _raise_file_errors(target: Path) -> Iterator[None]:
+def _raise_file_errors(target: Path, numbers: Collection[int] = ()) -> Iterator[None]:
+    """Raise FileError for an error of the operating system; of these numbers alone, if some are given."""
     try:
         yield
     except OSError as error:
+        if numbers and error.errno not in numbers:
+            raise
         at = f" ({error.filename})" if error.filename and Path(error.filename) != target else ""
         remedy = REMEDY_WHERE_FULL if error.errno in FULL else "Specify a folder with write permission."
         raise FileError(f"{target}: cannot be written to: {error.strerror or error}{at}. {remedy}") from error
-
-
-@contextlib.contextmanager
-def _raise_where_full(target: Path) -> Iterator[None]:
-    """Raise FileError where there is no space for a file; other errors are those of the block."""
-    try:
-        yield
-    except OSError as error:
-        if error.errno not in FULL:
-            raise
-        raise FileError(f"{target}: cannot be written to: {error.strerror}. {REMEDY_WHERE_FULL}") from error
 
 
 def _missing_folders(folder: Path) -> list[Path]:

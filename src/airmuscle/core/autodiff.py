@@ -44,24 +44,26 @@ def check_finite(expression: Any, owner: str) -> None:
             )
 
 
-def _trace_with_derivatives(obj: Any, method: str, count: int) -> Any:
-    """Return the cached CasADi function (arguments, parameters) -> (value, d/d argument i, d/d parameters)."""
+def _traced(obj: Any, method: str, count: int, wrt: int | None = None) -> Any:
+    """The cached CasADi function (arguments, parameters) -> value, d/d argument i for each, d/d parameters; with `wrt`
+    only the derivative by this argument."""
     import casadi
 
-    key = (tree.structure(obj), method, count)
+    key = (tree.structure(obj), method, count, wrt)
     if key not in _traced_functions:
         model, parameters = symbolic(obj)
         arguments = [casadi.SX.sym(f"x{i}") for i in range(count)]
         value = casadi.densify(casadi.SX(getattr(model, method)(*arguments)))
         check_finite(value, f"{type(obj).__name__}.{method}")
-        slopes = [casadi.densify(casadi.jacobian(value, x)) for x in (*arguments, parameters)]
+        varied = [*arguments, parameters] if wrt is None else [arguments[wrt]]
+        slopes = [casadi.densify(casadi.jacobian(value, x)) for x in varied]
         _traced_functions[key] = casadi.Function("law", [*arguments, parameters], casadi.cse([value, *slopes]))
     return _traced_functions[key]
 
 
 def _evaluate_traced(obj: Any, method: str, arguments: tuple[Any, ...]) -> tuple[list[Any], tuple[int, ...], int]:
     """Return the outputs of the traced function at the arguments, their shape and the number of points."""
-    function = _trace_with_derivatives(obj, method, len(arguments))
+    function = _traced(obj, method, len(arguments))
     results, shape = _call_traced(function, [leaf.value for leaf in tree.leaves(obj)], arguments)
     return results, shape, math.prod(shape)
 
@@ -140,11 +142,7 @@ def jvp(function: Callable[[Any], Sequence[Any]], point: Sequence[Any], directio
 
         primals, tangents = ([jax.numpy.asarray(x, dtype=float) for x in values] for values in (point, direction))
         return tuple(jax.jvp(lambda x: tuple(function(x)), (primals,), (tangents,))[1])
-    import casadi
-
-    x, values = _symbolic_values(function, len(point))
-    product = casadi.jtimes(values, x, casadi.vertcat(*direction))
-    return _substitute(product, x, point, ops.is_symbol(*point, *direction))
+    return _symbolic_product(function, point, direction, False)
 
 
 def vjp(function: Callable[[Any], Sequence[Any]], point: Sequence[Any], weights: Sequence[Any]) -> tuple[Any, ...]:
@@ -155,11 +153,7 @@ def vjp(function: Callable[[Any], Sequence[Any]], point: Sequence[Any], weights:
         primals = [jax.numpy.asarray(x, dtype=float) for x in point]
         gradient = jax.grad(lambda x: sum(w * y for w, y in zip(weights, function(x), strict=True)))
         return tuple(gradient(primals))
-    import casadi
-
-    x, values = _symbolic_values(function, len(point))
-    product = casadi.jtimes(values, x, casadi.vertcat(*weights), True)
-    return _substitute(product, x, point, ops.is_symbol(*point, *weights))
+    return _symbolic_product(function, point, weights, True)
 
 
 def value_and_derivative(obj: Any, method: str, count: int, wrt: int = 0) -> Callable[..., tuple[Any, Any]]:
@@ -171,16 +165,7 @@ def value_and_derivative(obj: Any, method: str, count: int, wrt: int = 0) -> Cal
     """
     import casadi
 
-    key = (tree.structure(obj), method, count, wrt)
-    if key not in _traced_functions:
-        model, symbols = symbolic(obj)
-        x = [casadi.SX.sym(f"x{i}") for i in range(count)]
-        value = casadi.densify(casadi.SX(getattr(model, method)(*x)))
-        check_finite(value, f"{type(obj).__name__}.{method}")
-        _traced_functions[key] = casadi.Function(
-            "law", [*x, symbols], casadi.cse([value, casadi.densify(casadi.jacobian(value, x[wrt]))])
-        )
-    function, parameters = _traced_functions[key], [leaf.value for leaf in tree.leaves(obj)]
+    function, parameters = _traced(obj, method, count, wrt), [leaf.value for leaf in tree.leaves(obj)]
     if any(isinstance(value, np.ndarray) for value in parameters):
         return lambda *arguments: _evaluate_pair(function, parameters, arguments)
     vector = casadi.DM(np.array(parameters, dtype=float))
@@ -203,20 +188,18 @@ def _is_jax(*operands: Any) -> bool:
     return any(type(x).__module__.startswith("jax") for x in operands)
 
 
-def _symbolic_values(function: Callable[[Any], Sequence[Any]], count: int) -> tuple[Any, Any]:
+def _symbolic_product(
+    function: Callable[[Any], Sequence[Any]], point: Sequence[Any], vector: Sequence[Any], transposed: bool
+) -> tuple[Any, ...]:
+    """The Jacobian at a point, or its transpose, times a vector: floats unless one of the values is a symbol."""
     import casadi
 
-    x = casadi.SX.sym("x", count)
-    return x, casadi.vertcat(*(casadi.SX(v) for v in function([x[i] for i in range(count)])))
-
-
-def _substitute(derivative: Any, x: Any, point: Sequence[Any], symbolic: bool) -> tuple[Any, ...]:
-    """Return the components of `derivative` at a point: symbols if `symbolic`, else floats."""
-    import casadi
-
-    result = casadi.substitute(derivative, x, casadi.vertcat(*point))
+    x = casadi.SX.sym("x", len(point))
+    values = casadi.vertcat(*(casadi.SX(v) for v in function([x[i] for i in range(len(point))])))
+    product = casadi.jtimes(values, x, casadi.vertcat(*vector), transposed)
+    result = casadi.substitute(product, x, casadi.vertcat(*point))
     components = tuple(result[i] for i in range(result.numel()))
-    return components if symbolic else tuple(float(component) for component in components)
+    return components if ops.is_symbol(*point, *vector) else tuple(map(float, components))
 
 
 def jacobian(obj: Any, method: str, *arguments: Any) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
@@ -231,7 +214,7 @@ def parameter_derivatives(obj: Any, method: str, arguments: Sequence[Any], leave
     if points[0].size >= MIN_POINTS:
         key = (tree.structure(obj), method, len(points), tuple(leaves), "program")
         if key not in _traced_functions:
-            function = _trace_with_derivatives(obj, method, len(points))
+            function = _traced(obj, method, len(points))
             _traced_functions[key] = make_program(function, function.n_out() - 1, list(leaves))
         program = _traced_functions[key]
         if program is not None:

@@ -35,17 +35,15 @@ class DisplayUnits:
     units  the texts of the units, such as ("bar", "mm"); a quantity without one keeps the default of the output
     """
 
-    def __init__(self, units: tuple[str, ...], where: str = "display", before: "DisplayUnits | None" = None) -> None:
+    def __init__(self, units: tuple[str, ...], where: str = "display") -> None:
         self.units = units
-        self.before = before
-        self.is_block = False
         self._by_si = _factors_by_si_unit(units, where)
 
     def __enter__(self) -> Self:
         """Restrict the choice to a block in this thread: the choice of the process is the earlier one again."""
         with _lock:
-            self.is_block = True
-            _process[0] = _last_of_process(_process[0])
+            if self in _process:
+                _process.remove(self)
         _blocks.set((*_blocks.get(), self))
         return self
 
@@ -61,15 +59,9 @@ class DisplayUnits:
 
 
 _lock = threading.Lock()
-_process: list[DisplayUnits | None] = [None]
+_process: list[DisplayUnits] = []
+"""The choices of this process, the last of which is in force."""
 _blocks: ContextVar[tuple[DisplayUnits, ...]] = ContextVar("display units", default=())
-
-
-def _last_of_process(choice: DisplayUnits | None) -> DisplayUnits | None:
-    """The last choice that was not made for a block."""
-    while choice is not None and choice.is_block:
-        choice = choice.before
-    return choice
 
 
 def display(*units: str) -> DisplayUnits:
@@ -79,8 +71,9 @@ def display(*units: str) -> DisplayUnits:
     changes plots, tables, reports, texts and notebooks; values, arguments and files (CSV, TOML, JSON) are not affected.
     Raises UnitError for an unknown unit, for two units of one quantity, and for an absolute pressure.
     """
+    choice = DisplayUnits(units)
     with _lock:
-        _process[0] = choice = DisplayUnits(units, before=_last_of_process(_process[0]))
+        _process.append(choice)
     return choice
 
 
@@ -91,8 +84,7 @@ def current_units() -> tuple[str, ...] | None:
 
 
 def _choice_here() -> DisplayUnits | None:
-    blocks = _blocks.get()
-    return blocks[-1] if blocks else _process[0]
+    return next(reversed(_blocks.get() or tuple(_process)), None)
 
 
 def chosen_scale(si_unit: str, factor: float, label: str) -> tuple[float, str]:

@@ -104,19 +104,19 @@ def _node(obj: Any) -> _Node:
 
 
 def _model_node(obj: Any) -> _Node:
-    declared = {p.name for p in parameters(obj)}
-    parts: list[Any] = [type(obj)]
+    kind: Any = type(obj)
+    parts: list[Any] = [kind]
     values: list[Any] = []
-    for field in dataclasses.fields(obj):
-        value = getattr(obj, field.name)
-        if field.name in declared:
-            several = isinstance(value, tuple)
-            parts.append((field.name, len(value) if several else 1))
-            values += value if several else (value,)
-        else:
+    for name, declared in _fields(kind) or ():
+        value = getattr(obj, name)
+        if declared is None:
             node = _node(value)
-            parts.append((field.name, node.structure))
+            parts.append((name, node.structure))
             values += node.values
+        else:
+            several = isinstance(value, tuple)
+            parts.append((name, len(value) if several else 1))
+            values += value if several else (value,)
     return _Node(_intern(tuple(parts)), tuple(values))
 
 

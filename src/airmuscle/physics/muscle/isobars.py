@@ -206,7 +206,12 @@ def isobar_figure(
     figure, axes = new_figure()
     draw_isobars(axes, curves, textwrap.fill(title, 60, max_lines=MAX_TITLE_LINES, placeholder=" …"), point, measured)
     if validity_range is not None:
-        _shade_extrapolation(axes, validity_range, curves)
+        low, high = validity_range.contraction
+        (across, _), label = axis_scales()[0], "outside the validity range"
+        for start, end in ((curves.contractions[0], low), (high, curves.contractions[-1])):
+            if end - start > 1e-9:
+                axes.axvspan(across * start, across * end, facecolor="0.5", alpha=0.16, linewidth=0, label=label)
+                label = "_nolegend_"
     if point is not None:
         _draw_working_point(axes, characteristic, curves, point)
     plotting.legend_outside(axes, title="gauge pressure")
@@ -219,41 +224,16 @@ def describe_point(point: WorkingPoint) -> str:
     return f"{', '.join(texts)}, {quantity_text(point.force, 'N', 'N')}"
 
 
-def _shade_extrapolation(axes: Any, validity_range: ValidityRange, curves: Isobars) -> None:
-    (across, _), _ = axis_scales()
-    low, high = validity_range.contraction
-    spans = [(curves.contractions[0], low), (high, curves.contractions[-1])]
-    label = "outside the validity range"
-    for start, end in spans:
-        if end - start > 1e-9:
-            axes.axvspan(across * start, across * end, facecolor="0.5", alpha=0.16, linewidth=0, label=label)
-            label = "_nolegend_"
-
-
 def _draw_working_point(axes: Any, characteristic: Characteristic, curves: Isobars, point: WorkingPoint) -> None:
     forces = forces_along(characteristic, point.pressure, curves.contractions)
     (across, _), (up, _) = axis_scales()
-    axes.plot(
-        across * curves.contractions,
-        up * mask_slack(forces),
-        color=plotting.RED,
-        linewidth=2.0,
-        label=f"{quantity_text(point.pressure, 'Pa', 'kPa', 6)} (working point)",
-        zorder=3,
-    )
-    axes.plot(
-        [across * point.contraction],
-        [up * point.force],
-        marker="o",
-        markersize=7,
-        markerfacecolor="white",
-        markeredgecolor=plotting.RED,
-        markeredgewidth=1.8,
-        linestyle="none",
-        label=f"working point\n{contraction_text(point.contraction)}, {quantity_text(point.force, 'N', 'N')}",
-        zorder=4,
-        clip_on=point.force < 0,
-    )
+    label = f"{quantity_text(point.pressure, 'Pa', 'kPa', 6)} (working point)"
+    line = {"color": plotting.RED, "linewidth": 2.0, "label": label, "zorder": 3}
+    axes.plot(across * curves.contractions, up * mask_slack(forces), **line)
+    label = f"working point\n{contraction_text(point.contraction)}, {quantity_text(point.force, 'N', 'N')}"
+    ring = {"marker": "o", "markersize": 7, "markerfacecolor": "white", "markeredgecolor": plotting.RED}
+    style = {"linestyle": "none", "markeredgewidth": 1.8, "label": label, "zorder": 4, "clip_on": point.force < 0}
+    axes.plot([across * point.contraction], [up * point.force], **ring, **style)
 
 
 def plot_isobars(

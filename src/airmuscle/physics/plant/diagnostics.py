@@ -7,7 +7,7 @@ import numpy as np
 
 from ...core import Array, ParameterError, Value, describe_model, select_prefix
 from ...core.diagnostics import ColumnLimit, Columns, Diagnostic, DiagnosticCode
-from ..muscle import INNER_CONTRACTION, ElasticSeriesElement, Muscle
+from ..muscle import INNER_CONTRACTION, ElasticSeriesElement, Muscle, RatedRange
 from ..muscle.friction import NoFriction
 
 MARGIN = 1e-3
@@ -30,15 +30,9 @@ _MEANINGS = {
 
 def friction(muscles: Sequence[Muscle]) -> Diagnostic:
     """The friction of the muscles; also stated if there is none, which is the default."""
-    if all(isinstance(m.friction, NoFriction) for m in muscles):
-        text = "off"
-    elif len(muscles) == 1:
-        text = describe_model(muscles[0].friction)
-    else:
-        parts = [
-            f"{m.name} {'none' if isinstance(m.friction, NoFriction) else describe_model(m.friction)}" for m in muscles
-        ]
-        text = ", ".join(parts)
+    texts = ["none" if isinstance(m.friction, NoFriction) else describe_model(m.friction) for m in muscles]
+    text = texts[0] if len(muscles) == 1 else ", ".join(f"{m.name} {t}" for m, t in zip(muscles, texts, strict=True))
+    text = "off" if set(texts) == {"none"} else text
     return Diagnostic(DiagnosticCode.MODEL, "friction", f"friction of the muscles: {text}")
 
 
@@ -119,20 +113,14 @@ def describe_limit(limit: ColumnLimit) -> str:
 
 def _outside(limit: ColumnLimit) -> tuple[str, str]:
     """Text that says which range is left, and what that means."""
-    (scale, unit), (where, meaning) = _shown_unit(limit.quantity), _MEANINGS[limit.code]
-    span = _span(*(end / scale for end in limit.bounds))
-    return f"outside {where} in {limit.quantity.replace('_', ' ')} ({span} {unit})", meaning
+    where, meaning = _MEANINGS[limit.code]
+    span = RatedRange(limit.quantity.replace("_", " "), *limit.bounds, *_shown_unit(limit.quantity))
+    return f"outside {where} in {span.quantity} ({span})", meaning
 
 
 def _shown_unit(quantity: str) -> tuple[float, str]:
     """Factor and name of the unit in which a quantity is shown."""
     return {"pressure": (1e3, "kPa"), "speed": (1.0, "m/s"), "force": (1.0, "N")}.get(quantity, (0.01, "%"))
-
-
-def _span(low: float, high: float) -> str:
-    if np.isinf(high):
-        return f"at least {low:.4g}"
-    return f"{low:.4g} to {high:.4g}" if np.isfinite(low) else f"at most {high:.4g}"
 
 
 def rated_temperature(muscles: Sequence[Muscle], ambient_temperature: float) -> list[Diagnostic]:

@@ -139,16 +139,12 @@ def _unit_flow(critical_ratio: float, upstream: float, downstream: float) -> flo
             f"the downstream pressure is {downstream:g} Pa; it must be less than the upstream pressure of {upstream:g} "
             "Pa (both absolute)."
         )
-    law = Valve(1e-8, _check_critical_ratio(critical_ratio))
+    law = Valve(1e-8, critical_ratio)
     return float(law.mass_flow(upstream, downstream, 1.0, REFERENCE_TEMPERATURE) / (REFERENCE_DENSITY * 1e-8))
 
 
 def _near_equal_factor(critical_ratio: float) -> float:
-    return float(ops.sqrt(1.0 - _check_critical_ratio(critical_ratio)))
-
-
-def _check_critical_ratio(critical_ratio: float) -> float:
-    return Valve(1e-8, critical_ratio).critical_ratio  # Valve declares the bounds
+    return float(ops.sqrt(1.0 - Valve(1e-8, critical_ratio).critical_ratio))  # Valve declares the bounds
 
 
 def _check_positive(what: str, value: float) -> None:

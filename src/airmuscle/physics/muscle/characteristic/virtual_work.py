@@ -1,7 +1,7 @@
 """Laws of virtual work: force from the volume of a geometry, also with the rubber of a circular meridian."""
 
 import functools
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 from ....core import ParameterError, Reference, TraceError, Value, model, ops, parameter
 from ..geometry.base import Geometry, check_contraction_range
@@ -47,17 +47,6 @@ _MIN_ANGLE = 1e-200
 """Lower bound of the angle in a denominator, which avoids a division by zero for straight fibres."""
 
 
-class _WorkTerms(NamedTuple):
-    """Work per contraction, multiplied by psi to be finite at zero contraction."""
-
-    area: Value
-    """psi (dV/deps)/l_0 [m2]."""
-    rubber: Value
-    """psi (dU/deps)/l_0 [N]."""
-    angle: Value
-    """psi [rad]."""
-
-
 @model
 class CircleVirtualWork(RubberLaw, ForceLaw):
     """Straight-fibre muscle with a circular meridian, by virtual work.
@@ -93,8 +82,8 @@ class CircleVirtualWork(RubberLaw, ForceLaw):
     def force(self, pressure: Value, contraction: Value) -> Value:
         """Tension [N]; negative beyond the maximum volume, unbounded at zero contraction (straight fibres)."""
         self._check_contraction(contraction, self.geometry.contraction_range)
-        work = self._work_terms(contraction)
-        return (pressure * work.area - work.rubber) / ops.maximum(work.angle, _MIN_ANGLE)
+        area, rubber, angle = self._work_terms(contraction)
+        return (pressure * area - rubber) / ops.maximum(angle, _MIN_ANGLE)
 
     def pressure(self, contraction: Value, force: Value) -> Value:
         self._check_contraction(contraction, self.contraction_range)
@@ -114,20 +103,17 @@ class CircleVirtualWork(RubberLaw, ForceLaw):
 
     def _pressure(self, contraction: Value, force: Value) -> Value:
         """Equilibrium pressure [Pa], without a check of its range."""
-        work = self._work_terms(contraction)
-        return (force * work.angle + work.rubber) / work.area
+        area, rubber, angle = self._work_terms(contraction)
+        return (force * angle + rubber) / area
 
-    def _work_terms(self, contraction: Value) -> _WorkTerms:
-        tube = self.geometry
-        arc = CircularArc()
+    def _work_terms(self, contraction: Value) -> tuple[Value, Value, Value]:
+        """psi (dV/deps)/l_0 [m2], psi (dU/deps)/l_0 [N] and psi [rad], which are finite at zero contraction."""
+        tube, arc = self.geometry, CircularArc()
         angle_squared = arc.angle_squared(contraction)
         derivatives = arc.derivatives_times_angle(angle_squared, tube.fibre_length, tube.end_radius)
         energy = self.rubber.energy(derivatives.arc_excess, derivatives.arc_excess_squared, tube.end_radius)
-        return _WorkTerms(
-            derivatives.volume / tube.fibre_length,
-            self.wall_thickness * energy / tube.fibre_length,
-            ops.sqrt(angle_squared),
-        )
+        rubber = self.wall_thickness * energy / tube.fibre_length
+        return derivatives.volume / tube.fibre_length, rubber, ops.sqrt(angle_squared)
 
     def _check_contraction(self, contraction: Value, limits: tuple[float, float]) -> None:
         """Raise GeometryLimitError if a contraction is outside `limits`, unless the model is being traced."""
