@@ -217,7 +217,8 @@ def check_arguments(
         for each in value if declared.kind is declared.VAR_POSITIONAL else (value,):
             if not _suits(each, hint):
                 raise ParameterError(f"{owner}: {name} must be {describe(hint)}; it is {abridged(each)}.") from failure
-        if _is_empty(value) and value is not declared.default:
+        is_several = isinstance(value, Sequence | Mapping) and not isinstance(value, str)
+        if is_several and not value and value is not declared.default:
             raise ParameterError(f"{owner}: {name} is empty; give at least one.") from failure
         is_path = Path in typing.get_args(hint) and isinstance(value, str | Path)
         if is_path and (isinstance(failure, OSError) or not Path(value).name or "\0" in str(value)):
@@ -234,7 +235,3 @@ def _suits(value: Any, hint: Any) -> bool:
     return conforms(value, hint, lists=True) or (
         isinstance(value, np.ndarray) and value.ndim > 0 and conforms(value.tolist(), hint, lists=True)
     )
-
-
-def _is_empty(value: Any) -> bool:
-    return isinstance(value, Sequence | Mapping) and not isinstance(value, str) and not value

@@ -105,7 +105,7 @@ def _notation(value: Any) -> str:
 
 def printable(text: str) -> str:
     r"""The text with control characters and undecodable bytes replaced by escapes such as \x1b."""
-    return text if text.isprintable() else "".join(c if _is_printable(c) else _escape(c) for c in text)
+    return text if text.isprintable() else "".join(map(_escape, text))
 
 
 def quotable(text: str) -> str:
@@ -122,12 +122,11 @@ def listed(names: Iterable[str], characters: int = MAX_LISTED_TEXT, longest: int
     return ", ".join(all_names if rest <= 1 else [*all_names[:count], f"and {rest} more"])
 
 
-def _is_printable(character: str) -> bool:
-    return character.isprintable() or character in "\n\t" or unicodedata.category(character) == "Zs"
-
-
 def _escape(character: str) -> str:
-    """An escape; a byte that could not be decoded (U+DC80 to U+DCFF, PEP 383) is written as that byte."""
+    """A character, an escape of one that cannot be printed; a byte that could not be decoded (U+DC80 to U+DCFF, PEP
+    383) is written as that byte."""
+    if character.isprintable() or character in "\n\t" or unicodedata.category(character) == "Zs":
+        return character
     code = ord(character)
     if 0xDC80 <= code <= 0xDCFF:
         return f"\\x{code - 0xDC00:02x}"

@@ -142,7 +142,13 @@ class Statics:
     @functools.cached_property
     def contraction_limits(self) -> list[tuple[Value, Value]]:
         """Limits of the contraction of each muscle in the search for equilibria."""
-        return [_search_range(muscle) for muscle in self.plants.muscles]
+        limits = []
+        for muscle in self.plants.muscles:
+            low, high = muscle.geometry.contraction_range
+            low = ops.maximum(low, LOWEST_CONTRACTION)
+            margin = 1e-9 * (high - low)
+            limits.append((low + margin, high - margin))
+        return limits
 
     def allowed(self) -> npt.NDArray[np.bool_]:
         """Plants (N,) for which the inputs and pressures are allowed."""
@@ -247,10 +253,3 @@ def _with_arrays(plant: StaticPlant, parameters: Array) -> StaticPlant:
     """The plant with an array (N, 1) for every parameter, also if N = 1: powers of scalars and arrays differ in the
     last digit, and the equilibrium of a plant must not depend on the number of plants."""
     return tree.unflatten(plant, [column[:, None].copy() for column in parameters.T])
-
-
-def _search_range(muscle: Muscle) -> tuple[Value, Value]:
-    low, high = muscle.geometry.contraction_range
-    low = ops.maximum(low, LOWEST_CONTRACTION)
-    margin = 1e-9 * (high - low)
-    return low + margin, high - margin

@@ -51,10 +51,14 @@ def compute_isobars(
 ) -> Isobars:
     """Return isobars at the given pressures [Pa].
 
-    None stands for round pressures over the validity range, or over the law's pressure range if it has none.
+    None stands for round pressures over the validity range; without one up to twice the pressure of the working point,
+    or over the law's pressure range.
     """
     if pressures is None:
-        pressures = _isobar_pressures(characteristic, validity_range, point)
+        low, high = validity_range.pressure if validity_range else characteristic.pressure_range
+        if validity_range is None and point is not None and point.pressure > low:
+            high = min(2.0 * point.pressure, high)
+        pressures = _round_pressures(low, high)
     low, high = _contraction_axis(characteristic, validity_range, point, pressures)
     contractions = np.linspace(low, high, POINTS if characteristic.traceable else COARSE_POINTS)
     forces = [forces_along(characteristic, float(pressure), contractions) for pressure in pressures]
@@ -119,20 +123,6 @@ def _force_axis_limit(curves: Isobars, point: WorkingPoint | None, measured: Rec
     points = [point.force] if point is not None else []
     points += [float(np.nanmax(measured["force"]))] if measured is not None else []
     return max(1e-9, min(limit, float(pulling.max(initial=0.0))), *points)
-
-
-def _isobar_pressures(
-    characteristic: Characteristic, validity_range: ValidityRange | None, point: WorkingPoint | None
-) -> Array:
-    """Return round pressures [Pa] over the validity range.
-
-    Without one they extend to twice the pressure of the working point, or over the law's pressure range.
-    """
-    if validity_range is not None:
-        return _round_pressures(*validity_range.pressure)
-    low, high = characteristic.pressure_range
-    upper = 2.0 * point.pressure if point is not None and point.pressure > low else high
-    return _round_pressures(low, min(upper, high))
 
 
 def _round_pressures(low: float, high: float) -> Array:

@@ -50,7 +50,8 @@ class PleatedTube(FibreTube):
 
         Above `free_contraction` the tension is negative.
         """
-        return (0.0, _max_contraction(self._slenderness))
+        at_bracket_end = _contraction_of_tube(_ROOT_MU_BRACKET[1] ** 2, self._slenderness)
+        return (0.0, max(self.free_contraction, min(0.5, at_bracket_end)))
 
     @property
     def free_contraction(self) -> float:
@@ -114,15 +115,10 @@ class PleatedTube(FibreTube):
             squares - 2 * self.end_radius * arc_moment + self.end_radius**2 * self.fibre_length,
             np.pi * radius**3 / (3 * mu**1.5) * bracket,
         )
-        return Segment(
-            self.end_radius, *(unwrap_scalar(self._cylinder_at_zero(v, contraction, i)) for i, v in enumerate(values))
-        )
-
-    def _cylinder_at_zero(self, value: Any, contraction: Value, index: int) -> Any:
-        """Return the value, or that of the cylinder at zero contraction, where mu = 0."""
-        radius, length = self.end_radius, self.fibre_length
-        cylinder = (length, length, radius, 0.0, 1.0, 0.0, 0.0, 0.0, np.pi * radius**2 * length)
-        return np.where(np.asarray(contraction) > 0, value, cylinder[index])
+        rest, r0 = self.fibre_length, self.end_radius
+        cylinder = (rest, rest, r0, 0.0, 1.0, 0.0, 0.0, 0.0, np.pi * r0**2 * rest)  # at zero contraction, where mu = 0
+        pairs = zip(values, cylinder, strict=True)
+        return Segment(r0, *(unwrap_scalar(np.where(np.asarray(contraction) > 0, v, at_rest)) for v, at_rest in pairs))
 
     def profile(self, contraction: float, position: Array) -> Profile:
         from scipy.special import ellipeinc, ellipkinc
@@ -170,12 +166,6 @@ def _contraction(mu: Any, slenderness: float) -> Any:
 def _contraction_of_tube(mu: float, slenderness: float) -> float:
     """Return the contraction [1] of a parameter mu, which laws ask for at every point of a tube."""
     return float(_contraction(np.asarray(mu), slenderness))
-
-
-def _max_contraction(slenderness: float) -> float:
-    """Return the maximum contraction [1] of a tube of this slenderness."""
-    at_maximum_volume, at_end = (_contraction_of_tube(mu, slenderness) for mu in (0.5, _ROOT_MU_BRACKET[1] ** 2))
-    return max(at_maximum_volume, min(0.5, at_end))
 
 
 def unwrap_scalar(value: Any) -> Any:
