@@ -329,7 +329,7 @@ def test_a_manifold_books_what_its_branches_draw():
         (lambda: Manifold(Supply(6e5), (ClosedChamber(SharedSupply()),), ("a", "b")), "give a distinct name for each of the 1 branches"),
         (lambda: Manifold(Supply(6e5), (ClosedChamber(SharedSupply()),), ("supply",)), "cannot be named 'supply'"),
         (lambda: Manifold(Supply(6e5), (ClosedChamber(SharedSupply()),), ("a.b",)), "give a name without a dot"),
-        (lambda: ProportionalValve(Supply(6e5), VALVE, VALVE, SPOOL, 0.0, 3), "muscle_count is 3; it must be 1 or 2"),
+        (lambda: ProportionalValve(Supply(6e5), VALVE, VALVE, SPOOL, 0.0, 3), "muscle_count is 3; allowed range: 1 to 2"),
         (lambda: ProportionalValve(Supply(6e5), VALVE, VALVE, SPOOL, 0.0, True), "muscle_count must be an integer; it is True"),
         (lambda: ProportionalValve(Supply(6e5), VALVE, VALVE, SPOOL, 1.0), r"overlap .* allowed range: -0.5 to 0.9"),
         (lambda: Tube(VALVE, 1e-5, 0), "Tube: segment_count is 0; allowed range: 1 to 200"),

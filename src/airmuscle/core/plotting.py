@@ -133,8 +133,9 @@ def given_axes(ax: Any, count: int, what: str) -> list[Any]:
 
     `what` is named in messages. Raises ParameterError for anything else.
     """
-    axes = [ax] if hasattr(ax, "plot") and hasattr(ax, "set_xlabel") else _flat(ax)
-    if axes is None or not all(hasattr(item, "plot") and hasattr(item, "set_xlabel") for item in axes):
+    given = ax.ravel() if isinstance(ax, np.ndarray) else ax
+    axes = list(given) if isinstance(given, np.ndarray | Sequence) and not isinstance(given, str | bytes) else [given]
+    if not all(hasattr(item, "plot") and hasattr(item, "set_xlabel") for item in axes):
         raise ParameterError(f"{what}: ax is {abridged(ax)}; it must be a Matplotlib Axes or a sequence of Axes.")
     if len(axes) < count:
         raise ParameterError(
@@ -142,13 +143,6 @@ def given_axes(ax: Any, count: int, what: str) -> list[Any]:
             f"allowed range: at least {count}. Name fewer columns, or make them with plt.subplots({count}, 1)."
         )
     return axes
-
-
-def _flat(ax: Any) -> list[Any] | None:
-    """The items of a sequence or an array of any shape; None for anything else."""
-    if isinstance(ax, np.ndarray):
-        return list(ax.ravel())
-    return list(ax) if isinstance(ax, Sequence) and not isinstance(ax, str | bytes) else None
 
 
 def relabel_in_display_units(many: Iterable[Any]) -> None:

@@ -3,7 +3,7 @@
 import dataclasses
 from typing import ClassVar
 
-from ...core import Input, ParameterError, Reference, StateVariable, Value, Values, model, ops, parameter, published
+from ...core import Input, Reference, StateVariable, Value, Values, model, ops, parameter, published, within
 from .circuit import CircuitFlows, ValvePair
 from .gas import Air, Airs, Ambient, absolute_pressure, gauge_pressure
 from .valve import ISO6358, proportional_opening
@@ -34,12 +34,7 @@ class ProportionalValve(ValvePair):
 
     spool: SecondOrderLag
     overlap: float = parameter("1", "o", "overlap as a fraction of the stroke", bounds=(-0.5, 0.9), default=0.0)
-    muscle_count: int = 1
-    """Number of muscles, 1 or 2."""
-
-    def check(self) -> None:
-        if isinstance(self.muscle_count, bool) or self.muscle_count not in (1, 2):
-            raise ParameterError(f"ProportionalValve: muscle_count is {self.muscle_count!r}; it must be 1 or 2.")
+    muscle_count: int = within(1, 2, default=1)
 
     @property
     def port_count(self) -> int:

@@ -147,21 +147,17 @@ class _PolynomialSurface(ContractionLaw):
         """Sum_ij a_ij p^i F^j at gauge pressure [Pa] and force [N]; linear extrapolation outside the validity range."""
         inner_p = ops.clip(pressure, self.min_pressure, self.max_pressure)
         inner_f = ops.clip(force, self.min_force, self.max_force)
-        value, by_p, by_f = self._value_and_derivatives(inner_p / bar, inner_f)
-        return value + by_p * (pressure - inner_p) / bar + by_f * (force - inner_f)
-
-    def _value_and_derivatives(self, p: Value, f: Value) -> tuple[Value, Value, Value]:
-        """Polynomial and its derivatives with respect to p [bar] and F [N], by Horner's method in both variables."""
-        width = self.force_degree + 1
+        # the polynomial and its derivatives by p [bar] and F [N], by Horner's method in both variables
+        p, width = inner_p / bar, self.force_degree + 1
         value: Value = 0.0
         by_p: Value = 0.0
         by_f: Value = 0.0
         for start in range(len(self.coefficients) - width, -1, -width):
             row = self.coefficients[start : start + width]
             by_p = by_p * p + value
-            value = value * p + ops.polynomial(row, f)
-            by_f = by_f * p + ops.polynomial(tuple(j * a for j, a in enumerate(row))[1:], f)
-        return value, by_p, by_f
+            value = value * p + ops.polynomial(row, inner_f)
+            by_f = by_f * p + ops.polynomial(tuple(j * a for j, a in enumerate(row))[1:], inner_f)
+        return value + by_p * (pressure - inner_p) / bar + by_f * (force - inner_f)
 
 
 @model

@@ -115,7 +115,12 @@ def find_first_root(
     roots = np.where(unsolved, np.nan, bounds[0])
     index = rises.argmax(axis=0)
     plateau = np.take_along_axis(values, index[None, :] + 1, axis=0)[0] == 0
-    for subset, target in ((~plateau, function), (plateau, _sign_function(function))):
+
+    def sign(x: Any, *others: Any) -> Any:
+        """The sign of the function, so that the search finds the edge of a plateau at zero (a clamped force)."""
+        return np.where(np.asarray(function(x, *others)) >= 0, 1.0, -1.0)
+
+    for subset, target in ((~plateau, function), (plateau, sign)):
         selected = subset & ~at_start & ~unsolved
         if selected.any():
             bracket = (grid[index[selected]], grid[index[selected] + 1])
@@ -151,11 +156,6 @@ def solve_direction(
         return f"{message(a, b)}{available}: {describe_range(scale * ends[0], scale * ends[1], unit)}."
 
     return find_first_root(residual, bounds, given, text)
-
-
-def _sign_function(function: Callable[[Any, Any, Any], Any]) -> Callable[[Any, Any, Any], Any]:
-    """Return the sign of a function, so that the search finds the edge of a plateau at zero (a clamped force)."""
-    return lambda x, a, b: np.where(np.asarray(function(x, a, b)) >= 0, 1.0, -1.0)
 
 
 def check_solution(

@@ -114,19 +114,16 @@ class ChebyshevGeometry(Geometry):
         half = (self.max_contraction - self.min_contraction) / 2
         x = (contraction - self.min_contraction) / half - 1.0
         inner = ops.clip(x, -1.0, 1.0)
-        value, slope = self._clenshaw(inner)
-        return value + slope * (x - inner)
-
-    def _clenshaw(self, x: Value) -> tuple[Value, Value]:
-        """Polynomial and derivative with respect to x, from b_k = a_k + 2 x b_(k+1) - b_(k+2) and its derivative."""
+        # polynomial and derivative by x, from b_k = a_k + 2 x b_(k+1) - b_(k+2) and its derivative
         b: Value = 0.0
         b_next: Value = 0.0
         d: Value = 0.0
         d_next: Value = 0.0
         for a in reversed(self.coefficients[1:]):
-            d, d_next = 2 * b + 2 * x * d - d_next, d
-            b, b_next = a + 2 * x * b - b_next, b
-        return self.coefficients[0] + x * b - b_next, b + x * d - d_next
+            d, d_next = 2 * b + 2 * inner * d - d_next, d
+            b, b_next = a + 2 * inner * b - b_next, b
+        value, slope = self.coefficients[0] + inner * b - b_next, b + inner * d - d_next
+        return value + slope * (x - inner)
 
 
 def as_polynomial(
