@@ -95,10 +95,15 @@ def bootstrap(
     group, count = _assign_groups(fit, runs, by or default_split(runs, MIN_GROUPS))
     draws = np.random.default_rng(seed).multinomial(count, np.full(count, 1.0 / count), size=refits).astype(float)
     if is_linear(fit.problem) and isinstance(fit.loss, LeastSquares):
-        values = _refit_linear(fit.problem, fit.values, group, draws)
-    else:
-        values = _refit_in_blocks(fit, group, draws, progress or (lambda fraction: None), workers)
-    return Bootstrap(fit, values, count, seed)
+        return Bootstrap(fit, _refit_linear(fit.problem, fit.values, group, draws), count, seed)
+    report = progress or (lambda fraction: None)
+    blocks = [draws[i : i + REFITS_OF_A_TASK] for i in range(0, refits, REFITS_OF_A_TASK)]
+    first = _refit_iteratively((fit, group, np.empty((0, len(fit.estimates))), report), blocks[0])
+    # The other blocks, at once, start at the parameters found in the first.
+    with process_pool(workers if len(blocks) > 2 else 1, one_thread_each=True, terminate=True) as executor:
+        distribution = DistributedCalls(executor, _refit_iteratively, (fit, group, first, None))
+        others = distribution.results(blocks[1:], lambda number: report((1 + number) / len(blocks)))
+    return Bootstrap(fit, np.concatenate([first, *others]), count, seed)
 
 
 def _assign_groups(fit: Fit, runs: Sequence[Recording], by: GroupSplit) -> tuple[RowIndices, int]:
@@ -151,18 +156,6 @@ def _has_full_rank(normal: Array) -> npt.NDArray[np.bool_]:
         if (pivots**2 > _MIN_EIGENVALUE).all():
             return np.ones(len(normal), dtype=bool)
     return np.asarray(np.linalg.eigvalsh(normal)[:, 0] > _MIN_EIGENVALUE)
-
-
-def _refit_in_blocks(
-    fit: Fit, group: RowIndices, draws: Array, progress: Callable[[float], None], workers: Workers
-) -> Array:
-    """The refits (R, P): a first block, then the others at once, which start at the parameters found in the first."""
-    blocks = [draws[i : i + REFITS_OF_A_TASK] for i in range(0, len(draws), REFITS_OF_A_TASK)]
-    first = _refit_iteratively((fit, group, np.empty((0, len(fit.estimates))), progress), blocks[0])
-    with process_pool(workers if len(blocks) > 2 else 1, one_thread_each=True, terminate=True) as executor:
-        distribution = DistributedCalls(executor, _refit_iteratively, (fit, group, first, None))
-        others = distribution.results(blocks[1:], lambda count: progress((1 + count) / len(blocks)))
-    return np.concatenate([first, *others])
 
 
 def _refit_iteratively(common: tuple[Fit, RowIndices, Array, Callable[[float], None] | None], draws: Array) -> Array:

@@ -233,7 +233,7 @@ class _FoldRefits:
         law: Any = tree.with_parameters(problem.law, problem.leaf_values(values))
         if hasattr(law, "rescaled"):
             law = law.rescaled(*((float(x[rows].min()), float(x[rows].max())) for x in problem.arguments))
-        model: Characteristic = law if pooling is None else pooling.law(law, values, rows)
+        model: Characteristic = law if pooling is None else pooling.law(law, pooling.predict(values, rows))
         return model
 
 

@@ -30,6 +30,10 @@ MIN_PRESSURE_SHARE = 0.02
 """Minimum pressure of a point, as a fraction of the maximum pressure of the rig (chosen)."""
 MIN_POINTS = 3
 """Minimum number of feasible points of a run; chosen."""
+ASSUMPTION = (
+    "the expected standard errors suppose independent errors of the points; errors that a run shares (zero and gain of "
+    "the sensors) are not contained, and several points of a run do not reduce them"
+)
 REGULARISATION = 1e-9
 """Relative information added in every direction, so that designs of fewer runs than parameters can be compared."""
 
@@ -96,14 +100,6 @@ class ExperimentPlan(Reported):
     """(det M / det M_0)^(1/P), M_0 the information matrix of the same number of evenly spaced runs."""
     undetermined: tuple[UndeterminedCombination, ...]
 
-    @property
-    def assumption(self) -> str:
-        """What the expected standard errors suppose, as a sentence."""
-        return (
-            "the expected standard errors suppose independent errors of the points; errors that a run shares (zero and "
-            "gain of the sensors) are not contained, and several points of a run do not reduce them"
-        )
-
     def chapter(self) -> Chapter:
         """The description of the plan: runs, expected precision, efficiency."""
         columns: dict[str, Any] = {
@@ -119,7 +115,7 @@ class ExperimentPlan(Reported):
             values=(NamedValue("relative D-efficiency", self.relative_d_efficiency, "1", digits=3, brief=False),),
             tables=(run_table(self.runs, "runs", "Runs"),
                     Table("precision", "Expected precision", columns, "SI units.", brief=len(self.names))),
-            notes=(*map(str, self.undetermined), self.assumption),
+            notes=(*map(str, self.undetermined), ASSUMPTION),
         )  # fmt: skip
 
     def recording(self) -> Recording:

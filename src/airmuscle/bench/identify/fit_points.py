@@ -50,7 +50,24 @@ class FitPoints:
         """The points of one or several recordings. Raises IdentificationError for an infinite value."""
         single = isinstance(recording, Recording)
         runs = (recording,) if isinstance(recording, Recording) else tuple(recording)
-        joined, missing = _join_recordings(runs)
+        columns = {name: np.concatenate([run[name] for run in runs]) for name in POINT_COLUMNS} if runs else {}
+        origins = list(dict.fromkeys(run.origin for run in runs))
+        few = origins if len(origins) <= 3 else [*origins[:2], f"{len(origins) - 2} more"]
+        origin = " + ".join(few) or "no recording"
+        for name, values in columns.items():
+            if np.isinf(values).any():
+                row = int(np.argmax(np.isinf(values)))
+                raise IdentificationError(
+                    f"{origin}, row {row + 1}: {name} is {values[row]}. Remove such rows, for example with "
+                    f"recording.rows(np.isfinite(recording['{name}']))."
+                )
+        missing = np.isnan(np.stack(list(columns.values()))).any(axis=0) if columns else np.zeros(0, dtype=bool)
+        lengths = {run.constants[RESTING_LENGTH] for run in runs if RESTING_LENGTH in run.constants}
+        if len(lengths) > 1 and all(RESTING_LENGTH in run.constants for run in runs):
+            by_row = [np.full(len(run), float(run.constants[RESTING_LENGTH])) for run in runs]
+            columns[RESTING_LENGTH] = np.concatenate(by_row)
+        constants = {RESTING_LENGTH: lengths.pop()} if len(lengths) == 1 else {}
+        joined = Recording(columns, origin, constants, references=tuple(cite(runs)))
         dropped, repeated = int(np.count_nonzero(missing)), find_repeated_rows(runs, POINT_COLUMNS)
         starts = np.cumsum([0, *(len(run) for run in runs)])
         for each in repeated:
@@ -121,28 +138,6 @@ class FitPoints:
             censoring = default_censoring(law)
             censoring = censoring.within(self._force_limits) if isinstance(law, ForceLaw) else censoring
         return make_problem(law, self.data, censoring, weights, fixed)
-
-
-def _join_recordings(runs: Sequence[Recording]) -> tuple[Recording, npt.NDArray[np.bool_]]:
-    """The points of one or several recordings, and the mask of the rows with a missing value."""
-    columns = {name: np.concatenate([run[name] for run in runs]) for name in POINT_COLUMNS} if runs else {}
-    origins = list(dict.fromkeys(run.origin for run in runs))
-    few = len(origins) <= 3
-    origin = " + ".join(origins if few else [*origins[:2], f"{len(origins) - 2} more"]) or "no recording"
-    for name, values in columns.items():
-        if np.isinf(values).any():
-            row = int(np.argmax(np.isinf(values)))
-            raise IdentificationError(
-                f"{origin}, row {row + 1}: {name} is {values[row]}. Remove such rows, for example with "
-                f"recording.rows(np.isfinite(recording['{name}']))."
-            )
-    missing = np.isnan(np.stack(list(columns.values()))).any(axis=0) if columns else np.zeros(0, dtype=bool)
-    lengths = {run.constants[RESTING_LENGTH] for run in runs if RESTING_LENGTH in run.constants}
-    if len(lengths) > 1 and all(RESTING_LENGTH in run.constants for run in runs):
-        by_row = [np.full(len(run), float(run.constants[RESTING_LENGTH])) for run in runs]
-        columns[RESTING_LENGTH] = np.concatenate(by_row)
-    constants = {"resting_length": lengths.pop()} if len(lengths) == 1 else {}
-    return Recording(columns, origin, constants, references=tuple(cite(runs))), missing
 
 
 def _columns_at_levels(recording: Recording) -> tuple[dict[str, Array], dict[str, npt.NDArray[np.bool_]]]:

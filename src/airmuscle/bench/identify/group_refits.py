@@ -151,7 +151,11 @@ class GroupRefits:
 
         start  of the iteration for a law that is not linear in its parameters; by default the fit to all rows
         """
-        if self._basis is None or not self._is_determined(counts):
+        if self._basis is None:
+            return None
+        # A lower bound of the scaled singular values shows whether the uncensored rows determine all parameters.
+        lowest = float(np.linalg.eigvalsh(np.tensordot(counts, self._sums.uncensored, 1))[0])
+        if not (lowest > steps.MIN_EIGENVALUE and np.sqrt(lowest) * self._smallest > _RANK_MARGIN * RANK_TOLERANCE):
             return None
         normal, gradient = (np.tensordot(counts, part, 1) for part in (self._sums.normal, self._sums.gradient))
         step = steps.normal_step(normal, gradient)
@@ -174,11 +178,6 @@ class GroupRefits:
             measured = self._rows[rows & uncensored]
             sums.uncensored[i] = measured.T @ measured
         return sums
-
-    def _is_determined(self, counts: Array) -> bool:
-        """Whether the uncensored rows determine all parameters, by a lower bound of the scaled singular values."""
-        lowest = float(np.linalg.eigvalsh(np.tensordot(counts, self._sums.uncensored, 1))[0])
-        return lowest > steps.MIN_EIGENVALUE and np.sqrt(lowest) * self._smallest > _RANK_MARGIN * RANK_TOLERANCE
 
     def _solve_linear(self, counts: Array, step: Array, normal: Array, gradient: Array) -> Array | None:
         """Newton steps of the one-sided squares: the rows whose bound is violated are those of the previous step.

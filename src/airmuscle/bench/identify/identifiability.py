@@ -141,14 +141,11 @@ def _describe_combination(vector: Array, relative_stderr: float, names: Sequence
     shares = vector / vector[np.argmax(np.abs(vector))]
     order = [int(i) for i in np.argsort(-np.abs(shares)) if abs(shares[i]) >= MIN_SHARE]
     listed = tuple((names[i], float(shares[i])) for i in order)
-    return UndeterminedCombination(listed, float(relative_stderr), _find_remedy([name for name, _ in listed]))
-
-
-def _find_remedy(names: Sequence[str]) -> str:
-    kinds = {name.partition(" of record")[0].rpartition(".")[2].partition("[")[0] for name in names}
-    for first, second, remedy in REMEDIES:
-        if len(kinds) > 1 and kinds & set(first) and kinds & set(second):
-            return remedy
-    if len(names) == 1:
-        return "fix it at a value that was measured separately, or record a quantity on which it has an effect"
-    return "measure and fix one of them, or record a further quantity on which they have different effects"
+    kinds = {name.partition(" of record")[0].rpartition(".")[2].partition("[")[0] for name, _ in listed}
+    general = "measure and fix one of them, or record a further quantity on which they have different effects"
+    if len(listed) == 1:
+        general = "fix it at a value that was measured separately, or record a quantity on which it has an effect"
+    confounded = (
+        remedy for first, second, remedy in REMEDIES if len(kinds) > 1 and kinds & set(first) and kinds & set(second)
+    )
+    return UndeterminedCombination(listed, float(relative_stderr), next(confounded, general))

@@ -144,15 +144,15 @@ def _find_limit(fit: Fit, index: int, step: float, threshold: float) -> float:
     leaf = problem.free[index]
     low, high = problem.leaves[leaf].declared.bounds
     others = tuple(i for i in problem.free if i != leaf)
-    inside, outside = estimate.value, estimate.value
+    inside, outside, unbounded = estimate.value, estimate.value, float(np.copysign(np.inf, step))
     for doubling in range(_MAX_DOUBLINGS):
         inside, outside = outside, float(np.clip(estimate.value + step * 2.0**doubling, low, high))
         if inside == outside:  # the bound is reached below the threshold
-            return -np.inf if step < 0 else np.inf
+            return unbounded
         if _constrained_sum_of_squares(problem, others, leaf, outside) > threshold:
             break
     else:
-        return -np.inf if step < 0 else np.inf
+        return unbounded
     for _ in range(_BISECTIONS):
         middle = (inside + outside) / 2
         above = _constrained_sum_of_squares(problem, others, leaf, middle) > threshold

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import Array, IdentificationError, ParameterError, ShortRepr
+from ...core import IdentificationError, ParameterError, ShortRepr
 from ...physics.muscle.characteristic.base import Characteristic
 from ...recording import Recording
 from .candidates import blank_surface
@@ -126,20 +126,18 @@ def estimate_length_error(
         raise ParameterError(f"no recording is of specimen '{specimen}'; the specimens are {known}.")
     recorded = float(recordings[members.index(True)].constants["resting_length"])
     model = population_of(law)
-    offset, first, state = 0.0, np.nan, None
-    for _ in range(_ITERATIONS):
-        state = _State.at(model, recordings, members, offset)
-        model = state.model
-        if np.isnan(first):
-            first = state.rmse
-            if state.reachable_reduction < 0.5 * min_reduction:
+    offset, before = 0.0, 0.0
+    for iteration in range(_ITERATIONS):
+        step = _newton_step(model, recordings, members, offset, prior_std)
+        model = step.model
+        if iteration == 0:
+            before = step.rmse
+            if step.reduction < 0.5 * min_reduction:
                 break
-        change = state.newton_step(offset, prior_std)
-        offset = float(np.clip(offset + change, -0.2 * recorded, 0.2 * recorded))
-        if abs(change) < 1e-3 * state.standard_error(prior_std):
+        offset = float(np.clip(offset + step.change, -0.2 * recorded, 0.2 * recorded))
+        if abs(step.change) < 1e-3 * step.standard_error:
             break
-    assert state is not None
-    return LengthError(specimen, recorded, offset, state.standard_error(prior_std), first, state.rmse, model)
+    return LengthError(specimen, recorded, offset, step.standard_error, before, step.rmse, model)
 
 
 def find_length_errors(law: Characteristic, recordings: Sequence[Recording]) -> tuple[LengthError, ...]:
@@ -176,50 +174,45 @@ def _separate_rmse(recordings: Sequence[Recording], names: Sequence[str]) -> flo
     return float(np.sqrt(np.mean(np.concatenate(residuals) ** 2)))
 
 
-class _State(NamedTuple):
-    """The fit with one correction: the law, its weighted residuals and Jacobian, and the derivative by the length."""
+class _Step(NamedTuple):
+    """The fit with one correction, and the Newton step from it."""
 
     model: Characteristic
-    residuals: Array
-    derivative: Array
-    variance: float
     rmse: float
+    reduction: float
+    """Reduction of the mean square residual by the best correction, if the law is linear in it."""
+    change: float
+    """Change of the correction [m] that minimises the squares and the prior."""
+    standard_error: float
+    """That of the correction [m]."""
 
-    @classmethod
-    def at(cls, start: Characteristic, runs: Sequence[Recording], members: Sequence[bool], offset: float) -> "_State":
-        low, here, high = (
-            FitPoints.from_recordings([corrected_length(r, d) if m else r for r, m in zip(runs, members, strict=True)])
-            for d in (offset - _STEP, offset, offset + _STEP)
-        )
-        model = refit(start, here)
-        problem = here.problem(model)
-        quantity = problem.fitted_quantity
-        below, above = (evaluate(model, quantity.method, quantity.arguments, points.data) for points in (low, high))
-        modelled = problem.predict(problem.initial_values)
-        weights = problem.weights * problem.active_rows(modelled)
-        matrix = weights[:, None] * problem.jacobian(problem.initial_values)
-        basis = np.linalg.qr(matrix / np.maximum(np.linalg.norm(matrix, axis=0), 1e-300))[0]
-        derivative = weights * (above - below) / (2 * _STEP)
-        residuals = problem.residuals(modelled)
-        share = effective_sample_size(residuals) / residuals.size
-        variance = float(residuals @ residuals) / max(residuals.size - matrix.shape[1], 1) / share
-        rmse = float(np.sqrt(np.mean(residuals**2)))
-        return cls(model, residuals, derivative - basis @ (basis.T @ derivative), variance, rmse)
 
-    @property
-    def reachable_reduction(self) -> float:
-        """The reduction of the mean square residual by the best correction, if the law is linear in it."""
-        curvature = max(float(self.derivative @ self.derivative), 1e-300)
-        return float(self.derivative @ self.residuals) ** 2 / curvature / self.residuals.size
-
-    def newton_step(self, offset: float, prior_std: float) -> float:
-        """The change of the offset [m] that minimises the squares and the prior."""
-        gradient = float(self.derivative @ self.residuals) + self.variance * offset / prior_std**2
-        return -gradient / self._curvature(prior_std)
-
-    def standard_error(self, prior_std: float) -> float:
-        """The standard error of the offset [m]."""
-        return float(np.sqrt(self.variance / self._curvature(prior_std)))
-
-    def _curvature(self, prior_std: float) -> float:
-        return float(self.derivative @ self.derivative) + self.variance / prior_std**2
+def _newton_step(
+    start: Characteristic, runs: Sequence[Recording], members: Sequence[bool], offset: float, prior_std: float
+) -> _Step:
+    low, here, high = (
+        FitPoints.from_recordings([corrected_length(r, d) if m else r for r, m in zip(runs, members, strict=True)])
+        for d in (offset - _STEP, offset, offset + _STEP)
+    )
+    model = refit(start, here)
+    problem = here.problem(model)
+    quantity = problem.fitted_quantity
+    below, above = (evaluate(model, quantity.method, quantity.arguments, points.data) for points in (low, high))
+    modelled = problem.predict(problem.initial_values)
+    weights = problem.weights * problem.active_rows(modelled)
+    matrix = weights[:, None] * problem.jacobian(problem.initial_values)
+    basis = np.linalg.qr(matrix / np.maximum(np.linalg.norm(matrix, axis=0), 1e-300))[0]
+    slopes = weights * (above - below) / (2 * _STEP)
+    slopes = slopes - basis @ (basis.T @ slopes)
+    residuals = problem.residuals(modelled)
+    share = effective_sample_size(residuals) / residuals.size
+    variance = float(residuals @ residuals) / max(residuals.size - matrix.shape[1], 1) / share
+    gradient, square = float(slopes @ residuals), float(slopes @ slopes)
+    curvature = square + variance / prior_std**2
+    return _Step(
+        model,
+        rmse=float(np.sqrt(np.mean(residuals**2))),
+        reduction=gradient**2 / max(square, 1e-300) / residuals.size,
+        change=-(gradient + variance * offset / prior_std**2) / curvature,
+        standard_error=float(np.sqrt(variance / curvature)),
+    )

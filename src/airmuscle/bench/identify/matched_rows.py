@@ -6,6 +6,7 @@ their difference is hysteresis.
 """
 
 import dataclasses
+import functools
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
 
@@ -54,19 +55,28 @@ class Block:
     slopes: Array
     """Derivative of the polynomial by the pressure [N/Pa]."""
 
+    @property
+    def points(self) -> Array:
+        """Pressure [Pa] and contraction of the rows, shape (N, 2)."""
+        return np.column_stack([self.recording[name][self.rows] for name in ("pressure", "contraction")])
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class MatchedRuns:
-    """Two blocks with the indices of matched rows, and the force of the first minus that of the second [N]."""
+    """Two blocks with the indices of matched rows."""
 
     first: Block
     second: Block
     pairs: npt.NDArray[np.intp]
     """Indices of the matched rows in both blocks, shape (M, 2)."""
-    differences: Array
     are_near: bool = True
     """Whether the matched rows are at equal pressure and contraction; otherwise they are neighbouring static points,
     and the polynomial accounts for their distance."""
+
+    @functools.cached_property
+    def differences(self) -> Array:
+        """The force of the first block minus that of the second at the matched rows [N], shape (M,)."""
+        return self.first.residuals[self.pairs[:, 0]] - self.second.residuals[self.pairs[:, 1]]
 
     @property
     def forces(self) -> tuple[Array, Array]:
@@ -168,25 +178,18 @@ def _matched_runs(blocks: Sequence[Block], recordings: Sequence[Recording]) -> l
     """Every pair of blocks of one direction with enough matched rows."""
     highest = max(float(np.max(np.abs(run["pressure"]))) for run in recordings)
     reach = np.array([PRESSURE_REACH * max(highest, 1.0), CONTRACTION_REACH])
-    points = [np.column_stack([b.recording[n][b.rows] for n in ("pressure", "contraction")]) / reach for b in blocks]
+    points = [block.points / reach for block in blocks]
     limits = [(x.min(axis=0) - 1.0, x.max(axis=0) + 1.0) for x in points]
-    matched = [each for block, own in zip(blocks, points, strict=True) for each in _unordered(block, own)]
+    without_time = [pair for pair in zip(blocks, points, strict=True) if "time" not in pair[0].recording]
+    within = [_within(block, own, NEIGHBOURS, 1.0) for block, own in without_time if len(own) >= NEIGHBOURS]
+    matched = [each for each in within if len(each.pairs) >= MIN_MATCHES]
     for i, j in itertools.combinations(range(len(blocks)), 2):
         apart = (limits[i][0] > limits[j][1]).any() or (limits[j][0] > limits[i][1]).any()
         if not apart and blocks[i].direction == blocks[j].direction:
-            pairs = _nearest(points[i], points[j])
+            pairs = _nearest(points[i], points[j], 1, 1.0)
             if len(pairs) >= MIN_MATCHES:
-                both = blocks[i].residuals[pairs[:, 0]] - blocks[j].residuals[pairs[:, 1]]
-                matched.append(MatchedRuns(blocks[i], blocks[j], pairs, both))
+                matched.append(MatchedRuns(blocks[i], blocks[j], pairs))
     return [*matched, *_spread(blocks)]
-
-
-def _unordered(block: Block, points: Array) -> Iterator[MatchedRuns]:
-    """The pairs of neighbouring rows of a block without time."""
-    if "time" not in block.recording and len(points) >= NEIGHBOURS:
-        pairs = _neighbours(points, NEIGHBOURS, 1.0)
-        if len(pairs) >= MIN_MATCHES:
-            yield _paired(block, pairs, are_near=True)
 
 
 def _spread(blocks: Sequence[Block]) -> Iterator[MatchedRuns]:
@@ -199,29 +202,20 @@ def _spread(blocks: Sequence[Block]) -> Iterator[MatchedRuns]:
         joined = [np.concatenate([getattr(block, n) for block in own]) for n in ("rows", "residuals", "slopes")]
         if len(joined[0]) >= MIN_SPREAD_ROWS:
             block = Block(own[0].recording, joined[0], 0, {}, *joined[1:])
-            points = np.column_stack([block.recording[n][block.rows] for n in ("pressure", "contraction")])
-            spread = points / np.maximum(np.ptp(points, axis=0), 1e-9)
-            yield _paired(block, _neighbours(spread, SPREAD_NEIGHBOURS, np.inf), are_near=False)
+            spread = block.points / np.maximum(np.ptp(block.points, axis=0), 1e-9)
+            yield _within(block, spread, SPREAD_NEIGHBOURS, np.inf)
 
 
-def _paired(block: Block, pairs: npt.NDArray[np.intp], are_near: bool) -> MatchedRuns:
-    return MatchedRuns(block, block, pairs, block.residuals[pairs[:, 0]] - block.residuals[pairs[:, 1]], are_near)
+def _within(block: Block, points: Array, count: int, reach: float) -> MatchedRuns:
+    """The rows of a block, at these scaled points (N, 2), with their nearest ones; near with a finite reach."""
+    pairs = _nearest(points, points, count, reach)
+    return MatchedRuns(block, block, pairs[pairs[:, 0] != pairs[:, 1]], bool(np.isfinite(reach)))
 
 
-def _neighbours(points: Array, count: int, reach: float) -> npt.NDArray[np.intp]:
-    """Each point (N, 2) with its nearest ones within the reach, without itself; shape (M, 2)."""
+def _nearest(points: Array, others: Array, count: int, reach: float) -> npt.NDArray[np.intp]:
+    """Each point (N, 2) with the nearest ones of others within the reach; indices of shape (M, 2)."""
     from scipy.spatial import cKDTree
 
-    distance, index = cKDTree(points).query(points, count, distance_upper_bound=reach)
+    distance, index = cKDTree(others).query(points, range(1, count + 1), distance_upper_bound=reach)
     first, place = np.nonzero(np.isfinite(distance))
-    pairs: npt.NDArray[np.intp] = np.column_stack([first, index[first, place]])
-    return np.asarray(pairs[pairs[:, 0] != pairs[:, 1]])
-
-
-def _nearest(first: Array, second: Array) -> npt.NDArray[np.intp]:
-    """Each point of the first set (N, 2) with the nearest of the second at a distance of 1 at most; shape (M, 2)."""
-    from scipy.spatial import cKDTree
-
-    distance, index = cKDTree(second).query(first, distance_upper_bound=1.0)
-    near = np.flatnonzero(np.isfinite(distance))
-    return np.column_stack([near, index[near]])
+    return np.column_stack([first, index[first, place]])

@@ -13,6 +13,7 @@ inference", Journal of Human Resources 50(2), 317-372.
 
 import dataclasses
 import functools
+import itertools
 from typing import NamedTuple
 
 import numpy as np
@@ -114,14 +115,16 @@ class ParameterCovariance:
         errors, correlations = np.full(count, np.nan), np.full((count, count), np.nan)
         factor = 1.0 if self.groups is None else float(self._quantile(self.degrees_of_freedom, 0.95)) / NORMAL_QUANTILE
         errors[self.parameters] = factor * np.sqrt(np.diag(self._scatter))
-        correlations[square] = self._design_correlations if self.groups is None else _normalised(self._scatter)
+        correlations[square] = (
+            normalised(self.basis @ self.basis.T) if self.groups is None else normalised(self._scatter)
+        )
         return errors, correlations
 
     def greatest_correlations(self) -> Array:
         """The greatest magnitude of the correlations of each fitted parameter (Q,) with another for independent rows,
         which depends only on the points; 0 for those that are not contained."""
         greatest = np.zeros(self.parameters.size)
-        between = np.abs(self._design_correlations - np.eye(len(self.basis)))
+        between = np.abs(normalised(self.basis @ self.basis.T) - np.eye(len(self.basis)))
         greatest[self.parameters] = between.max(axis=1, initial=0.0)
         return greatest
 
@@ -139,10 +142,6 @@ class ParameterCovariance:
     def _quantile(self, freedoms: npt.ArrayLike, level: float) -> Array:
         least = 0.0 if self.groups is None else LEAST_DEGREES_OF_FREEDOM
         return student_quantile(np.maximum(freedoms, least), level)
-
-    @property
-    def _design_correlations(self) -> Array:
-        return _normalised(self.basis @ self.basis.T)
 
     def within_bounds(self, low: Mask, high: Mask, descent: Array) -> "ParameterCovariance":
         """The covariance where some of the parameters, masks (P,), are on their lower and upper bounds.
@@ -208,21 +207,19 @@ def estimate_covariance(
     if not in_parts and count < MIN_GROUPS:
         return independent
     rows = weighted @ basis
-    for unit, group, number in ((SPECIMENS, runs.specimen, specimens), (RUNS, runs.run, count)):
-        if number >= MIN_GROUPS and (unit == RUNS or specimens < count):
-            found = _group(independent, rows, residuals, group, unit)
-            if found.degrees_of_freedom >= MIN_DEGREES_OF_FREEDOM:
-                return found
-    parts = max(-(-(parameters + SPARE_GROUPS) // count), 2)
-    while in_parts and count * parts * MIN_GROUP_ROWS <= len(residuals):
-        found = _group(independent, rows, residuals, successive_parts(runs.run, parts), PARTS)
+    units = ((SPECIMENS, runs.specimen, specimens if specimens < count else 0), (RUNS, runs.run, count))
+    whole = ((unit, group) for unit, group, number in units if number >= MIN_GROUPS)
+    fewest, most = max(-(-(parameters + SPARE_GROUPS) // count), 2), len(residuals) // (count * MIN_GROUP_ROWS)
+    divided = ((PARTS, successive_parts(runs.run, parts)) for parts in range(fewest, most + 1) if in_parts)
+    for unit, group in itertools.chain(whole, divided):
+        found = _group(independent, rows, residuals, group, unit)
         if found.degrees_of_freedom >= MIN_DEGREES_OF_FREEDOM:
             return found
-        parts += 1
     return independent
 
 
-def _normalised(matrix: Array) -> Array:
+def normalised(matrix: Array) -> Array:
+    """The correlations of a covariance matrix."""
     deviations = np.sqrt(np.diag(matrix))
     return np.asarray(matrix / np.outer(deviations, deviations))
 

@@ -1,7 +1,7 @@
 """Partial pooling: fits of a PooledLengthLaw, from the fit of its population law to all specimens."""
 
 import dataclasses
-from collections.abc import Sequence
+import functools
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -39,9 +39,20 @@ class Specimens:
 
     @classmethod
     def of(cls, points: FitPoints) -> "Specimens":
-        """The specimens of the complete rows. Raises IdentificationError for fewer than two, or without a length."""
-        names = [specimen_name(run) for run in points.recordings]
-        lengths = _lengths(points.recordings, names)
+        """The specimens of the complete rows.
+
+        Raises IdentificationError for fewer than two, or a resting length that is missing or has two values.
+        """
+        names, lengths = [specimen_name(run) for run in points.recordings], dict[str, float]()
+        for run, name in zip(points.recordings, names, strict=True):
+            stated = run.constants.get(RESTING_LENGTH)
+            if stated is None or abs(lengths.setdefault(name, float(stated)) - float(stated)) > 1e-6:
+                what = f"two resting lengths, {lengths[name]:g} and {stated:g} m" if stated else "no resting length"
+                raise IdentificationError(
+                    f"{run.origin}: specimen {name} has {what}. State one resting length for each specimen, or "
+                    "different names of specimens.",
+                    cause=f"specimen {name} has {what}",
+                )
         if len(lengths) < 2:
             raise IdentificationError(
                 f"{points.joined.origin}: partial pooling needs two specimens or more, but there is one, "
@@ -51,21 +62,6 @@ class Specimens:
         order = list(lengths)
         member = np.repeat([order.index(name) for name in names], [len(run) for run in points.recordings])
         return cls(tuple(order), tuple(lengths.values()), member[~points.missing])
-
-
-def _lengths(recordings: Sequence[Recording], names: Sequence[str]) -> dict[str, float]:
-    """The resting length [m] of each specimen. Raises IdentificationError where it is missing or has two values."""
-    lengths: dict[str, float] = {}
-    for run, name in zip(recordings, names, strict=True):
-        stated = run.constants.get("resting_length")
-        if stated is None or abs(lengths.setdefault(name, float(stated)) - float(stated)) > 1e-6:
-            what = "no resting length" if stated is None else f"two resting lengths, {lengths[name]:g} and {stated:g} m"
-            raise IdentificationError(
-                f"{run.origin}: specimen {name} has {what}. State one resting length for each specimen, or different "
-                "names of specimens.",
-                cause=f"specimen {name} has {what}",
-            )
-    return lengths
 
 
 class PredictedEffects(NamedTuple):
@@ -127,7 +123,7 @@ class Pooling:
         ]
         regions = [self._slack_region(i, predicted, values, kept) for i in range(members[1])]
         limited = [
-            bounded_coefficients(own.joined(region), ratio, start)
+            bounded_coefficients(BoundedRows(*map(np.concatenate, zip(own, region, strict=True))), ratio, start)
             for own, region, start in zip(measured, regions, effects.coefficients, strict=True)
         ]
         effects = dataclasses.replace(effects, coefficients=np.array(limited))
@@ -161,24 +157,17 @@ class Pooling:
         scatter = effects.deviation, effects.degrees_of_freedom
         return estimate_pooled_covariance(rows, runs.rows(used), predicted.ratio, *scatter)
 
-    @property
+    @functools.cached_property
     def _design(self) -> tuple[Array, Array]:
-        stored: tuple[Array, Array] | None = self.__dict__.get("_stored_design")
-        if stored is None:
-            stored = self.__dict__["_stored_design"] = design_matrix(self.problem)
-        return stored
+        return design_matrix(self.problem)
 
-    def law(self, population: Any, values: Array, rows: Rows | None = None) -> PooledLengthLaw:
-        """The pooled law of a population law with these parameters."""
-        return _pooled(population, self.specimens, self.predict(values, rows))
-
-
-def _pooled(population: Any, specimens: Specimens, predicted: PredictedEffects) -> PooledLengthLaw:
-    limits: dict[str, Any] = {"min_force": -UNREACHED_FORCE, "max_force": UNREACHED_FORCE}
-    rows, surface = predicted.effects.coefficients.tolist(), predicted.surface
-    effects = tuple(dataclasses.replace(surface, coefficients=tuple(row), **limits) for row in rows)
-    names, lengths = specimens.names, specimens.lengths
-    return PooledLengthLaw(population, effects, names, lengths, effect_decay=predicted.decay)
+    def law(self, population: Any, predicted: PredictedEffects) -> PooledLengthLaw:
+        """The pooled law of a population law and the effects of the specimens."""
+        limits: dict[str, Any] = {"min_force": -UNREACHED_FORCE, "max_force": UNREACHED_FORCE}
+        rows, surface = predicted.effects.coefficients.tolist(), predicted.surface
+        effects = tuple(dataclasses.replace(surface, coefficients=tuple(row), **limits) for row in rows)
+        names, lengths = self.specimens.names, self.specimens.lengths
+        return PooledLengthLaw(population, effects, names, lengths, effect_decay=predicted.decay)
 
 
 def check_poolable(law: PooledLengthLaw, points: FitPoints) -> Specimens:
@@ -207,7 +196,7 @@ def pool(law: PooledLengthLaw, population: Fit, points: FitPoints) -> Fit:
     predicted = pooling.predict(population.values)
     covariance = pooling.covariance(population.values, predicted, points.runs)
     effects = dataclasses.replace(predicted.effects, covariance=covariance)
-    model = _pooled(population.model, pooling.specimens, predicted)
+    model = pooling.law(population.model, predicted)
     data = population.recording.with_columns(**{SPECIMEN: pooling.specimens.member.astype(float)})
     modelled = evaluate(model, "force", population.fitted_quantity.arguments, data)
     estimates = zip(population.estimates, effects.population_errors.tolist(), strict=True)
@@ -257,4 +246,5 @@ def population_of(law: Any) -> Any:
 def refit_pooled(law: PooledLengthLaw, population: Characteristic, points: FitPoints) -> PooledLengthLaw:
     """The pooled law of a population law that was refitted to these points."""
     problem = points.problem(population)
-    return make_pooling(law, points, problem).law(population, problem.initial_values)
+    pooling = make_pooling(law, points, problem)
+    return pooling.law(population, pooling.predict(problem.initial_values))

@@ -63,19 +63,17 @@ def of_length(law: Any, length: float | None) -> Any:
 
 
 def evaluate(law: Any, method: str, arguments: tuple[str, str], data: Recording) -> Array:
-    """The values of `law.method(*arguments)` at every row, with the law of the row's resting length; shape (N,)."""
-    values = np.zeros(len(data))
-    for single, rows in _laws_by_rows(law, data):
-        values[rows] = getattr(single, method)(*(data[name][rows] for name in arguments))
-    return values
-
-
-def _laws_by_rows(law: Any, data: Recording) -> list[tuple[Any, slice | npt.NDArray[np.intp]]]:
-    """The law of each specimen, or of each resting length, with the indices of its rows."""
+    """The values of `law.method(*arguments)` at every row, with the law of its specimen or resting length; (N,)."""
+    laws: list[tuple[Any, slice | npt.NDArray[np.intp]]]
     if isinstance(law, PooledLengthLaw) and SPECIMEN in data.columns:
         member = data[SPECIMEN].astype(int)
-        return [(law.for_specimen(law.specimens[i]), np.flatnonzero(member == i)) for i in np.unique(member).tolist()]
-    return [(of_length(law, length), as_slice(rows)) for length, rows in rows_by_length(law, data)]
+        laws = [(law.for_specimen(law.specimens[i]), np.flatnonzero(member == i)) for i in np.unique(member).tolist()]
+    else:
+        laws = [(of_length(law, length), as_slice(rows)) for length, rows in rows_by_length(law, data)]
+    values = np.zeros(len(data))
+    for single, rows in laws:
+        values[rows] = getattr(single, method)(*(data[name][rows] for name in arguments))
+    return values
 
 
 def fitted_quantity_of(law: Characteristic) -> FittedQuantity:
@@ -208,15 +206,12 @@ class FitProblem:
         """The solution with these free parameters (P,)."""
         return LeastSquaresSolution(values, self.predict(values), self.jacobian(values))
 
-    def jacobian(self, values: Array) -> Array:
-        """Derivatives of `predict` with respect to the free parameters, shape (N, P).
+    def jacobian(self, values: Array, which: Sequence[int] | None = None) -> Array:
+        """Derivatives of `predict` with respect to the free parameters, or to these ones, shape (N, P).
 
         Exact if the law is traceable, otherwise by central differences.
         """
-        return self.partial_jacobian(values, range(len(self.free)))
-
-    def partial_jacobian(self, values: Array, which: Sequence[int]) -> Array:
-        """The columns of `jacobian` of these free parameters, shape (N, len(which))."""
+        which = range(len(self.free)) if which is None else which
         if all(autodiff.is_traceable(type(part)) for _, part in parts_of(self.law)):
             leaves, method = [self.free[i] for i in which], self.fitted_quantity.method
             return self._join([autodiff.parameter_derivatives(law, method, x, leaves) for law, x in self._laws(values)])

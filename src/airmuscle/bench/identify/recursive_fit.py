@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...core import Array, IdentificationError, ParameterError, ShortRepr, abridged, check_field_types, within
-from ...physics.muscle.characteristic import ContractileSurface, exponents
+from ...physics.muscle.characteristic import ContractileSurface, ValidityRange, exponents
 from .experiment_design import LEVEL_COUNT, BenchLimits
 
 PRIOR = 1e-4
@@ -77,7 +77,7 @@ class RecursiveFit(ShortRepr):
         """The fit with one more sample [Pa, 1, N]. A sample outside the limits is counted and left out."""
         if not self.limits.validity_range.contains(pressure, contraction):
             return dataclasses.replace(self, outside=self.outside + 1)
-        terms, kept, squared = self._terms(np.array([pressure]), np.array([contraction]))[0], 1.0, self.squared_factor
+        terms, kept, squared = self._terms(pressure, contraction)[0], 1.0, self.squared_factor
         if self.forgetting < 1.0:
             kept, squared = np.sqrt(self.forgetting), _with_row(self.forgetting * squared, terms)
         factor = _with_row(kept * self.factor, np.append(terms, force))
@@ -134,11 +134,11 @@ class RecursiveFit(ShortRepr):
     def determined(self) -> float:
         """Share of the range of the test rig, from 0 to 1, on which the samples determine the force better than one
         sample at the point would."""
-        return float(np.mean(self._variance(self._grid_terms) < DETERMINED))
+        return float(np.mean(self._variance(_grid_terms(self.limits.validity_range, self.degree)) < DETERMINED))
 
     def force(self, pressure: float, contraction: float) -> tuple[float, float]:
         """Predicted force and its standard error [N], without the limits of the force."""
-        terms = self._terms(np.array([pressure]), np.array([contraction]))
+        terms = self._terms(pressure, contraction)
         return float((terms @ self.coefficients)[0]), float(self.noise * np.sqrt(self._variance(terms)[0]))
 
     def next_point(self) -> NextPoint:
@@ -147,8 +147,8 @@ class RecursiveFit(ShortRepr):
         Points with a predicted force above the maximum, and those where the muscle is certainly slack (below zero by
         two standard errors), are left out. Raises IdentificationError if no point remains.
         """
-        force = self._grid_terms @ self.coefficients
-        variance = self._variance(self._grid_terms)
+        terms = _grid_terms(self.limits.validity_range, self.degree)
+        force, variance = terms @ self.coefficients, self._variance(terms)
         error = self.noise * np.sqrt(variance)
         feasible = (force <= self.limits.max_force) & (force + 2 * error >= 0.0)
         if not feasible.any():
@@ -157,7 +157,7 @@ class RecursiveFit(ShortRepr):
                 "limits, or check the units."
             )
         best = int(np.argmax(np.where(feasible, variance, -1.0)))
-        pressure, contraction = self._grid
+        pressure, contraction = _grid(self.limits.validity_range)
         return NextPoint(float(pressure[best]), float(contraction[best]), float(force[best]), float(error[best]))
 
     def _variance(self, terms: Array) -> Array:
@@ -169,18 +169,9 @@ class RecursiveFit(ShortRepr):
         variance: Array = np.sum(shares**2, axis=1)
         return variance
 
-    @property
-    def _grid(self) -> tuple[Array, Array]:
-        return _grid(self.limits.validity_range.pressure, self.limits.validity_range.contraction)
-
-    @property
-    def _grid_terms(self) -> Array:
-        span = self.limits.validity_range
-        return _grid_terms(span.pressure, span.contraction, self.degree)
-
-    def _terms(self, pressure: Array, contraction: Array) -> Array:
-        span = self.limits.validity_range
-        return _terms(pressure, contraction, span.pressure, span.contraction, self.degree)
+    def _terms(self, pressure: float, contraction: float) -> Array:
+        """The terms of one point, shape (1, P)."""
+        return _terms(np.array([pressure]), np.array([contraction]), self.limits.validity_range, self.degree)
 
 
 @functools.cache
@@ -196,10 +187,9 @@ def _with_row(factor: Array, row: Array) -> Array:
     return np.asarray(np.triu(_lapack().dgeqrf(np.vstack([factor, row]), overwrite_a=True)[0][: len(factor)]))
 
 
-def _terms(
-    pressure: Array, contraction: Array, pressures: tuple[float, float], contractions: tuple[float, float], degree: int
-) -> Array:
+def _terms(pressure: Array, contraction: Array, span: ValidityRange, degree: int) -> Array:
     """Powers of contraction and pressure, scaled to -1 to 1, shape (N, P), in the order of the coefficients."""
+    pressures, contractions = span.pressure, span.contraction
     x = (2 * contraction - sum(contractions)) / (contractions[1] - contractions[0])
     q = (2 * pressure - sum(pressures)) / (pressures[1] - pressures[0])
     x_powers, q_powers = (np.vander(v, degree + 1, increasing=True) for v in (x, q))
@@ -214,13 +204,13 @@ def _powers(degree: int) -> tuple[list[int], list[int]]:
 
 
 @functools.lru_cache(maxsize=8)
-def _grid(pressures: tuple[float, float], contractions: tuple[float, float]) -> tuple[Array, Array]:
+def _grid(span: ValidityRange) -> tuple[Array, Array]:
     """All pairs of evenly spaced levels of pressure and contraction, shape (N,) each."""
-    axes = (np.linspace(*limits, LEVEL_COUNT) for limits in (pressures, contractions))
+    axes = (np.linspace(*limits, LEVEL_COUNT) for limits in (span.pressure, span.contraction))
     pressure, contraction = np.meshgrid(*axes, indexing="ij")
     return pressure.ravel(), contraction.ravel()
 
 
 @functools.lru_cache(maxsize=8)
-def _grid_terms(pressures: tuple[float, float], contractions: tuple[float, float], degree: int) -> Array:
-    return _terms(*_grid(pressures, contractions), pressures, contractions, degree)
+def _grid_terms(span: ValidityRange, degree: int) -> Array:
+    return _terms(*_grid(span), span, degree)

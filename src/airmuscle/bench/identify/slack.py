@@ -19,7 +19,7 @@ import numpy.typing as npt
 from ...core import Array, contraction_text, quantity_text
 from ...recording import Recording
 from .fit_points import FitPoints
-from .problem import FORCE, RESTING_LENGTH, FitProblem, LeastSquaresSolution
+from .problem import FORCE, POINT_COLUMNS, RESTING_LENGTH, FitProblem, LeastSquaresSolution
 from .solver import is_linear, solve_least_squares
 from .weighting import Loss
 
@@ -162,24 +162,24 @@ def with_slack_bounds(problem: FitProblem, points: FitPoints) -> BoundedProblem:
     """The problem with bounds for further lengths; unchanged unless it is of a linear force law of several lengths."""
     unchanged = BoundedProblem(problem, np.zeros(0, dtype=np.intp))
     suits = problem.fitted_quantity == FORCE and RESTING_LENGTH in problem.data.columns
-    if not suits or not hasattr(problem.law, "with_resting_length") or not is_linear(problem):
+    suits = suits and hasattr(problem.law, "with_resting_length") and bool((problem.censoring > 0).any())
+    if not suits or not is_linear(problem):
         return unchanged
-    parts = [_bounds_of_run(run, i) for i, run in enumerate(points.recordings)] if (problem.censoring > 0).any() else []
-    columns = {name: np.concatenate([part[name] for part in parts]) for name in _COLUMNS} if parts else {}
-    if not parts or not columns["pressure"].size:
+    bounds = np.hstack([_bounds_of_run(run, i) for i, run in enumerate(points.recordings)])
+    if not bounds.size:
         return unchanged
-    source = columns.pop("source").astype(np.intp)
-    shares = columns.pop("share")
-    data = Recording({n: np.concatenate([problem.data[n], columns[n]]) for n in columns}, problem.data.origin)
+    *columns, source, shares = bounds
+    names = (*POINT_COLUMNS, RESTING_LENGTH)
+    joined = {n: np.concatenate([problem.data[n], column]) for n, column in zip(names, columns, strict=True)}
     return BoundedProblem(
         dataclasses.replace(
             problem,
-            data=data,
+            data=Recording(joined, problem.data.origin),
             target=np.concatenate([problem.target, np.zeros(source.size)]),
             censoring=np.concatenate([problem.censoring, np.ones(source.size)]),
             weights=np.concatenate([problem.weights, np.sqrt(float(np.mean(problem.weights**2)) * shares)]),
         ),
-        source,
+        source.astype(np.intp),
     )
 
 
@@ -191,20 +191,17 @@ def solve_bounded(
     return LeastSquaresSolution(solution.values, solution.modelled[:count], solution.jacobian[:count])
 
 
-_COLUMNS = ("pressure", "contraction", "force", RESTING_LENGTH, "source", "share")
-
-
-def _bounds_of_run(run: Recording, index: int) -> dict[str, Array]:
-    """The bounds of one recording, with its index, and the number of its rows for which each of them stands."""
-    pressure, contraction, force = (run[name] for name in ("pressure", "contraction", "force"))
+def _bounds_of_run(run: Recording, index: int) -> Array:
+    """Pressure, contraction, force and resting length of the bounds of one recording, its index, and the number of its
+    rows for which each of them stands; shape (6, M)."""
+    pressure, contraction, force = (run[name] for name in POINT_COLUMNS)
     complete = np.isfinite(pressure + contraction + force)
     pressure, contraction, force = pressure[complete], contraction[complete], force[complete]
     if not (force <= 0).any():
-        return {name: np.zeros(0) for name in _COLUMNS}
+        return np.zeros((6, 0))
     steps = Slackness.of(pressure, contraction, force <= 0, force > MIN_PULL * float(force.max()))
     p, c = steps.region(float(pressure.min()), float(contraction.max()), _SHARE, _BOUND_GRID)
     lengths = float(run.constants[RESTING_LENGTH]) * np.array(LENGTH_FACTORS)
     size = p.size * lengths.size
-    columns = (np.tile(p, lengths.size), np.tile(c, lengths.size), np.zeros(size), np.repeat(lengths, p.size))
-    numbers = np.full(size, float(index)), np.full(size, _WEIGHT * force.size / max(size, 1))
-    return dict(zip(_COLUMNS, (*columns, *numbers), strict=True))
+    points = np.tile(p, lengths.size), np.tile(c, lengths.size), np.zeros(size), np.repeat(lengths, p.size)
+    return np.stack([*points, np.full(size, float(index)), np.full(size, _WEIGHT * force.size / max(size, 1))])

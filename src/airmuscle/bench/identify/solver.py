@@ -45,13 +45,9 @@ def solve_least_squares(problem: FitProblem, loss: Loss, start: Array | None = N
     if is_determined_without_censored(problem, robust.jacobian):
         return robust
     # The search stops as soon as no bound is violated; parameters that only bounds determine are then arbitrary.
-    return _solve_linear(_reweight(problem, loss, robust))
-
-
-def _reweight(problem: FitProblem, loss: Loss, solution: LeastSquaresSolution) -> FitProblem:
-    """The least-squares problem with the same solution as the robust one: every square is weighted by rho'."""
-    derivative = loss.rho((problem.residuals(solution.modelled) / loss.scale) ** 2)[1]
-    return dataclasses.replace(problem, weights=problem.weights * np.sqrt(derivative))
+    # Least squares with every square weighted by rho' have the same solution.
+    derivative = loss.rho((problem.residuals(robust.modelled) / loss.scale) ** 2)[1]
+    return _solve_linear(dataclasses.replace(problem, weights=problem.weights * np.sqrt(derivative)))
 
 
 def is_linear(problem: FitProblem) -> bool:
@@ -113,7 +109,13 @@ def solve_iteratively(problem: FitProblem, loss: Loss, start: Array) -> LeastSqu
         if result.status > 0 or _is_converged(result):
             break
     else:
-        raise _not_converged(problem)
+        evaluations = sum(count for _, count in SEARCH_STAGES)
+        raise IdentificationError(
+            f"{problem.data.origin}: the fit of {type(problem.law).__name__} did not converge in {evaluations} "
+            "evaluations. Give initial values closer to those of the muscle, or choose a law with fewer parameters.",
+            hint=Hint("To fix parameters", "fixed"),
+            cause="the fit does not converge",
+        )
     return problem.solution(np.clip(scaled * scale, low, high))
 
 
@@ -144,13 +146,3 @@ def _check_finite(problem: FitProblem, start: Array) -> None:
             "law.",
             cause=f"it gives no finite {problem.fitted_quantity.name} with its initial values",
         )
-
-
-def _not_converged(problem: FitProblem) -> IdentificationError:
-    evaluations = sum(count for _, count in SEARCH_STAGES)
-    return IdentificationError(
-        f"{problem.data.origin}: the fit of {type(problem.law).__name__} did not converge in {evaluations} "
-        "evaluations. Give initial values closer to those of the muscle, or choose a law with fewer parameters.",
-        hint=Hint("To fix parameters", "fixed"),
-        cause="the fit does not converge",
-    )

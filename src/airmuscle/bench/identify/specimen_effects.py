@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core import Array
-from .parameter_covariance import NORMAL_QUANTILE
+from .parameter_covariance import NORMAL_QUANTILE, normalised
 from .pooled_covariance import PooledCovariance, Sums
 from .variable_projection import shortened_step
 
@@ -34,10 +34,6 @@ class BoundedRows(NamedTuple):
     values: Array
     side: Array
     weights: Array
-
-    def joined(self, other: "BoundedRows") -> "BoundedRows":
-        """These rows followed by others."""
-        return BoundedRows(*(np.concatenate(pair) for pair in zip(self, other, strict=True)))
 
     def active(self, coefficients: Array) -> npt.NDArray[np.bool_]:
         """Mask (N,) of the values, and of the bounds that an effect with these coefficients (K,) violates."""
@@ -112,9 +108,7 @@ class SpecimenEffects:
         """Correlations of the errors of the population parameters, shape (P, P)."""
         assert self.covariance is not None
         size = len(self.population_errors)
-        covariance = self.covariance.matrix[:size, :size]
-        deviations = np.sqrt(np.diag(covariance))
-        return np.asarray(covariance / np.outer(deviations, deviations))
+        return normalised(self.covariance.matrix[:size, :size])
 
 
 def predict_effects(sums: Sums, specimens: tuple[str, ...]) -> SpecimenEffects:

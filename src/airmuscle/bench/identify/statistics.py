@@ -235,26 +235,21 @@ def _rank_deficiency(problem: FitProblem, free: Mask, shares: Array, rank: int) 
     what, cause = f"cannot separate {listed}{more}", f"cannot separate {' and '.join(few)}"
     if len(names) == 1:
         what = cause = f"do not depend on {names[0]}"
-    text, hint = _degree_remedy(problem, min(levels) - 1)
+    text, hint = "", Hint("To fix one parameter", "fixed", (path,))
+    if isinstance(problem.law, ContractileSurface):
+        text = (
+            "a(x^i q^j) is the coefficient of the powers i of the contraction and j of the pressure, each scaled to "
+            "-1..1; powers up to n need n + 1 levels. "
+        )
+        degree = min(levels) - 1  # the greatest for the pure powers of each quantity
+        if 0 < degree < problem.law.degree:
+            hint = Hint(DEGREE_REMEDY, "degree", degree, "characteristic.ContractileSurface.blank")
     return IdentificationError(
         f"{problem.data.origin}: the data {what} of {law} {ranks}. Number of levels: {', '.join(counts)}. {text}"
         "Measure at more levels, or choose a lower degree or a law with fewer parameters.",
-        hint=hint or Hint("To fix one parameter", "fixed", (path,)),
+        hint=hint,
         cause=f"the data {cause} (rank {rank} of {len(labels)})",
     )
-
-
-def _degree_remedy(problem: FitProblem, degree: int) -> tuple[str, Hint | None]:
-    """What the terms of a surface are, and the greatest total degree that the levels determine: one less than their
-    number, for the pure powers of each quantity."""
-    if not isinstance(problem.law, ContractileSurface):
-        return "", None
-    text = (
-        "a(x^i q^j) is the coefficient of the powers i of the contraction and j of the pressure, each scaled to -1..1; "
-        "powers up to n need n + 1 levels. "
-    )
-    possible = 0 < degree < problem.law.degree
-    return text, Hint(DEGREE_REMEDY, "degree", degree, "characteristic.ContractileSurface.blank") if possible else None
 
 
 def count_levels(values: Array) -> int:

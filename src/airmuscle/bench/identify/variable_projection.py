@@ -129,7 +129,7 @@ def find_initial_values(problem: FitProblem, multi_start: bool = True) -> Array:
     if not multi_start or thinned is not problem:
         best = projection.search(best)
     low, high = problem.bounds
-    values = np.clip(projection.complete(best), low, high)
+    values = np.clip(projection.solve(best)[0], low, high)
     after, before = (_sum_of_squares(problem.residuals(problem.predict(v))) for v in (values, problem.initial_values))
     return values if after < before else problem.initial_values
 
@@ -146,19 +146,15 @@ class _Projection:
         self._last: tuple[bytes, tuple[Array, Array, Array]] | None = None
         self._active: npt.NDArray[np.bool_] | None = None
 
-    def complete(self, nonlinear: Array) -> Array:
-        """All free parameters for these nonlinear ones; NaN for the linear ones where the law is not finite."""
-        return self._solve(nonlinear)[0]
-
-    def _solve(self, nonlinear: Array) -> tuple[Array, Array, Array]:
-        """All free parameters (P,), the fitted quantity (N,) and the columns of the linear parameters; kept for the
-        Jacobian at the same point."""
+    def solve(self, nonlinear: Array) -> tuple[Array, Array, Array]:
+        """All free parameters (P,), the fitted quantity (N,) and the columns of the linear parameters, which are NaN
+        where the law is not finite; kept for the Jacobian at the same point."""
         key = nonlinear.tobytes()
         if self._last is None or self._last[0] != key:
             values = np.zeros(self._linear.size)
             values[~self._linear] = nonlinear
             constant = self._problem.predict(values)
-            columns = self._problem.partial_jacobian(values, self._linear_indices)
+            columns = self._problem.jacobian(values, self._linear_indices)
             finite = np.isfinite(columns).all() and np.isfinite(constant).all()
             values[self._linear] = (
                 solve_censored_least_squares(self._problem, columns, constant, self._active) if finite else np.nan
@@ -170,13 +166,13 @@ class _Projection:
 
     def residuals(self, nonlinear: Array) -> Array:
         """Weighted residuals with the optimal linear parameters, shape (N,)."""
-        return self._problem.residuals(self._solve(nonlinear)[1])
+        return self._problem.residuals(self.solve(nonlinear)[1])
 
     def jacobian(self, nonlinear: Array) -> Array:
         """Derivatives of the residuals with respect to the nonlinear parameters, after Kaufman; shape (N, K)."""
-        values, modelled, columns = self._solve(nonlinear)
+        values, modelled, columns = self.solve(nonlinear)
         row_weights = (self._problem.weights * self._problem.active_rows(modelled))[:, None]
-        slopes = row_weights * self._problem.partial_jacobian(values, np.flatnonzero(~self._linear).tolist())
+        slopes = row_weights * self._problem.jacobian(values, np.flatnonzero(~self._linear).tolist())
         norms = np.linalg.norm(columns, axis=0)
         linear = row_weights * (columns / np.where(norms > 0, norms, 1.0))
         return np.asarray(slopes - linear @ np.linalg.lstsq(linear, slopes, rcond=None)[0])
