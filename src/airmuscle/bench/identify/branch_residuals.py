@@ -8,7 +8,7 @@ turning point give the same tau.
 
 import dataclasses
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -17,15 +17,14 @@ import numpy.typing as npt
 from ...core import Array, Hint, HintedText
 from ...recording import Recording
 from ...recording.columns import QUANTITIES
-from ..segment import Branch, branch_directions, branch_name, estimate_sensors, find_branches
+from ..segment import branch_directions, branch_name, find_branches
 from ..segment.interval import remembered, running_median
+from .weighting import reading_deviations
 
-MIN_LOOP_ROWS = 12
-"""Minimum number of rows of a branch (chosen)."""
+MIN_LOOP_ROWS, MIN_LOOPS = 12, 2
+"""Minimum number of rows of a branch, and of turning points that must agree (chosen)."""
 LOOP_BINS = 8
 """Intervals of pressure in which the width of a loop is measured (chosen)."""
-MIN_LOOPS = 2
-"""Minimum number of turning points that must agree (chosen)."""
 AGREEMENT = 0.35
 """Relative difference of the delays of the loop and of the turning point that still agree (chosen)."""
 MIN_SAMPLES = 2.0
@@ -72,32 +71,27 @@ def delay_notes(delay: SensorDelay | None) -> list[str]:
     ]
 
 
-def _turns(recording: Recording) -> list[tuple[float, ...]]:
-    """At each maximum of the pressure of a recording with time, what `_turn` returns."""
+def _turns(recording: Recording) -> Iterator[tuple[float, ...]]:
+    """At each maximum of the pressure of a recording with time: delays [s] of the loop of its branches and of its turning
+    point, width of the loop [N], and sample time [s]; none where the pressure dwells there or the force is flat."""
     if any(name not in recording for name in ("time", "pressure", "force")) or len(recording) < 2 * MIN_LOOP_ROWS:
-        return []
+        return
     if not np.isfinite(recording["pressure"] + recording["force"]).all():
-        return []
-    branches = [b for b in find_branches(recording) if b.column == "pressure"]
-    pairs = [(a, b) for a, b in itertools.pairwise(branches) if a.direction > 0 > b.direction]
-    return [turn for a, b in pairs if (turn := _turn(recording, a, b)) is not None]
-
-
-def _turn(recording: Recording, up: Branch, down: Branch) -> tuple[float, ...] | None:
-    """Delays of the loop of two branches and of its turning point [s], width of the loop [N], and sample time [s]; None
-    where the pressure dwells at its maximum or the force is flat."""
-    if min(len(up.interval), len(down.interval)) < MIN_LOOP_ROWS:
-        return None
-    rows = slice(up.interval.start, down.interval.stop)
-    time, pressure = recording["time"][rows], recording["pressure"][rows]
-    force = running_median(recording["force"][rows], 3)
-    top, span = int(np.argmax(pressure)), float(np.ptp(pressure))
-    step = float(np.median(np.diff(time)))
-    dwell = int(np.count_nonzero(pressure > pressure[top] - 0.02 * span))
-    if step <= 0 or dwell > DWELL_ROWS + 0.06 * time.size:
-        return None
-    loop, late = _loop_delay(time, pressure, force, top), float(time[int(np.argmax(force))] - time[top])
-    return None if loop is None else (loop[0], late, loop[1], step)
+        return
+    branches = [branch for branch in find_branches(recording) if branch.column == "pressure"]
+    for up, down in itertools.pairwise(branches):
+        if not up.direction > 0 > down.direction or min(len(up.interval), len(down.interval)) < MIN_LOOP_ROWS:
+            continue
+        rows = slice(up.interval.start, down.interval.stop)
+        time, pressure = recording["time"][rows], recording["pressure"][rows]
+        force = running_median(recording["force"][rows], 3)
+        top, step = int(np.argmax(pressure)), float(np.median(np.diff(time)))
+        dwell = int(np.count_nonzero(pressure > pressure[top] - 0.02 * float(np.ptp(pressure))))
+        if step <= 0 or dwell > DWELL_ROWS + 0.06 * time.size:
+            continue
+        loop = _loop_delay(time, pressure, force, top)
+        if loop is not None:
+            yield loop[0], float(time[int(np.argmax(force))] - time[top]), loop[1], step
 
 
 def _loop_delay(time: Array, pressure: Array, force: Array, top: int) -> tuple[float, float] | None:
@@ -129,10 +123,9 @@ def _line(time: Array, pressure: Array, force: Array, part: slice, low: float, h
 
 MIN_BRANCH_ROWS = 5
 """Minimum number of rows of a branch (chosen); the jump between two levels of a map is no branch."""
-BINS = 12
-"""Intervals of the driven quantity in each recording within which the two branches are compared (chosen)."""
-MIN_BINS = 3
-"""Minimum number of intervals with rows of both branches (chosen)."""
+BINS, MIN_BINS = 12, 3
+"""Intervals of the driven quantity in each recording within which the two branches are compared, and minimum number of
+those with rows of both (chosen)."""
 MIN_STANDARD_ERRORS = 3.0
 """Standard errors above which the mean difference is not random (chosen)."""
 
@@ -163,7 +156,7 @@ def branch_distance(runs: Sequence[Recording], residuals: Sequence[Array], quant
         return 0.0
     mean = abs(float(np.mean(differences)))
     standard_error = float(np.std(differences, ddof=1) / np.sqrt(differences.size))
-    random = mean <= MIN_STANDARD_ERRORS * standard_error or mean <= _sensor_deviation(runs, quantity)
+    random = mean <= MIN_STANDARD_ERRORS * standard_error or mean <= reading_deviations(runs, quantity)[0]
     return 0.0 if random else mean
 
 
@@ -211,11 +204,3 @@ def _branch_bins(run: Recording) -> _BranchBins:
     driven = complete[column]
     edges = np.linspace(driven.min(), driven.max(), BINS + 1)[1:-1]
     return _BranchBins(known, branch_directions(complete, branches), np.digitize(driven, edges), column)
-
-
-@remembered
-def _sensor_deviation(runs: Sequence[Recording], quantity: str) -> float:
-    """Standard deviation of one reading of the quantity [SI]; 0 where it cannot be estimated."""
-    columns = [run[quantity][np.isfinite(run[quantity])] for run in runs]
-    sensors = estimate_sensors([Recording({quantity: values}, "fit") for values in columns if values.size])
-    return sensors[quantity].std if quantity in sensors else 0.0

@@ -21,10 +21,8 @@ from .contradictions import contradiction_notes, repeatability, two_muscle_notes
 from .matched_rows import match_rows
 from .weighting import Huber
 
-MAX_MISFIT = 3.0
-"""Ratio of the residual to the scatter of the data above which the law does not follow them (chosen)."""
-MIN_MISFIT = 0.02
-"""Minimum residual that is reported, as a fraction of the maximum force (chosen)."""
+MAX_MISFIT, MIN_MISFIT = 3.0, 0.02
+"""Residual above which the law does not follow the data: ratio to their scatter and to the maximum force (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -87,10 +85,9 @@ class Remarks:
 
 MIN_DISTANCE = 0.02
 """Minimum distance of an outlier of the force from its neighbours, as a fraction of the maximum force (chosen)."""
-MIN_SHARE = 0.002
-"""Minimum share of rows with such outliers that a fit reports (chosen)."""
-MIN_RMS = 0.005
-"""Minimum share of such outliers in the rms error that a fit reports, as a fraction of the maximum force (chosen)."""
+MIN_SHARE, MIN_RMS = 0.002, 0.005
+"""Minimum share of rows with such outliers that a fit reports, or of their part of the rms error, as a fraction of the
+maximum force (chosen)."""
 HELD = 0.005
 """Range of the contraction at a held length (chosen)."""
 HUBER = 3.0

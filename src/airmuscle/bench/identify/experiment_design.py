@@ -24,10 +24,8 @@ from .weighting import UNCENSORED
 
 LEVEL_COUNT = 13
 """Levels of pressure, and of contraction, of the candidate runs; chosen."""
-MIN_FORCE_SHARE = 0.01
-"""Minimum force of a point, as a fraction of the maximum force of law and rig; below it nothing pulls (chosen)."""
-MIN_PRESSURE_SHARE = 0.02
-"""Minimum pressure of a point, as a fraction of the maximum pressure of the rig (chosen)."""
+MIN_FORCE_SHARE, MIN_PRESSURE_SHARE = 0.01, 0.02
+"""Minimum force and pressure of a point, as fractions of the maxima; below them nothing pulls (chosen)."""
 MIN_POINTS = 3
 """Minimum number of feasible points of a run; chosen."""
 ASSUMPTION = (

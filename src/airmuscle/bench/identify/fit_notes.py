@@ -38,7 +38,8 @@ def examine(points: FitPoints, problem: FitProblem, modelled: Array, own: Sequen
     scatter = dataclasses.replace(checks.scatter, branches=distance)
     branches = branch_notes(points.recordings, distance, quantity.name, delayed=checks.delay is not None)
     notes = (*checks.notes, *map(str, points.repeated), *own, *branches, *_level_notes(fit.data_ranges))
-    notes += _effect_notes(fit.effects)
+    if fit.effects is not None:
+        notes += (_effect_note(fit.effects),)
     if quantity == FORCE:
         lengths = {run.constants.get(RESTING_LENGTH) for run in points.recordings} - {None}
         count = 1 if hasattr(fit.model, "with_resting_length") else len(lengths)
@@ -62,18 +63,15 @@ def _level_notes(ranges: Mapping[str, tuple[float, float]]) -> list[str]:
     ]
 
 
-def _effect_notes(effects: SpecimenEffects | None) -> tuple[str, ...]:
+def _effect_note(effects: SpecimenEffects) -> str:
     """The remark on the number of parameters of the specimen effects."""
-    if effects is None:
-        return ()
-    count = len(effects.specimens)
+    text = f"Partial pooling of {len(effects.specimens)} specimens: "
     if effects.degrees_of_freedom < NO_EFFECT:
-        return (f"Partial pooling of {count} specimens: the data show no difference between them.",)
+        return f"{text}the data show no difference between them."
     return (
-        f"Partial pooling of {count} specimens: coefficients of the specimen effects with a standard "
-        f"deviation of {effects.deviation:.3g} N (restricted maximum likelihood) and {effects.degrees_of_freedom:.3g} "
-        f"effective parameters of {effects.coefficients.size}. The standard errors of the population parameters "
-        "contain this scatter.",
+        f"{text}coefficients of the specimen effects with a standard deviation of {effects.deviation:.3g} N "
+        f"(restricted maximum likelihood) and {effects.degrees_of_freedom:.3g} effective parameters of "
+        f"{effects.coefficients.size}. The standard errors of the population parameters contain this scatter."
     )
 
 

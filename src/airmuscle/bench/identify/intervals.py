@@ -61,10 +61,8 @@ def confidence_band(fit: Fit, points: Recording, *, level: float = 0.95, predict
     return Band(value, value - half, value + half)
 
 
-_HIGH_CORRELATION = 0.99
-"""Absolute correlation above which the standard error of a parameter is not trusted (chosen)."""
-_HIGH_RELATIVE_ERROR = 0.5
-"""Standard error relative to the value above which it is not trusted (chosen)."""
+_HIGH_CORRELATION, _HIGH_RELATIVE_ERROR = 0.99, 0.5
+"""Absolute correlation, or relative standard error, above which a standard error is not trusted (chosen)."""
 _MAX_DOUBLINGS = 12
 """Maximum number of outward steps, each twice the previous one: up to 4096 standard errors."""
 _BISECTIONS = 18

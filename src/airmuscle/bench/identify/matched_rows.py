@@ -21,18 +21,13 @@ from .cross_validation import specimen_name
 
 PRESSURE_REACH, CONTRACTION_REACH = 0.015, 0.004
 """Maximum distance of matched rows: in pressure, as a fraction of the highest, and in contraction (chosen)."""
-MIN_MATCHES = 5
-"""Minimum number of matched rows of two runs (chosen)."""
-MAX_ROWS = 4000
-"""Maximum number of rows of a specimen that are matched (chosen)."""
-MAX_BLOCKS = 80
-"""Maximum number of runs of a specimen that are matched (chosen)."""
-NEIGHBOURS = 4
-"""Number of nearest rows of one block that are compared, with the row itself (chosen)."""
-SPREAD_NEIGHBOURS = 9
-"""The same of rows of which no two have one place: also those at the next pressures (chosen)."""
-MIN_BRANCH_ROWS = 5
-"""Minimum number of rows of a branch (chosen)."""
+MIN_MATCHES, MIN_BRANCH_ROWS = 5, 5
+"""Minimum numbers of matched rows of two runs, and of rows of a branch (chosen)."""
+MAX_ROWS, MAX_BLOCKS = 4000, 80
+"""Maximum numbers of rows and of runs of a specimen that are matched (chosen)."""
+NEIGHBOURS, SPREAD_NEIGHBOURS = 4, 9
+"""Number of nearest rows of one block that are compared, with the row itself (chosen); of rows of which no two have one
+place also those at the next pressures."""
 MIN_SPREAD_ROWS = 30
 """Minimum number of rows without time of which no two have one place, and neighbours are compared (chosen)."""
 MIN_FORCE = 0.02

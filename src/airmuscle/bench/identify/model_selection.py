@@ -114,10 +114,8 @@ def excess_error(model: RankedModel, best: RankedModel) -> float:
 
 MAX_LIMITED = 0.01
 """Fraction of the rows above which limited residuals are no outliers (chosen)."""
-MAX_LISTED = 10
-"""Maximum number of laws in the brief view of a comparison, besides the recommended one (chosen)."""
-SHORT_LISTED = 4
-"""Maximum number of excluded laws in the brief view (chosen)."""
+MAX_LISTED, SHORT_LISTED = 10, 4
+"""Maximum numbers of ranked laws, besides the recommended one, and of excluded laws in the brief view (chosen)."""
 _SLACK_NOTE = (
     "Slack rows: where the muscle was measured slack. A law that pulls there more than three rms errors of the law and "
     "2 % of the maximum force is not recommended if another law pulls less."

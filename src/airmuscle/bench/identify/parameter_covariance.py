@@ -115,9 +115,7 @@ class ParameterCovariance:
         errors, correlations = np.full(count, np.nan), np.full((count, count), np.nan)
         factor = 1.0 if self.groups is None else float(self._quantile(self.degrees_of_freedom, 0.95)) / NORMAL_QUANTILE
         errors[self.parameters] = factor * np.sqrt(np.diag(self._scatter))
-        correlations[square] = (
-            normalised(self.basis @ self.basis.T) if self.groups is None else normalised(self._scatter)
-        )
+        correlations[square] = normalised(self.basis @ self.basis.T if self.groups is None else self._scatter)
         return errors, correlations
 
     def greatest_correlations(self) -> Array:

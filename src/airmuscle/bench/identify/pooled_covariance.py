@@ -52,8 +52,7 @@ class Sums(NamedTuple):
 
     def scaled(self, share: float) -> "Sums":
         """The sums for rows that count only as this share of independent ones."""
-        xx, xz, zz, xr, zr = (share * each for each in (self.xx, self.xz, self.zz, self.xr, self.zr))
-        return Sums(xx, xz, zz, xr, zr, share * self.rr, share * self.rows)
+        return Sums(*(share * each for each in self))  # type: ignore[arg-type]
 
 
 class EffectRows(NamedTuple):

@@ -86,10 +86,8 @@ def uncensored_rank(problem: FitProblem, jacobian: Array) -> int:
     return int(np.linalg.matrix_rank(triangle, rtol=RANK_TOLERANCE))
 
 
-_GUESS_COUNT = 16
-"""Initial guesses at which the projected residuals are evaluated, including the given one (chosen)."""
-_SEARCH_COUNT = 2
-"""Searches, from the best of these (chosen)."""
+_GUESS_COUNT, _SEARCH_COUNT = 16, 2
+"""Initial guesses, with the given one, at which projected residuals are evaluated; searches from the best (chosen)."""
 _SPREAD_FACTOR = 4.0
 """Maximum factor between an initial guess and the given value (chosen)."""
 _RANGE_FRACTION = 0.01

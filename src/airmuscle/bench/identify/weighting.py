@@ -151,7 +151,7 @@ def sensor_deviations(runs: Sequence[Recording], quantity: str) -> Array | None:
     share their median. None where all recordings are of one rig, or a sensor shows neither noise nor resolution.
     """
     try:
-        deviations, quantisation = np.array([_sensor_deviation(run, quantity) for run in runs]).reshape(-1, 2).T
+        deviations, quantisation = np.array([reading_deviations([run], quantity) for run in runs]).reshape(-1, 2).T
     except ColumnError:
         return None
     timed = all("time" in run.columns for run in runs)
@@ -172,9 +172,10 @@ def sensor_deviations(runs: Sequence[Recording], quantity: str) -> Array | None:
 
 
 @remembered
-def _sensor_deviation(run: Recording, quantity: str) -> tuple[float, float]:
-    """Standard deviations of noise and quantisation, and of quantisation alone; 0 where they cannot be estimated."""
-    values = run[quantity][np.isfinite(run[quantity])]
-    sensors = estimate_sensors(Recording({quantity: values}, run.origin)) if values.size else {}
+def reading_deviations(runs: Sequence[Recording], quantity: str) -> tuple[float, float]:
+    """Standard deviations of one reading of a quantity [SI]: of noise and quantisation, and of quantisation alone; 0
+    where they cannot be estimated."""
+    columns = [run[quantity][np.isfinite(run[quantity])] for run in runs]
+    sensors = estimate_sensors([Recording({quantity: values}, "runs") for values in columns if values.size])
     sensor = sensors.get(quantity)
     return (0.0, 0.0) if sensor is None else (sensor.std, float(sensor.resolution / np.sqrt(12.0)))
