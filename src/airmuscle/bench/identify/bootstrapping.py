@@ -174,21 +174,11 @@ def _refit_iteratively(common: tuple[Fit, RowIndices, Array, Callable[[float], N
             progress(0.1 * i / len(draws))
         check_running()
         refitted = None if near is None else near.refit(counts, known.best(counts))
-        values[i] = _search(fit, counts[group], near is not None) if refitted is None else refitted
-        if np.isfinite(values[i]).all():
-            known.add(values[i])
+        if refitted is None:  # a search of its own; Gauss-Newton steps have failed where there are `near` refits
+            search = solve_least_squares if near is None else solve_iteratively
+            with contextlib.suppress(IdentificationError, np.linalg.LinAlgError):
+                refitted = search(problem.repeated(counts[group]), fit.loss, fit.values).values
+        if refitted is not None and np.isfinite(refitted).all():
+            values[i] = refitted
+            known.add(refitted)
     return values
-
-
-def _search(fit: Fit, repeats: Array, tried: bool = False) -> Array:
-    """The parameters for these multiplicities of the rows (N,) by a search of its own; NaN where it fails.
-
-    `tried`: whether Gauss-Newton steps have failed.
-    """
-    drawn = repeats > 0
-    problem = fit.problem.rows(drawn)
-    problem = dataclasses.replace(problem, weights=problem.weights * np.sqrt(repeats[drawn]))
-    try:
-        return (solve_iteratively if tried else solve_least_squares)(problem, fit.loss, fit.values).values
-    except (IdentificationError, np.linalg.LinAlgError):
-        return np.full(len(fit.estimates), np.nan)

@@ -72,8 +72,8 @@ def delay_notes(delay: SensorDelay | None) -> list[str]:
 
 
 def _turns(recording: Recording) -> Iterator[tuple[float, ...]]:
-    """At each maximum of the pressure of a recording with time: delays [s] of the loop of its branches and of its turning
-    point, width of the loop [N], and sample time [s]; none where the pressure dwells there or the force is flat."""
+    """At each maximum of the pressure of a recording with time: delays [s] of the loop of its branches and of its
+    turning point, width of the loop [N], sample time [s]; none where the pressure dwells there or the force is flat."""
     if any(name not in recording for name in ("time", "pressure", "force")) or len(recording) < 2 * MIN_LOOP_ROWS:
         return
     if not np.isfinite(recording["pressure"] + recording["force"]).all():

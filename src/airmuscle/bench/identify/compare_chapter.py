@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -91,8 +91,7 @@ def select_for_both(
     return JointSelection(comparisons, tuple(ranking[chosen] for ranking in rankings), ratios(chosen))
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class LawSelection:
+class LawSelection(NamedTuple):
     """The recommended law, with the comparison for one purpose or those for both."""
 
     comparisons: tuple[Comparison, ...]

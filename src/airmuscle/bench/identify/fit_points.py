@@ -37,8 +37,6 @@ class FitPoints:
     """
 
     recordings: tuple[Recording, ...]
-    single: bool
-    """Whether one recording was given, not a sequence."""
     joined: Recording
     missing: npt.NDArray[np.bool_]
     dropped: int
@@ -48,7 +46,6 @@ class FitPoints:
     @classmethod
     def from_recordings(cls, recording: Recording | Sequence[Recording]) -> "FitPoints":
         """The points of one or several recordings. Raises IdentificationError for an infinite value."""
-        single = isinstance(recording, Recording)
         runs = (recording,) if isinstance(recording, Recording) else tuple(recording)
         columns = {name: np.concatenate([run[name] for run in runs]) for name in POINT_COLUMNS} if runs else {}
         origins = list(dict.fromkeys(run.origin for run in runs))
@@ -72,7 +69,7 @@ class FitPoints:
         starts = np.cumsum([0, *(len(run) for run in runs)])
         for each in repeated:
             missing[starts[each.recording] + each.rows.start : starts[each.recording] + each.rows.stop] = True
-        return cls(runs, single, joined, missing, dropped, repeated)
+        return cls(runs, joined, missing, dropped, repeated)
 
     @functools.cached_property
     def data(self) -> Recording:
@@ -95,7 +92,7 @@ class FitPoints:
 
     def deviations(self, quantity: str) -> Array | None:
         """The standard deviations of the sensors by recording; None unless they differ."""
-        return None if self.single or len(self.recordings) < 2 else sensor_deviations(self.recordings, quantity)
+        return None if len(self.recordings) < 2 else sensor_deviations(self.recordings, quantity)
 
     @functools.cached_property
     def at_levels(self) -> Recording:

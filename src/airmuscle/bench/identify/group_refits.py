@@ -14,7 +14,6 @@ range: the variance of the former is s^2/(1 - h_i), that of the latter s^2 (1 + 
 regression (Cook and Weisberg, Residuals and Influence in Regression (1982), section 2.2).
 """
 
-import dataclasses
 import math
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -207,10 +206,7 @@ class GroupRefits:
     def _iterate(self, counts: Array, step: Array, start: Array | None) -> Array | None:
         """Gauss-Newton steps on the drawn rows."""
         assert self._basis is not None
-        repeats = counts[self._group]
-        drawn = repeats > 0
-        problem = self._problem.rows(drawn)
-        problem = dataclasses.replace(problem, weights=problem.weights * np.sqrt(repeats[drawn]))
+        problem = self._problem.repeated(counts[self._group])
         first = steps.FirstStep(self._basis, step, float(counts @ self._sums.squares)) if start is None else None
         solution = steps.gauss_newton(problem, self._solution.values if start is None else start, first, RELATIVE_STEP)
         return None if solution is None else solution.values

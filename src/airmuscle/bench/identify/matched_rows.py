@@ -9,6 +9,7 @@ import dataclasses
 import functools
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -97,8 +98,7 @@ class MatchedRuns:
         return -float(np.median(self.differences / np.maximum(self.first.slopes[self.pairs[:, 0]], 1e-12)))
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Matches:
+class Matches(NamedTuple):
     """All matched runs of a bench, and its maximum force [N]."""
 
     runs: tuple[MatchedRuns, ...]

@@ -29,8 +29,7 @@ DECAY_RANGE = 0.05
 (chosen): where the population is far from pulling, no specimen pulls."""
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Specimens:
+class Specimens(NamedTuple):
     """The specimens of N rows: names, resting lengths [m], and the index of the specimen of each row (N,)."""
 
     names: tuple[str, ...]

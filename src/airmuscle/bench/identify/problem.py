@@ -163,6 +163,12 @@ class FitProblem:
             weights=self.weights[selection],
         )
 
+    def repeated(self, counts: Array) -> "FitProblem":
+        """The problem in which each row counts this many times (N,)."""
+        drawn = counts > 0
+        problem = self.rows(drawn)
+        return dataclasses.replace(problem, weights=problem.weights * np.sqrt(counts[drawn]))
+
     def predict(self, values: Array) -> Array:
         """The fitted quantity at every row with these parameters [SI]; shape (N,)."""
         method = self.fitted_quantity.method

@@ -77,7 +77,7 @@ class RecursiveFit(ShortRepr):
         """The fit with one more sample [Pa, 1, N]. A sample outside the limits is counted and left out."""
         if not self.limits.validity_range.contains(pressure, contraction):
             return dataclasses.replace(self, outside=self.outside + 1)
-        terms, kept, squared = self._terms(pressure, contraction)[0], 1.0, self.squared_factor
+        terms, kept, squared = self._terms(np.array([pressure]), np.array([contraction]))[0], 1.0, self.squared_factor
         if self.forgetting < 1.0:
             kept, squared = np.sqrt(self.forgetting), _with_row(self.forgetting * squared, terms)
         factor = _with_row(kept * self.factor, np.append(terms, force))
@@ -138,7 +138,7 @@ class RecursiveFit(ShortRepr):
 
     def force(self, pressure: float, contraction: float) -> tuple[float, float]:
         """Predicted force and its standard error [N], without the limits of the force."""
-        terms = self._terms(pressure, contraction)
+        terms = self._terms(np.array([pressure]), np.array([contraction]))
         return float((terms @ self.coefficients)[0]), float(self.noise * np.sqrt(self._variance(terms)[0]))
 
     def next_point(self) -> NextPoint:
@@ -169,9 +169,8 @@ class RecursiveFit(ShortRepr):
         variance: Array = np.sum(shares**2, axis=1)
         return variance
 
-    def _terms(self, pressure: float, contraction: float) -> Array:
-        """The terms of one point, shape (1, P)."""
-        return _terms(np.array([pressure]), np.array([contraction]), self.limits.validity_range, self.degree)
+    def _terms(self, pressure: Array, contraction: Array) -> Array:
+        return _terms(pressure, contraction, self.limits.validity_range, self.degree)
 
 
 @functools.cache

@@ -99,8 +99,7 @@ Mask = npt.NDArray[np.bool_]
 DEGREE_REMEDY = "For the greatest degree that the levels determine"
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class FitStatistics:
+class FitStatistics(NamedTuple):
     """Statistics of the design matrix and the residuals at the solution; parameters on a bound have NaN."""
 
     rank: int
