@@ -168,10 +168,15 @@ def test_a_study_says_what_it_was_told(folder):
     )  # fmt: skip
     study = load_dynamic_fit(path)
     first, second = study.experiments
-    assert study.own == ("circuit.supply.pressure", StartTime(0.05), InitialValue("pressure", 2e3))
-    assert (study.seed, study.starts, study.bounds) == (3, 2, {"gas.exponent": (1.01, 1.4)})
-    assert study.method.rtol == 1e-7
-    assert study.observed == pytest.approx({"pressure": 500.0, "position": 5e-5})
+    assert study.search.unknowns(study.plant) == (
+        "circuit.supply.pressure",
+        StartTime(0.05),
+        InitialValue("pressure", 2e3),
+    )
+    assert (study.search.seed, study.search.starts, study.search.bounds) == (3, 2, {"gas.exponent": (1.01, 1.4)})
+    assert study.search.integrator.rtol == 1e-7
+    deviations = {name: deviation for name, (deviation, _) in study.observed.items()}
+    assert deviations == pytest.approx({"pressure": 500.0, "position": 5e-5})
     assert (first.plant.mechanism, second.plant.mechanism) == (HangingMass(10.0), HangingMass(12.0))
     assert (second.recording["time"].min(), second.recording["time"].max()) == pytest.approx((0.3, 1.0), abs=0.011)
     assert second.initial_conditions.known["pressure"] == pytest.approx(np.median(second.recording["pressure"][:3]))
@@ -318,7 +323,7 @@ def test_the_page_on_dynamic_identification_holds_a_study_that_loads(folder):
     (folder / "page.toml").write_text(text, encoding="utf-8")
     study = load_dynamic_fit(folder / "page.toml")
     assert [e.plant.mechanism.mass for e in study.experiments] == [10.0, 12.0]
-    assert study.free[0] == ("circuit.fill.conductance", "circuit.discharge.conductance")
+    assert study.search.free[0] == ("circuit.fill.conductance", "circuit.discharge.conductance")
 
 
 def test_a_start_that_was_found_begins_the_written_scenario(folder, tmp_path):

@@ -7,11 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from ...bench.identify.dynamic import CrossPrediction, DynamicFit, cross_predict, fit_dynamic
-from ...bench.identify.dynamic.experiment import Experiment, InitialValue, ParameterPaths, RecordUnknown, stated_ambient
+from ...bench.identify.dynamic.experiment import Experiment, InitialValue, stated_ambient
 from ...bench.readers import ColumnMapping, read, read_mapping
 from ...bench.readers.mapping import mapping_of_tables
 from ...core import ParameterError, ShortRepr, abridged, ambient_pressure
-from ...engine.run import Integrator
 from ...engine.run.problem import check_signal
 from ...physics.plant.plant import Plant
 from ...recording import Recording
@@ -142,24 +141,20 @@ class DynamicFitSetup(ShortRepr):
     experiments: tuple[Experiment, ...]
     input_tables: tuple[Mapping[str, Any], ...]
     """The table [input] of each record as written in its file, for the scenarios of the result."""
-    observed: Mapping[str, float]
-    free: tuple[ParameterPaths, ...]
-    own: tuple[RecordUnknown, ...] = ()
-    bounds: Mapping[str, tuple[float, float]] = dataclasses.field(default_factory=dict)
-    starts: int = 1
-    seed: int = 0
-    method: Integrator | None = None
-    columns: Mapping[str, str] = dataclasses.field(default_factory=dict)
-    """Measured column of each observed output that has another name."""
+    observed: Mapping[str, tuple[float, str]]
+    """Standard deviation of the sensor and column of each observed output."""
+    search: values.FitTable
     origin: str = ""
     """Name of the file, for messages."""
 
     def fit(self) -> DynamicFit:
         """The result of the fit; see `airmuscle.bench.fit_dynamic`."""
+        search, deviations = self.search, {name: deviation for name, (deviation, _) in self.observed.items()}
         with located_errors(self.origin or self.title):
             return fit_dynamic(
-                self.plant, self.experiments, free=self.free, observed=self.observed, per_record=self.own,
-                bounds=self.bounds, starts=self.starts, seed=self.seed, method=self.method,
+                self.plant, self.experiments, free=search.free, observed=deviations,
+                per_record=search.unknowns(self.plant), bounds=search.bounds, starts=search.starts, seed=search.seed,
+                method=search.integrator,
             )  # fmt: skip
 
     def cross_predictions(self, fit: DynamicFit) -> tuple[CrossPrediction, ...]:
@@ -169,7 +164,8 @@ class DynamicFitSetup(ShortRepr):
             chosen = tuple(dataclasses.replace(self.experiments[i], plant=fit.plant(i)) for i in records)
             plant = chosen[0].plant
             assert isinstance(plant, Plant)
-            return dataclasses.replace(self, plant=plant, experiments=chosen, starts=1).fit()
+            search = dataclasses.replace(self.search, starts=1)
+            return dataclasses.replace(self, plant=plant, experiments=chosen, search=search).fit()
 
         return cross_predict(fit, refit)
 
@@ -190,11 +186,11 @@ class DynamicFitSetup(ShortRepr):
         start = {name: value for name, value in known.items() if name in given or name in pressure_names(plant)}
         duration = float(record_model.times[-1]) - record_model.start_time(fit.values)
         run = {"duration": duration, "initial_state": start}
-        named = {name: {"deviation": self.observed[name], "column": column} for name, column in self.columns.items()}
-        fitted = {
-            "observed": {**self.observed, **named},
-            "uncertainty": fit_uncertainty(fit, [each.rms for each in cross]),
+        observed = {
+            name: deviation if column == name else {"deviation": deviation, "column": column}
+            for name, (deviation, column) in self.observed.items()
         }
+        fitted = {"observed": observed, "uncertainty": fit_uncertainty(fit, [each.rms for each in cross])}
         return scenario_toml(f"{self.title}, {origin}", plant, self.input_tables[record], run, note, fitted)
 
 
@@ -212,19 +208,12 @@ def load_dynamic_fit(path: str | Path) -> DynamicFitSetup:
         observed = values.read_observed(stated, plant, location.at("observed"))
         records = build_records(tables, tables, plant, observed, location)
         table = values.required_table(tables, "fit", location)
-        fit: values.FitTable = values.table_reader(plant).build(table, location.inside("fit"), kind=values.FitTable)
         return DynamicFitSetup(
             title=read_text(tables, "title", location, needed=False) or file.stem,
             plant=plant,
             experiments=tuple(experiment for experiment, _ in records),
             input_tables=tuple(table for _, table in records),
-            observed={name: deviation for name, (deviation, _) in observed.items()},
-            columns={name: column for name, (_, column) in observed.items() if column != name},
-            free=fit.free,
-            own=fit.unknowns(plant),
-            bounds=fit.bounds,
-            starts=fit.starts,
-            seed=fit.seed,
-            method=fit.integrator,
+            observed=observed,
+            search=values.table_reader(plant).build(table, location.inside("fit"), kind=values.FitTable),
             origin=str(file),
         )

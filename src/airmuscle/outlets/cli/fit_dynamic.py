@@ -58,11 +58,11 @@ def fit_dynamic(study: Study, request: DynamicFitRequest, out: Folder = Path("dy
     """
     loaded = load_dynamic_fit(study)
     if request.starts is not None:
-        loaded = dataclasses.replace(loaded, starts=request.starts)
+        loaded = dataclasses.replace(loaded, search=dataclasses.replace(loaded.search, starts=request.starts))
     check_writable(out)
     findings = _findings(loaded)
     if not json:
-        counts = ((len(loaded.experiments), "record"), (loaded.starts, "start"))
+        counts = ((len(loaded.experiments), "record"), (loaded.search.starts, "start"))
         echo("  " + ", ".join(counted(*each) for each in counts), err=True)
     fit = loaded.fit()
     cross = loaded.cross_predictions(fit)
