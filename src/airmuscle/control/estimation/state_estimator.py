@@ -12,8 +12,7 @@ from ...core.declaration import forwarded
 from ...core.system import check_system, state_vector
 from ...engine.compile.function import AugmentedRates, augmented_rates, states_and_outputs
 from ...engine.compile.program import CompiledSystem, compile_system
-from ...engine.loop.control_loop import COMMAND
-from ...engine.loop.controller import Controller, Measurement
+from ...engine.loop import COMMAND, Controller, Measurement
 from ...recording.recording import Recording
 from .estimates import BoundFilter, Innovation, MeasuredRows, Pass, StateEstimate
 from .linear_design import DISTURBANCE, check_numbers, check_sample_time

@@ -8,8 +8,7 @@ import numpy as np
 
 from ...core import Parameter, ParameterError, Reference, Value, check_known, model, ops, parameter, published, within
 from ...core.system import select_prefix, with_prefix
-from ...engine.loop.control_law import Commanded, ControlLaw, EnclosingLaw, Memory, Sampled, inputs_of
-from ...engine.loop.controller import Measurement, relative_unit
+from ...engine.loop import Commanded, ControlLaw, EnclosingLaw, Measurement, Memory, Sampled, inputs_of, relative_unit
 from .enclosing import MAX_SAMPLES
 from .state_feedback import FRANKLIN1998
 

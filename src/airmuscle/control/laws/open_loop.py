@@ -8,10 +8,8 @@ import numpy as np
 
 from ...core import Parameter, ParameterError, Reference, Value, model, ops, parameter, published, within
 from ...engine.loop import ControlLaw, Measurement, Memory, Sampled
-from ...physics.muscle.characteristic.base import ForceLaw
+from ...physics import ElasticSeriesElement, ForceLaw, Muscle
 from ...physics.muscle.geometry.meridian import SAGA_2007
-from ...physics.muscle.muscle import Muscle
-from ...physics.muscle.series import ElasticSeriesElement
 from .single_column import ASTROM_HAGGLUND1995
 
 

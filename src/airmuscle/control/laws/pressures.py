@@ -6,9 +6,8 @@ from typing import ClassVar
 from ...core import ParameterError, Reference, Value, autodiff, model, ops, parameter, published, within
 from ...core.declaration import forwarded
 from ...engine.loop import Commanded, ControlLaw, Measurement, Memory, Sampled, commands, range_of
-from ...physics.mechanism.base import Mechanism
+from ...physics import Mechanism, Muscle
 from ...physics.muscle.characteristic.tondu_lopez2000 import TONDU_LOPEZ_2000
-from ...physics.muscle.muscle import Muscle
 from .open_loop import OpenLoopLaw, check_invertible, check_pair, pressure_between, static_force
 from .single_column import ASTROM_HAGGLUND1995
 

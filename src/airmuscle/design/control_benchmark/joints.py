@@ -9,11 +9,8 @@ from typing import Any
 from ...core import ParameterError, ShortRepr, check_field_types, leaves
 from ...engine.loop import ColumnSensor, Driver, SolenoidDriver
 from ...files.library.entry_file import load_law
+from ...physics import Dahl, JointWithExternalTorque, LinearDamper, Plant
 from ...physics.equilibrium import find_equilibrium
-from ...physics.mechanism import JointWithExternalTorque
-from ...physics.muscle import LinearDamper
-from ...physics.muscle.friction import Dahl
-from ...physics.plant.plant import Plant
 from ...physics.pneumatics import FillDischarge, Orifice, Polytropic, Supply, TubeOrifice, Valve
 from ..tuning import RobustObjective
 from .tasks import DEGREE, ControlTask, SineMotion, commissioning_tasks, tuning_tasks

@@ -9,9 +9,8 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ...control.laws.enclosing import WithStuckValve
+from ...control.laws import AntagonisticInverse, WithStuckValve
 from ...control.laws.open_loop import static_force
-from ...control.laws.pressures import AntagonisticInverse
 from ...core import Array, ParameterError, check_known, published
 from ...engine.loop import ControlLaw, Controller, ControlLoop, Driver, SampledSignal
 from ...physics.plant.plant import Plant

@@ -11,15 +11,11 @@ import numpy as np
 from ...core import Reference, ShortRepr, Value, model, ops, parameter, published
 from ...engine.loop import Driver, SolenoidDriver
 from ...files.library.entry_file import load_law
+from ...physics import FillDischarge, ForceLaw, LinearDamper, Orifice, Plant, SubsonicIndexValve, TonduLopez2000
 from ...physics.mechanism import AntagonisticJoint, JointWithExternalTorque
-from ...physics.muscle import LinearDamper
-from ...physics.muscle.characteristic import ForceLaw, TonduLopez2000
 from ...physics.muscle.friction import BoucWen, Friction, LuGre, MaxwellSlip
-from ...physics.plant.plant import Plant
 from ...physics.pneumatics import EnergyBalance, Gas, Isothermal, Supply, Tube, WallHeatTransfer, WithTubes
-from ...physics.pneumatics.circuit import FillDischarge
 from ...physics.pneumatics.gas import HEAT_CAPACITY_RATIO, REFERENCE_DENSITY, REFERENCE_TEMPERATURE
-from ...physics.pneumatics.valve import Orifice, SubsonicIndexValve
 
 SIDES = ("left", "right")
 SUPPLY = 6e5

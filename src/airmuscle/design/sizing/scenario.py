@@ -9,9 +9,7 @@ import numpy as np
 
 from ...core import STANDARD_GRAVITY, AirmuscleError, Array, SolveError
 from ...files.library.write import scenario_toml
-from ...physics.mechanism import AntagonisticJoint, HangingMass, Isotonic, Mechanism, SpringLoad
-from ...physics.muscle import LinearDamper, Muscle
-from ...physics.plant.plant import Plant
+from ...physics import AntagonisticJoint, HangingMass, Isotonic, LinearDamper, Mechanism, Muscle, Plant, SpringLoad
 from ...physics.pneumatics import FillDischarge, Orifice, ProportionalRegulator, SecondOrderLag, Supply, Valve
 from ...physics.pneumatics.gas import Isothermal, absolute_pressure
 from .choice import MuscleChoice

@@ -8,8 +8,7 @@ import numpy as np
 
 from ...core import BLACK, BLUE, GREEN, LINES, ORANGE, RED, SKY, AirmuscleError, cite, leaves, legend_below, new_figure
 from ...engine.loop.control_loop import SETPOINT, ControlLoop
-from ...engine.run import simulate
-from ...engine.run.integrators import Integrator
+from ...engine.run import Integrator, simulate
 from ...recording import Recording
 from ...report.chapter import BY_ROW, Chapter, NamedValue, Plot, Table, TableColumn
 from .case import loop_with_gains

@@ -9,13 +9,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...bench.identify.prediction import PlantUncertainty
-from ...core import AirmuscleError, Array, Leaf, ParameterError, check_field_types, leaves, with_parameters
-from ...core.annotation import within
+from ...core import AirmuscleError, Array, Leaf, ParameterError, check_field_types, leaves, with_parameters, within
 from ...engine.loop import MAX_DELAY, ColumnSensor, ControlLaw, ControlLoop, WithSensors
 from ...files.library import ParameterUncertainty, located_errors
 from ...files.scenario.plant_uncertainty import SEPARATOR, parameter_uncertainty
-from ...physics.plant.plant import Plant
-from ...physics.pneumatics import Valve, WithLeak
+from ...physics import Plant, Valve, WithLeak
 from .case import LoopCase
 
 LOAD = re.compile(r"^mechanism\.(.+\.)?(mass|inertia|weight_torque|payload|force)$")

@@ -10,8 +10,7 @@ import numpy as np
 from ...control.laws.single_column import PID
 from ...core import AirmuscleError, Array, ParameterError, Reference, check_field_types, published
 from ...engine.loop import Schedule, WithDrivers, commands, range_of
-from ...engine.run import simulate
-from ...engine.run.integrators import Integrator
+from ...engine.run import Integrator, simulate
 from .case import LoopCase
 from .process_models import (
     FirstOrderDeadTime,

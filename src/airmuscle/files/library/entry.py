@@ -11,11 +11,8 @@ from typing import Any, ClassVar
 
 from ...core import ABSOLUTE, Reference, check_field_types, model, parameter
 from ...core.errors import AirmuscleWarning, ParameterError, UnknownNameError, check_known, suggestion
+from ...physics import Characteristic, ForceLaw, Friction, Geometry, Plant, ValidityRange
 from ...physics.muscle import CreepElements, Damper, Muscle, Ratings, SeriesElement, Spring, Stop, Wall
-from ...physics.muscle.characteristic import Characteristic, ForceLaw, ValidityRange
-from ...physics.muscle.friction.base import Friction
-from ...physics.muscle.geometry.base import Geometry
-from ...physics.plant.plant import Plant
 from ...physics.pneumatics import REFERENCE_DENSITY, REFERENCE_TEMPERATURE, Orifice
 from ...report.chapter import Table
 from .entry_display import EntryDisplay

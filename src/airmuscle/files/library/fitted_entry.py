@@ -14,9 +14,7 @@ from ...bench.identify.group_refits import LEVEL
 from ...bench.identify.specimen_errors import SpecimenErrors, ranked_specimen_errors, resting_lengths_of, specimens_of
 from ...bench.segment import maximum_rate
 from ...core import HintedText, IdentificationError, ParameterError, UnknownNameError, cite, printable, suggestion
-from ...physics.muscle.characteristic import Characteristic, ContractileSurface
-from ...physics.muscle.friction import NoFriction
-from ...physics.muscle.geometry import Geometry
+from ...physics import Characteristic, ContractileSurface, Geometry, NoFriction
 from ...physics.muscle.muscle import LENGTH_TOLERANCE
 from ...recording import Recording
 from ...report.shown import value_text

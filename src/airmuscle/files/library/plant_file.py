@@ -15,10 +15,7 @@ from typing import Any
 from ...bench.readers import read_csv
 from ...core import FileError, ParameterError, Reference, abridged
 from ...engine.loop.driver import Driver, SolenoidDriver
-from ...physics.muscle import Muscle
-from ...physics.muscle.characteristic.base import ForceLaw
-from ...physics.plant.plant import Plant
-from ...physics.pneumatics.valve import Orifice
+from ...physics import ForceLaw, Muscle, Orifice, Plant
 from ...recording import Recording
 from .build import TableReader, build
 from .entry import MISSING_GEOMETRY, PATHS, AnyEntry, Entry, PlantEntry, ValveEntry, issue_warning

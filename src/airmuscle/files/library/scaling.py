@@ -4,8 +4,7 @@ import dataclasses
 from typing import Any, TypeVar, cast
 
 from ...core import ParameterError, leaves, quantity
-from ...physics.muscle.characteristic import MartensBoblan2017, Reynolds2003, Serres2009, TonduLopez2000, VirtualWork
-from ...physics.muscle.characteristic.chou_hannaford1996 import ChouHannaford1996
+from ...physics import ChouHannaford1996, MartensBoblan2017, Reynolds2003, Serres2009, TonduLopez2000, VirtualWork
 from ...physics.muscle.geometry import Braid, Geometry
 from ...physics.muscle.muscle import LENGTH_TOLERANCE
 from .entry import OPTIONAL_PARTS, Entry

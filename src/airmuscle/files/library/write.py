@@ -7,9 +7,7 @@ from typing import Any
 
 from ...bench.identify import Fit
 from ...core import FileError, ParameterError, Reference, abridged, atomic_file, one_line
-from ...physics.muscle import Muscle, Ratings
-from ...physics.muscle.characteristic import Characteristic, ValidityRange
-from ...physics.plant.plant import Plant
+from ...physics import Characteristic, Muscle, Plant, Ratings, ValidityRange
 from .entry import OPTIONAL_PARTS, Check, Entry
 from .fitted_entry import fitted_entry
 from .uncertainty import ParameterUncertainty, StatedBand

@@ -16,9 +16,7 @@ from typing import Any
 from ...core import Input, Parameter, ParameterError, abridged, is_known_unit, parameters
 from ...engine.loop import ControlLoop, check_input_names, check_present
 from ...engine.loop.controller import RELATIVE, Controller, SignalRelated, named_signal_units, parameter_units, unit_of
-from ...physics.mechanism.base import Mechanism
-from ...physics.muscle import Muscle
-from ...physics.plant.plant import Plant
+from ...physics import Mechanism, Muscle, Plant
 from ...recording.columns import column_units
 from ..library import PLANT_READER, Location, custom_field, located_errors, origin, read_parameter, read_table
 from ..library.build import build

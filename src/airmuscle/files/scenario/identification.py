@@ -8,8 +8,7 @@ from typing import Any
 
 from ...bench.identify.dynamic import CrossPrediction, DynamicFit, cross_predict, fit_dynamic
 from ...bench.identify.dynamic.experiment import Experiment, InitialValue, stated_ambient
-from ...bench.readers import ColumnMapping, read, read_mapping
-from ...bench.readers.mapping import mapping_of_tables
+from ...bench.readers import ColumnMapping, mapping_of_tables, read, read_mapping
 from ...core import ParameterError, ShortRepr, abridged, ambient_pressure
 from ...engine.run.problem import check_signal
 from ...physics.plant.plant import Plant

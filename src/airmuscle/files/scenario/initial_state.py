@@ -13,9 +13,8 @@ import numpy as np
 
 from ...bench.identify.dynamic import InitialConditions
 from ...core import EquilibriumError, HintedText, ParameterError
+from ...physics import Coordinate, Plant
 from ...physics.equilibrium import find_equilibrium
-from ...physics.mechanism.base import Coordinate
-from ...physics.plant.plant import Plant
 from ...recording import Recording
 from ..library.files import Location, check_keys, located_errors, read_finite_number, read_table
 

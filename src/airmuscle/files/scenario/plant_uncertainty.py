@@ -9,10 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from ...bench.identify.dynamic import DynamicFit
+from ...bench import DynamicFit, PlantUncertainty
 from ...bench.identify.dynamic.fit import OF_RECORD
 from ...bench.identify.group_refits import LEVEL, degrees_of_freedom, root_mean_square, t_quantile
-from ...bench.identify.prediction import PlantUncertainty
 from ...bench.identify.prediction.dynamic import NORMAL_QUANTILE
 from ...bench.segment import estimate_noise, maximum_rate
 from ...core import Array, ParameterError, check_known, tree

@@ -23,8 +23,7 @@ from ...physics.muscle.characteristic.base import ForceLaw
 from ...physics.muscle.muscle import LENGTH_TOLERANCE
 from ...recording import Recording
 from ...recording.columns import split_unit
-from ..library import Entry, read_toml, scale_to_length
-from ..library.files import Location, check_keys, located_errors
+from ..library import Entry, Location, check_keys, located_errors, read_toml, scale_to_length
 from .identification import Record, build_records, with_observed
 from .initial_state import first_value, pressure_names, recorded_pressures
 from .scenario import Scenario, build_scenario, scenario_tables

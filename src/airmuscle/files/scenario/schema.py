@@ -16,9 +16,7 @@ from typing import Any
 
 from ...core import Parameter, parameters
 from ...engine.loop import RELATIVE, Controller, Driver
-from ...physics.muscle import Muscle
-from ...physics.plant.plant import Plant
-from ...physics.pneumatics.valve import Orifice
+from ...physics import Muscle, Orifice, Plant
 from ..library import PREDICTED, StatedBand, is_code_allowed, model_class, model_names, only_class, plant_file
 from ..library.entry import CONDITIONS, PATHS, Check, Entry
 from ..library.fields import is_required, options, origin

@@ -12,9 +12,8 @@ from ...bench.identify.dynamic import InitialValue, StartTime
 from ...bench.identify.dynamic.experiment import ParameterPaths, RecordUnknown
 from ...bench.readers import read_csv
 from ...core import ColumnError, Input, ParameterError, abridged, check_known, tree
-from ...engine.loop import Driver, SampledSignal, WithDrivers
+from ...engine import Driver, Integrator, SampledSignal, WithDrivers
 from ...engine.loop.inputs import NO_INPUT, InputSignal, Periodic, Schedule, check_input_names
-from ...engine.run import Integrator
 from ...physics.plant.plant import Plant
 from ...recording.columns import quantity_of, split_unit
 from ..library import PLANT_READER, Location, TableReader, check_keys, custom_field, located_errors, model_class

@@ -15,10 +15,7 @@ from ...bench.segment import CONTRACTION_BAND, running_median
 from ...core import AirmuscleError, Array, ParameterError, tree
 from ...engine.loop import ControlLoop, InputSignal, Periodic, SampledSignal, Schedule, WithDrivers
 from ...engine.loop.sampled_signal import ACCELERATION, spline_trajectory
-from ...physics.mechanism import Isometric, PrescribedMotion
-from ...physics.muscle import Muscle
-from ...physics.plant.plant import Plant
-from ...physics.pneumatics import ProportionalRegulator, SecondOrderLag, Supply, Valve
+from ...physics import Isometric, Muscle, Plant, PrescribedMotion, ProportionalRegulator, SecondOrderLag, Supply, Valve
 from ...recording import Recording
 from ..library import Location, model_table, scenario_toml, tables_toml, write_text
 from .plant_uncertainty import COVARIANCE_KEYS, SEPARATOR, fit_uncertainty
