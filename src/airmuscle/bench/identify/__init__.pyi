@@ -106,3 +106,16 @@ from .weighting import LeastSquares as LeastSquares
 from .weighting import Loss as Loss
 from .weighting import SoftL1 as SoftL1
 from .weighting import sensor_deviations as sensor_deviations
+
+# isort: split
+# For the other packages, not in __all__
+from .campaign.transient import is_held as is_held
+from .candidate_scores import RankedModel as RankedModel
+from .compared_points import law_of_length as law_of_length
+from .cross_validation import specimen_name as specimen_name
+from .dynamic.experiment import RecordUnknown as RecordUnknown
+from .dynamic.fit import OF_RECORD as OF_RECORD
+from .group_refits import LEVEL as LEVEL
+from .group_refits import root_mean_square as root_mean_square
+from .group_refits import widening as widening
+from .prediction.result import length_notes as length_notes

@@ -12,3 +12,8 @@ from .nonlinear_predictive import NonlinearModelPredictive as NonlinearModelPred
 from .predictive_design import PredictiveControl as PredictiveControl
 from .predictive_design import design_predictive as design_predictive
 from .state_estimator import StateEstimator as StateEstimator
+
+# isort: split
+# For the other packages, not in __all__
+from .linear_design import GAO2003 as GAO2003
+from .linear_design import HAN2009 as HAN2009

@@ -6,8 +6,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ...core import Array, ParameterError, check_known, published
-from ...physics.analysis.linear_model import LinearModel
-from ...physics.analysis.sampled_model import held
+from ...physics.analysis import LinearModel, held
 from ..laws.state_feedback import StateFeedback
 
 DISTURBANCE = ".disturbance"

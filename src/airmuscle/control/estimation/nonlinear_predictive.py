@@ -18,12 +18,9 @@ from ...core import (
 )
 from ...core.declaration import forwarded
 from ...core.errors import check_known
-from ...engine.compile.cache.kernel import Kernel
-from ...engine.compile.function import augmented_rates
-from ...engine.compile.program import compile_system
+from ...engine.compile import Kernel, augmented_rates, compile_system
 from ...engine.loop.controller import Measurement, MultivariableController, failure_notes
-from ...physics.analysis.linear_model import linearise
-from ...physics.analysis.sampled_model import held
+from ...physics.analysis import held, linearise
 from ..laws.linear_model_predictive import RAWLINGS2017
 from .estimates import StateEstimate
 from .linear_design import check_numbers, regulator

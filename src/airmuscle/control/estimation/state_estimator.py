@@ -10,8 +10,7 @@ import numpy as np
 from ...core import Array, ParameterError, ShortRepr, SolveError, Status, System, check_field_types, check_known, tree
 from ...core.declaration import forwarded
 from ...core.system import check_system, state_vector
-from ...engine.compile.function import AugmentedRates, augmented_rates, states_and_outputs
-from ...engine.compile.program import CompiledSystem, compile_system
+from ...engine.compile import AugmentedRates, CompiledSystem, augmented_rates, compile_system, states_and_outputs
 from ...engine.loop import COMMAND, Controller, Measurement
 from ...recording.recording import Recording
 from .estimates import BoundFilter, Innovation, MeasuredRows, Pass, StateEstimate

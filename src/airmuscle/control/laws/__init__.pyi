@@ -39,3 +39,10 @@ from .single_column import SlidingMode as SlidingMode
 from .single_column import SuperTwisting as SuperTwisting
 from .state_feedback import ComputedTorque as ComputedTorque
 from .state_feedback import StateFeedback as StateFeedback
+
+# isort: split
+# For the other packages, not in __all__
+from .linear_model_predictive import RAWLINGS2017 as RAWLINGS2017
+from .open_loop import static_force as static_force
+from .pressures import DIFFERENCE as DIFFERENCE
+from .state_feedback import FRANKLIN1998 as FRANKLIN1998

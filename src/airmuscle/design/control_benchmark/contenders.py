@@ -6,8 +6,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
 
-from ...control.laws import Cascade, CoContraction, ProportionalFeedback
-from ...control.laws.pressures import DIFFERENCE
+from ...control.laws import DIFFERENCE, Cascade, CoContraction, ProportionalFeedback
 from ...core import ParameterError, Value, check_field_types, leaves, model, one_line, ops
 from ...core.declaration import forwarded
 from ...core.system import select_prefix, united, with_prefix

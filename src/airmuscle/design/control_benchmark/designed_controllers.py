@@ -6,11 +6,8 @@ from typing import Any, ClassVar, NamedTuple, TypeVar
 
 import numpy as np
 
-from ...control.estimation.linear_design import GAO2003, HAN2009, design_adrc, design_lqg
-from ...control.estimation.predictive_design import design_predictive
-from ...control.laws.linear_model_predictive import RAWLINGS2017, LinearModelPredictive
-from ...control.laws.pressures import DIFFERENCE
-from ...control.laws.state_feedback import FRANKLIN1998, StateFeedback
+from ...control.estimation import GAO2003, HAN2009, design_adrc, design_lqg, design_predictive
+from ...control.laws import DIFFERENCE, FRANKLIN1998, RAWLINGS2017, LinearModelPredictive, StateFeedback
 from ...core import Reference, Value, model, ops, parameter, select_prefix, united, with_prefix
 from ...core.declaration import forwarded
 from ...engine.loop import ControlLaw, Controller, EnclosingLaw, LawDesign, Measurement, Memory, Sampled

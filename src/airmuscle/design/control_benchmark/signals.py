@@ -9,8 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from ...control.laws import AntagonisticInverse, WithStuckValve
-from ...control.laws.open_loop import static_force
+from ...control.laws import AntagonisticInverse, WithStuckValve, static_force
 from ...core import Array, ParameterError, check_known, published
 from ...engine.loop import ControlLaw, Controller, ControlLoop, Driver, SampledSignal
 from ...physics.plant.plant import Plant

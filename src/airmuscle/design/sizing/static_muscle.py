@@ -9,9 +9,8 @@ import numpy as np
 
 from ...core import Array, ParameterError, ShortRepr, SolveError
 from ...files.library import Entry, own_length, scale_entry
-from ...physics.muscle import ElasticSeriesElement, Muscle
+from ...physics.muscle import LENGTH_BOUNDS, ElasticSeriesElement, Muscle
 from ...physics.muscle.characteristic import Characteristic, ContractionLaw, ForceLaw, PressureLaw, validity_range_of
-from ...physics.muscle.ratings import LENGTH_BOUNDS
 from .requirement import SizingConditions
 
 LEAST_DIAMETERS = 3.0

@@ -10,9 +10,7 @@ import numpy.typing as npt
 from ...core import AirmuscleError, Array, flatten, leaves, structure
 from ...engine.distribution import DistributedCalls
 from ...engine.loop import COMMAND, SETPOINT, ControlLaw, ControlLoop, with_designed_laws
-from ...engine.run.batch import BatchSolution, simulate_batch
-from ...engine.run.batch.job import hidden_progress
-from ...engine.run.batch.loops import CONTROLLER
+from ...engine.run.batch import CONTROLLER, BatchSolution, hidden_progress, simulate_batch
 from ...engine.run.integrators import Integrator
 from ...physics.plant.plant import Plant
 from .case import LoopCase, loop_with_gains, with_gains

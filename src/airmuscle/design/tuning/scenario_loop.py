@@ -13,8 +13,7 @@ from ...core import Leaf, ShortRepr, conversion, leaves, quantity
 from ...core.errors import AirmuscleWarning, FileError, ParameterError, check_known
 from ...engine.loop import ControlLoop, parameter_units
 from ...files.library import Location, ParameterUncertainty, load_law, located_errors, write_text
-from ...files.scenario.controller import path_keys, signal_units
-from ...files.scenario.scenario import Scenario, build_scenario, scenario_tables
+from ...files.scenario import Scenario, build_scenario, path_keys, scenario_tables, signal_units
 from ...physics.plant.plant import Plant
 from .case import with_gains as controller_with_gains
 from .perturbations import Perturbations, PerturbedFamily, muscle_paths, perturbed_family

@@ -7,10 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...bench.identify import Fit, standard_candidates
+from ...bench.identify import LEVEL, Fit, RankedModel, standard_candidates
 from ...bench.identify.campaign import Campaign, CreepStage, ReleaseStage, StaticStage
-from ...bench.identify.candidate_scores import RankedModel
-from ...bench.identify.group_refits import LEVEL
 from ...bench.identify.specimen_errors import SpecimenErrors, ranked_specimen_errors, resting_lengths_of, specimens_of
 from ...bench.segment import maximum_rate
 from ...core import HintedText, IdentificationError, ParameterError, UnknownNameError, cite, printable, suggestion

@@ -14,3 +14,9 @@ from .simulation_chapter import describe_input as describe_input
 from .write import campaign_scenarios as campaign_scenarios
 from .write import save_scenario as save_scenario
 from .write import scenario_text as scenario_text
+
+# isort: split
+# For the other packages, not in __all__
+from .controller import path_keys as path_keys
+from .controller import signal_units as signal_units
+from .scenario import scenario_tables as scenario_tables

@@ -10,9 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...bench import DynamicFit, PlantUncertainty
-from ...bench.identify.dynamic.fit import OF_RECORD
-from ...bench.identify.group_refits import LEVEL, degrees_of_freedom, root_mean_square, t_quantile
-from ...bench.identify.prediction.dynamic import NORMAL_QUANTILE
+from ...bench.identify import LEVEL, NORMAL_QUANTILE, OF_RECORD, degrees_of_freedom, root_mean_square, t_quantile
 from ...bench.segment import estimate_noise, maximum_rate
 from ...core import Array, ParameterError, check_known, tree
 from ...physics.plant.plant import Plant

@@ -7,14 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from ...bench.identify.campaign.transient import is_held
-from ...bench.identify.compared_points import law_of_length
-from ...bench.identify.cross_validation import specimen_name
+from ...bench.identify import RecordUnknown, is_held, law_of_length, length_notes, specimen_name, widening
 from ...bench.identify.dynamic import Experiment
-from ...bench.identify.dynamic.experiment import RecordUnknown
-from ...bench.identify.group_refits import widening
 from ...bench.identify.prediction import RecordPrediction, predict_dynamic, predict_static
-from ...bench.identify.prediction.result import length_notes
 from ...bench.identify.problem import fitted_quantity_of
 from ...bench.readers.plausibility import CONTRACTION_RANGE
 from ...core import ColumnError, Hint, ParameterError

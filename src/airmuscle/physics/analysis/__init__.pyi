@@ -9,3 +9,7 @@ from .statics_of_joint import JointPoints as JointPoints
 from .statics_of_joint import JointStatics as JointStatics
 from .statics_of_joint import joint_statics as joint_statics
 from .statics_of_joint import plot_reachable_region as plot_reachable_region
+
+# isort: split
+# For the other packages, not in __all__
+from .sampled_model import held as held

@@ -30,3 +30,7 @@ from .series import ElasticSeriesElement as ElasticSeriesElement
 from .series import RigidSeriesElement as RigidSeriesElement
 from .series import SeriesElement as SeriesElement
 from .series import SeriesSpring as SeriesSpring
+
+# isort: split
+# For the other packages, not in __all__
+from .ratings import LENGTH_BOUNDS as LENGTH_BOUNDS

@@ -27,3 +27,8 @@ from .reliability import searches_at_lowest as searches_at_lowest
 from .result import DynamicFit as DynamicFit
 from .result import SensorLocation as SensorLocation
 from .result import locate_pressure_sensor as locate_pressure_sensor
+
+# isort: split
+# For the other packages, not in __all__
+from .experiment import ParameterPaths as ParameterPaths
+from .experiment import RecordUnknown as RecordUnknown

@@ -4,3 +4,8 @@ from .lanes import Single as Single
 from .run import simulate_batch as simulate_batch
 from .solution import BatchSolution as BatchSolution
 from .stepper import BatchStepper as BatchStepper
+
+# isort: split
+# For the other packages, not in __all__
+from .job import hidden_progress as hidden_progress
+from .loops import CONTROLLER as CONTROLLER
