@@ -6,16 +6,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from ...core import (
-    Array,
-    ParameterError,
-    Reference,
-    SolveError,
-    Status,
-    check_field_types,
-    published,
-    within,
-)
+from ...core import Array, ParameterError, Reference, SolveError, Status, check_field_types, published, within
 from ...core.declaration import forwarded
 from ...core.errors import check_known
 from ...engine.compile import Kernel, augmented_rates, compile_system

@@ -11,15 +11,8 @@ from ...engine.loop.controller import Measurement, MultivariableController, rela
 from ...physics.analysis.linear_model import LinearModel, linearise
 from ...physics.equilibrium import find_equilibrium
 from ...physics.plant.plant import Plant
-from ..laws.linear_model_predictive import (
-    CHISCI2001,
-    RAWLINGS2017,
-    CondensedProblem,
-    LinearModelPredictive,
-    ObserverModel,
-    PredictiveMemory,
-    TargetMap,
-)
+from ..laws import CHISCI2001, RAWLINGS2017, LinearModelPredictive
+from ..laws.linear_model_predictive import CondensedProblem, ObserverModel, PredictiveMemory, TargetMap
 from .linear_design import (
     DISTURBANCE,
     check_numbers,

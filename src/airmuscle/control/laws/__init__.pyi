@@ -42,6 +42,7 @@ from .state_feedback import StateFeedback as StateFeedback
 
 # isort: split
 # For the other packages, not in __all__
+from .linear_model_predictive import CHISCI2001 as CHISCI2001
 from .linear_model_predictive import RAWLINGS2017 as RAWLINGS2017
 from .open_loop import static_force as static_force
 from .pressures import DIFFERENCE as DIFFERENCE

@@ -15,16 +15,8 @@ from ...engine.processes import Workers, process_pool
 from ...recording import Recording
 from ..tuning import Tuning
 from ..tuning.case import check_names, with_gains
-from .commissioning import (
-    COMMISSIONING_RUNS,
-    SETS_PER_GAIN,
-    Commissioning,
-    Progress,
-    commission,
-    run_loop,
-    search_gains,
-    tuned_law,
-)
+from . import Commissioning, commission, search_gains, tuned_law
+from .commissioning import COMMISSIONING_RUNS, SETS_PER_GAIN, Progress, run_loop
 from .contenders import Contender, complete
 from .joints import BenchmarkJoint
 from .signals import TrackingMetrics, task_signals, track

@@ -11,15 +11,9 @@ from ...control.laws.single_column import PID
 from ...core import AirmuscleError, Array, ParameterError, Reference, check_field_types, published
 from ...engine.loop import Schedule, WithDrivers, commands, range_of
 from ...engine.run import Integrator, simulate
+from . import FirstOrderDeadTime, IntegratorDeadTime, UltimatePoint, first_order_of_step, integrator_of_step
 from .case import LoopCase
-from .process_models import (
-    FirstOrderDeadTime,
-    IntegratorDeadTime,
-    ProcessModel,
-    UltimatePoint,
-    first_order_of_step,
-    integrator_of_step,
-)
+from .process_models import ProcessModel
 
 
 @dataclasses.dataclass(frozen=True)

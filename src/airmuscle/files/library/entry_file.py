@@ -7,20 +7,10 @@ from typing import Any
 
 from ...core import ParameterError, Reference, UnknownNameError
 from ...physics.muscle.geometry.base import Geometry
+from . import Location, entries_of_product, is_path, list_laws, located_errors, read_text, read_toml
 from .build import build
 from .entry import Entry, PlantEntry, ProductEntry, ValveEntry, issue_warning
-from .files import (
-    FOLDERS,
-    Location,
-    complete_name,
-    entries_of_product,
-    is_path,
-    list_laws,
-    list_names,
-    located_errors,
-    read_text,
-    read_toml,
-)
+from .files import FOLDERS, complete_name, list_names
 
 NOUNS: Mapping[type[Any], str] = {
     ValveEntry: "valve", PlantEntry: "plant", ProductEntry: "product", Entry: "muscle or law",

@@ -17,24 +17,14 @@ from ...core import FileError, ParameterError, Reference, abridged
 from ...engine.loop.driver import Driver, SolenoidDriver
 from ...physics import ForceLaw, Muscle, Orifice, Plant
 from ...recording import Recording
+from . import Location, check_keys, list_data, located_errors, read_finite_number, read_table, read_text, read_toml
 from .build import TableReader, build
 from .entry import MISSING_GEOMETRY, PATHS, AnyEntry, Entry, PlantEntry, ValveEntry, issue_warning
 from .entry_file import build_entry, entry_tables, kind_of, load_law, load_valve, tables_of_name
-from .files import (
-    DATA,
-    Location,
-    check_keys,
-    complete_name,
-    list_data,
-    located_errors,
-    read_finite_number,
-    read_table,
-    read_text,
-    read_toml,
-)  # fmt: skip
+from .files import DATA, complete_name
 from .scaling import scale_entry
 
-SCENARIO_TABLES = ("plant", "input", "run", "output")
+SCENARIO_TABLES: tuple[str, ...] = ("plant", "input", "run", "output")
 """Tables of a plant of the library that a scenario has, too."""
 SIZES = ("resting_length", "diameter")
 """Sizes to which a table that names a library entry may scale its muscle."""
