@@ -12,8 +12,7 @@ from ...core.errors import check_known
 from ...engine.compile.cache.kernel import Kernel
 from ...recording.recording import Recording
 from ..laws.linear_model_predictive import TOLERANCES, UNLIMITED
-from .estimates import StateEstimate
-from .kalman_filters import ExtendedKalmanFilter
+from . import ExtendedKalmanFilter, StateEstimate
 
 MAX_HORIZON, STEPS, SETTLED = 200, 20, 1e-9
 """Maximum number of samples of a window; Gauss-Newton steps, and the step in standard deviations that ends them

@@ -15,13 +15,10 @@ from ...engine.processes import Workers, process_pool
 from ...recording import Recording
 from ..tuning import Tuning
 from ..tuning.case import check_names, with_gains
-from . import Commissioning, commission, search_gains, tuned_law
+from . import BenchmarkJoint, BenchmarkTruth, Commissioning, Contender, commission, complete, search_gains, tuned_law
 from .commissioning import COMMISSIONING_RUNS, SETS_PER_GAIN, Progress, run_loop
-from .contenders import Contender, complete
-from .joints import BenchmarkJoint
 from .signals import TrackingMetrics, task_signals, track
 from .tasks import STANDARD_TASKS, ControlTask
-from .truths import BenchmarkTruth
 
 REST_TASK, REST_LIFE = "hold", 10_000.0
 """Task at whose end the joint rests, and life [h] of the busiest valve that an engineer requires there (chosen)."""

@@ -13,8 +13,7 @@ from ...core.system import select_prefix, united, with_prefix
 from ...engine.loop import ControlLaw, Controller, Measurement, Memory, Sampled, SigmaDelta, SplitRange, WithSensors
 from ...engine.run.compiled_law import LawSample
 from ..tuning import load_scenario_loop
-from .joints import BenchmarkJoint
-from .tasks import StuckValve
+from . import BenchmarkJoint, StuckValve
 from .truths import SIDES
 
 ELSEWHERE = (

@@ -11,11 +11,10 @@ from ...core import Array, ParameterError, ShortRepr, check_whole, leaves
 from ...engine.loop import Driver, WithSensors
 from ...engine.run import simulate
 from ...physics.plant.plant import Plant
-from .benchmark import ContenderResult
+from . import ContenderResult, ControlTask
 from .commissioning import on_truth
 from .joints import ENCODER_STEP, BenchmarkJoint
 from .signals import TaskSignals, task_loop, task_signals
-from .tasks import ControlTask
 
 SIGNAL, RATE = "feed_forward", "feed_forward_rate"
 REPETITIONS = 30

@@ -7,8 +7,7 @@ import numpy as np
 
 from ...core import BLACK, DASHES, LINES, MARKERS, legend_below, new_figure
 from ...report.chapter import Plot
-from .benchmark import BenchmarkResult, Group, RunKey
-from .learning import LearningCurve
+from . import BenchmarkResult, Group, LearningCurve, RunKey
 
 MAX_PANELS = 4
 DRAWN = ("step", "sine 2 Hz", "minimum jerk", "load change", "torque disturbance", "sine 1 Hz", "valve stuck", "hold")

@@ -16,9 +16,8 @@ from ...physics.plant.plant import Plant
 from ...physics.pneumatics import REFERENCE_DENSITY, FillDischarge, WithTubes, absolute_pressure
 from ...recording import Recording
 from ..study.metrics import time_mean
+from . import BenchmarkJoint, ControlTask, JointMotion
 from .contenders import SensedController
-from .joints import BenchmarkJoint
-from .tasks import ControlTask, JointMotion
 
 TORQUE_INPUT = "external_torque"
 BISECTIONS = 40

@@ -22,8 +22,7 @@ from ...engine.run import solve
 from ...engine.run.output_times import output_times
 from ...files.scenario.scenario import Scenario
 from ...recording import Recording
-from .result import StudyResult
-from .study import Study, load_study
+from . import Study, StudyResult, load_study
 
 RUN_ERRORS = (AirmuscleError, ArithmeticError, ValueError)
 """Exceptions that fail a single run, without ending the study."""

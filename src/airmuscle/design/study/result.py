@@ -21,8 +21,7 @@ import numpy.typing as npt
 
 from ...core import Array, ColumnError, ShortRepr, check_known
 from ...report.chapter import BY_ROW, Table, TableColumn
-from .design import Saltelli
-from .study import Study
+from . import Saltelli, Study
 
 CONFIDENCE = 0.95
 BOOTSTRAP_SAMPLES = 1000

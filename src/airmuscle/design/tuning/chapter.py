@@ -11,9 +11,8 @@ from ...engine.loop.control_loop import SETPOINT, ControlLoop
 from ...engine.run import Integrator, simulate
 from ...recording import Recording
 from ...report.chapter import BY_ROW, Chapter, NamedValue, Plot, Table, TableColumn
+from . import RuleSettings, Tuning
 from .case import loop_with_gains
-from .result import Tuning
-from .rules import RuleSettings
 
 DISPLAY = {"Pa": (1e-5, "bar"), "m": (1e3, "mm"), "rad": (180 / np.pi, "deg")}
 """Factor and unit in which the controlled column is displayed."""

@@ -13,9 +13,8 @@ from ...engine.loop import COMMAND, SETPOINT, ControlLaw, ControlLoop, with_desi
 from ...engine.run.batch import CONTROLLER, BatchSolution, hidden_progress, simulate_batch
 from ...engine.run.integrators import Integrator
 from ...physics.plant.plant import Plant
+from . import CaseMetrics, TrackingIndex
 from .case import LoopCase, loop_with_gains, with_gains
-from .result import CaseMetrics
-from .tracking import TrackingIndex
 
 MAX_VALUES = 20_000_000
 """Values of all columns of one batch, which is 160 MB; more sets of gains are simulated in several batches (chosen)."""

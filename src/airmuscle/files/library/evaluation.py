@@ -12,8 +12,7 @@ from ...core.errors import AirmuscleWarning, GeometryLimitError, ParameterError,
 from ...physics.muscle.characteristic import Characteristic, ForceLaw, ValidityRange, validity_range_of
 from ...physics.muscle.isobars import Isobars, WorkingPoint, compute_isobars, describe_point, isobar_figure
 from ...report.chapter import Chapter, NamedValue, Plot, Table, TableColumn
-from .entry import Entry
-from .scaling import own_length
+from . import Entry, own_length
 
 UNITS = {"pressure": "Pa", "contraction": "1", "force": "N"}
 

@@ -16,12 +16,9 @@ from ...physics import Characteristic, ContractileSurface, Geometry, NoFriction
 from ...physics.muscle.muscle import LENGTH_TOLERANCE
 from ...recording import Recording
 from ...report.shown import value_text
+from . import ParameterUncertainty, StatedBand, is_path, load_law, model_class, model_names
 from .entry import MISSING_GEOMETRY, Entry
-from .entry_file import load_law
-from .fields import model_class, model_names
-from .files import is_path
 from .scaling import entry_at_length
-from .uncertainty import ParameterUncertainty, StatedBand
 
 MAX_NAMES, MAX_NAME = 3, 60
 """Maximum number of file names in a title, and of characters of each (chosen)."""
