@@ -104,7 +104,7 @@ def test_what_the_records_were_made_with_is_found_written_and_simulated(folder, 
 def test_a_fit_can_be_stored_and_loaded_by_another_process(folder):
     """A campaign keeps the fits of its finished stages; what was compiled is compiled again."""
     study = load_dynamic_fit(folder / "study.toml")
-    fit = dataclasses.replace(study, starts=1).fit()
+    fit = dataclasses.replace(study, search=dataclasses.replace(study.search, starts=1)).fit()
     again = pickle.loads(pickle.dumps(fit))
     assert again.rms("pressure", 1) == fit.rms("pressure", 1)
     assert again.plant(1) == fit.plant(1)

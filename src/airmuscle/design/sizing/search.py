@@ -78,13 +78,6 @@ def catalogue() -> tuple[Entry, ...]:
     return tuple(entry for entry in entries if not entry.warning)
 
 
-def products_without_law() -> tuple[UnsuitableMuscle, ...]:
-    """Products of the library of which no law is published, as unsuitable muscles."""
-    with_law = set(products_of_laws().values())
-    names = (name for name in list_products() if name not in with_law)
-    return tuple(UnsuitableMuscle(name, 0, "no law of this product is published") for name in names)
-
-
 @functools.cache
 def load_quietly(name: str) -> Entry:
     """A law of the library or of a file, without its warning. Raises UnknownNameError or FileError."""
@@ -124,8 +117,10 @@ def size_muscles(
         choices += choices_of_entry
         unsuitable += [] if choices_of_entry else [failed]
     unsuitable.sort(key=lambda item: item.count == 0)
-    others = products_without_law() if muscles is None else ()
-    return SizingResult(requirement, conditions, rank(choices, sort), (*unsuitable, *others), entries)
+    known = products_of_laws().values()
+    without_law = [name for name in list_products() if name not in known] if muscles is None else []
+    unsuitable += [UnsuitableMuscle(name, 0, "no law of this product is published") for name in without_law]
+    return SizingResult(requirement, conditions, rank(choices, sort), tuple(unsuitable), entries)
 
 
 def _choices_of(

@@ -28,15 +28,6 @@ _DISPLAY_UNITS = {
 """Factor and unit in which quantities with these SI units are displayed."""
 
 
-def study_plots(result: StudyResult, indices: dict[str, SobolIndices]) -> tuple[Plot, ...]:
-    """All plots of a study."""
-    plots = [_histograms(result)] if result.study.scalars else []
-    plots += [_scatter(result, name) for name in result.study.scalars]
-    if indices:
-        plots.append(_sensitivity_bars(result, indices))
-    return (*plots, *(_time_series_plot(result, name) for name in result.study.time_series))
-
-
 def _display_scale(unit: str) -> tuple[float, str]:
     """Factor and unit in which a quantity with an SI unit is displayed."""
     return _DISPLAY_UNITS.get(unit, (1.0, unit))
@@ -184,6 +175,9 @@ def study_chapter(result: StudyResult, *, execution: str = "") -> Chapter:
     `execution` is a paragraph on the processes that have computed the runs.
     """
     study, indices = result.study, result.indices()
+    plots = [_histograms(result), *(_scatter(result, name) for name in study.scalars)] if study.scalars else []
+    plots += [_sensitivity_bars(result, indices)] if indices else []
+    plots += [_time_series_plot(result, name) for name in study.time_series]
     tables = [result.statistics()] if study.scalars else []
     tables += [sensitivity_table(study, indices)] if indices else []
     tables += [failure_table(result)] if result.failed.size else []
@@ -195,7 +189,7 @@ def study_chapter(result: StudyResult, *, execution: str = "") -> Chapter:
             NamedValue("runs", len(study), brief=False),
             NamedValue("failed runs", int(result.failed.size), brief=False),
         ),
-        plots=study_plots(result, indices),
+        plots=tuple(plots),
         tables=(*tables, variation_table(study)),
         notes=tuple(_notes(result, indices)),
         references=tuple(cite(study.template.scenario.plant)),

@@ -190,13 +190,9 @@ def load_data(name: str) -> Recording:
     recording: Recording = read_csv(path)
     lines = path.read_text(encoding="utf-8").splitlines()
     header = " ".join(line.lstrip("# ") for line in lines if line.startswith("#") and " = " not in line)
-    return dataclasses.replace(recording, notes=(*recording.notes, header), references=_data_references(path))
-
-
-def _data_references(path: Path) -> tuple[Reference, ...]:
-    """References of a data set, from the file on the sources of its folder."""
     file = path.parent / "references.toml"
-    for source in read_toml(file)["source"]:
-        if path.stem in source["data_sets"]:
-            return tuple(Reference(**reference) for reference in source["reference"])
-    raise FileError(f"{file}: there is no source of the data set '{path.stem}'.")
+    sources = [source["reference"] for source in read_toml(file)["source"] if path.stem in source["data_sets"]]
+    if not sources:
+        raise FileError(f"{file}: there is no source of the data set '{path.stem}'.")
+    references = tuple(Reference(**reference) for reference in sources[0])
+    return dataclasses.replace(recording, notes=(*recording.notes, header), references=references)
