@@ -32,7 +32,7 @@ from airmuscle.papers.saga2007_muscle import (
     interpretation,
     with_rings,
 )
-from airmuscle.papers.saga2007_previous import PREVIOUS_MODEL, Ferraresi2001
+from airmuscle.papers.saga2007_previous import Ferraresi2001
 from airmuscle.physics import (
     AxialIntegral,
     CircularArc,
@@ -359,7 +359,7 @@ def test_the_previous_model_with_evenly_spread_fibres_is_the_pair_of_circle_and_
 
 
 def test_the_circle_of_the_previous_model_moves_with_pressure_at_a_load_and_not_at_a_contraction():
-    at_load, at_contraction = PREVIOUS_MODEL.claims("")
+    at_load, at_contraction = claims.ROWS["previous model"].claims("")
     assert (at_load.verdict, at_contraction.verdict) == (HOLDS, DIFFERS)
     assert at_contraction.reproduced == pytest.approx(1.0, rel=1e-9)
     model = Ferraresi2001(LINE_A)
@@ -706,7 +706,7 @@ def test_the_greatest_error_of_the_angle_is_that_of_all_angles_not_of_three():
 
 
 def test_the_printed_model_leaves_both_muscles_slack_and_the_circular_one_is_accurate():
-    verdicts = {c.case: (c.reproduced, c.verdict) for c in joining.FEED_FORWARD.claims("")}
+    verdicts = {c.case: (c.reproduced, c.verdict) for c in claims.ROWS["feed-forward of a pair"].claims("")}
     assert len(verdicts) == 6
     for line in ("A", "B"):
         assert verdicts[rf"printed, \(w = 2\), \(q = 1\), line {line}"] == (100.0, DIFFERS)

@@ -12,12 +12,12 @@ from ..bench.identify.surface.exponential import SurfaceFit, SurfaceProblem, fit
 from ..core import STANDARD_GRAVITY, Array
 from ..physics.muscle.characteristic.borzikova import BORZIKOVA, SAM_30X290, PlaneCurves
 from ..report.chapter import Chapter
-from ..report.claims import AtLeast, Claim, ClaimRow, Equal, Kind, claims_of
+from ..report.claims import AtLeast, Claim, Equal, claims_of
 from ..report.formatting import format_number, typographic
 from . import borzikova_surfaces as drawn
 from .borzikova_surfaces import Laws, index_on_curves, plots, round_contraction, sample, surfaces
 from .borzikova_tables import CATALOGUE_TABLE, CATALOGUE_TEXT, tables
-from .run import chapter_texts
+from .run import chapter_texts, claim_row
 
 PAPER = "borzikova"
 MAX_LINEARISATIONS = 50
@@ -120,56 +120,29 @@ _TABLE = dict(zip(CATALOGUE_TABLE["diameter [mm]"], CATALOGUE_TABLE["load at 3.5
 _TEXT = dict(zip(CATALOGUE_TEXT["diameter [mm]"], CATALOGUE_TEXT["load [kg]"], strict=True))
 _DIAMETERS = {load: diameter for diameter, load in _TEXT.items()}
 
-CURVES: tuple[ClaimRow, ...] = tuple(
-    ClaimRow("correlation index of the plane curve", Equal(curve.printed_index, 0.0005), "1", None,
-        "The index compares the curve with the measured points, which are lost, so it cannot be computed.",
-        {f"{curve.force:g} N": ()}, untestable=True, place="Fig. 4, plane curves")
-    for curve in SAM_30X290.curves
+CURVES = tuple(
+    claim_row(PAPER, "index of a curve", None, {f"{c.force:g} N": ()}, Equal(c.printed_index, 0.0005))
+    for c in SAM_30X290.curves
+)
+_LEAST_INDEX = AtLeast(min(c.printed_index for c in SAM_30X290.curves), 0.0005, derived=True)
+SURFACE = claim_row(PAPER, "index of a surface", surface_index, {name: (name,) for name in SURFACES}, _LEAST_INDEX)
+RANK = claim_row(PAPER, "rank", design_rank)
+PROCEDURE = claim_row(PAPER, "procedure", linearised_ratio, {
+    r"linear fit of \(\ln(1 - k/k_\text{max})\)": (False,), r"repeated linearisation of \(f\) (Gauss-Newton)": (True,),
+})  # fmt: skip
+LOAD = claim_row(PAPER, "load", lambda: 26.0 * STANDARD_GRAVITY)
+CATALOGUE = (
+    *(claim_row(PAPER, "lifted load", lambda size: float(_TEXT[size]), {case: (size,)}, Equal(float(_TABLE[size])))
+      for size, case in ((30, "30 x 290"), (20, "20 x 210"))),
+    claim_row(PAPER, "smallest muscle", lambda: float(_DIAMETERS[3])),
 )  # fmt: skip
-SURFACE = ClaimRow(
-    "correlation index of the surface on the three plane curves, not below the minimum printed for these",
-    AtLeast(min(c.printed_index for c in SAM_30X290.curves), 0.0005, derived=True), "1", surface_index,
-    cases={name: (name,) for name in SURFACES},
-    place="equation (1), printed matrix",
-)  # fmt: skip
-RANK = ClaimRow(
-    rf"{len(SAM_30X290.curves)} loads determine the coefficients of equation (1), of degree 4 in \(p\) and 2 in \(F\)",
-    Equal(15.0, derived=True), "1", design_rank,
-    r"Rank of the design matrix. Three loads determine a quadratic in \(F\) exactly, so no load can be left out for "
-    "validation.", kind=Kind.CHECK,
-)  # fmt: skip
-PROCEDURE = ClaimRow(
-    r"the linearised fit of equation (1) minimises \(S(A)\): ratio of its rms error to that of least squares on \(k\)",
-    Equal(1.0, 0.005, derived=True), "1", linearised_ratio, "Plane curves rounded to 0.5 %:",
-    {r"linear fit of \(\ln(1 - k/k_\text{max})\)": (False,),
-     r"repeated linearisation of \(f\) (Gauss-Newton)": (True,)}, place=r"method, sum \(S(A)\)",
-)  # fmt: skip
-LOAD = ClaimRow(
-    "a load of 26 kg is 260 N", Equal(260.0, 0.5), "N", lambda: 26.0 * STANDARD_GRAVITY,
-    r"The paper uses \(g\) = 10 m/s²; with standard gravity the loads are 44.1, 127.5 and 255.0 N. The printed values "
-    "are used.", place="plane curves",
-)  # fmt: skip
-CATALOGUE: tuple[ClaimRow, ...] = (
-    *(ClaimRow("catalogue table: load that the muscle lifts at 3.5 bar", Equal(float(_TABLE[size])), "kg",
-        lambda size: float(_TEXT[size]), "The reproduced value is the load in the text of the same paper at 25 % "
-        "contraction and an unknown pressure; the table gives the force at 3.5 bar. The two cannot be compared.",
-        {case: (size,)}, untestable=True, place="catalogue") for size, case in ((30, "30 x 290"), (20, "20 x 210"))),
-    ClaimRow("catalogue table: diameter of the smallest muscle", Equal(6.0), "mm", lambda: float(_DIAMETERS[3]),
-        "The text gives the same length of 150 mm and the same load of 3 kg with this diameter.",
-        place="catalogue"),
-)  # fmt: skip
-MUSCLE: tuple[ClaimRow, ...] = (
-    ClaimRow("text: 25 % contraction under a load", AtLeast(25.0), "%", largest_of_size, untestable=True,
-        cases={f"{load} kg, diameter {size} mm": (size,) for size, load in _TEXT.items()}, place="catalogue"),
-    ClaimRow(r"the contraction saturates at \(k_\text{max}\) = 40 %: maximum over the pressure range",
-        Equal(100.0 * SATURATION, 0.5), "%", lambda curves: largest_contraction(curves, "smallest"),
-        place="equation (1)"),
-    ClaimRow("a load is needed in the initial position", None, "N", initial_load, untestable=True,
-        place="text"),
-    ClaimRow("the characteristic is the mean of filling and emptying", None, "%", lambda curves: None,
-        "The two branches are not printed, so that neither the hysteresis nor the error of the mean can be computed.",
-        untestable=True, place="text"),
-)  # fmt: skip
+_SIZES = {f"{load} kg, diameter {size} mm": (size,) for size, load in _TEXT.items()}
+MUSCLE = (
+    claim_row(PAPER, "contraction under a load", largest_of_size, _SIZES),
+    claim_row(PAPER, "saturation", lambda curves: largest_contraction(curves, "smallest")),
+    claim_row(PAPER, "initial position", initial_load),
+    claim_row(PAPER, "mean of the branches", lambda curves: None),
+)
 
 
 def claims(curves: PlaneCurves, laws: Laws) -> tuple[Claim, ...]:

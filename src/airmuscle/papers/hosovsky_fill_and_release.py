@@ -1,7 +1,6 @@
 """Fill and discharge, Fig. 3 of Hošovský et al., and the quick release of their load."""
 
 import dataclasses
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -11,11 +10,11 @@ import airmuscle as am
 
 from ..core import BLACK, DASHES, LINES, legend_below, new_figure
 from ..report.chapter import Plot, Table
-from ..report.claims import AtLeast, AtMost, Claim, ClaimRow
+from ..report.claims import AtLeast, AtMost, Claim
 from ..report.formatting import format_unit
 from . import hosovsky_plant as rig
 from .hosovsky_plant import FORCE_MAPS, MATRIX, UnpublishedParameters, hanging_load, latched_load, plant
-from .run import captioned
+from .run import captioned, claim_row
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -92,16 +91,10 @@ RELEASE_SCHEDULE = am.Schedule({"latched": ((0.0, 1.0), (RELEASED_AT, 0.0))})
 MAX_DAMPING_DIFFERENCE = 0.30
 """Maximum relative difference of comparable damping, as a fraction of the larger value (chosen)."""
 COMPARABLE = AtMost(MAX_DAMPING_DIFFERENCE, chosen=True)
-STATEMENTS: Mapping[str, ClaimRow] = {
-    "acceleration": ClaimRow("a higher initial pressure gives a higher initial acceleration: difference",
-        AtLeast(0.0, derived=True), "m/s2", place="Fig. 4"),
-    "contraction": ClaimRow("a higher initial pressure gives a larger maximum contraction: difference",
-        AtLeast(0.0, derived=True), "%", place="Fig. 4"),
-    "relative damping": ClaimRow("relative damping is comparable: relative difference of the damping ratios",
-        COMPARABLE, "1", place="Fig. 4"),
-    "absolute damping": ClaimRow("absolute damping is comparable: relative difference of the decay rates",
-        COMPARABLE, "1", place="Fig. 4"),
-}  # fmt: skip
+STATEMENTS = {
+    **{key: claim_row(rig.PAPER, key, printed=AtLeast(0.0, derived=True)) for key in ("acceleration", "contraction")},
+    **{key: claim_row(rig.PAPER, key, printed=COMPARABLE) for key in ("relative damping", "absolute damping")},
+}
 """The four statements of the paper on the quick release, each with its criterion."""
 
 

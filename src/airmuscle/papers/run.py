@@ -9,12 +9,14 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor, as_completed
 from importlib import resources
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from ..core import check_writable
 from ..engine.processes import process_pool
 from ..files.library.files import complete_name
 from ..report.chapter import Chapter, Plot, Table
+from ..report.claims import AtLeast, AtMost, ClaimRow, Equal, Kind, PublishedValue
 from ..report.write import with_rendered_figures, write_report
 
 PAPERS: dict[str, str] = {
@@ -88,13 +90,13 @@ def select_papers(papers: Sequence[str] | None) -> list[str]:
 
 
 @functools.cache
-def _all_texts() -> dict[str, Any]:
-    return tomllib.loads(resources.files(__package__).joinpath("texts.toml").read_text(encoding="utf-8"))
+def _entries(file: str) -> dict[str, Any]:
+    return tomllib.loads(resources.files(__package__).joinpath(file).read_text(encoding="utf-8"))
 
 
 def chapter_texts(paper: str) -> dict[str, Any]:
     """Return the texts of a chapter as arguments of `Chapter`; line breaks within a paragraph are spaces."""
-    texts = _all_texts()[paper]
+    texts = _entries("texts.toml")[paper]
     rows = {key: tuple(map(tuple, value)) for key, value in texts.items() if isinstance(value, list)}
     tables = {key: tuple((k, _in_one_line(v)) for k, v in value.items())
               for key, value in texts.items() if isinstance(value, dict)}  # fmt: skip
@@ -103,13 +105,30 @@ def chapter_texts(paper: str) -> dict[str, Any]:
 
 def captioned(name: str, figure: Any) -> Plot:
     """Return a figure of a chapter with its caption in texts.toml."""
-    return Plot(name, _in_one_line(_all_texts()["figures"][name]), figure)
+    return Plot(name, _in_one_line(_entries("texts.toml")["figures"][name]), figure)
 
 
 def titled(name: str, columns: Mapping[str, Any], **options: Any) -> Table:
     """Return a table of a chapter with its title and note in texts.toml, except those among the `options`."""
-    texts = {key: _in_one_line(text) for key, text in _all_texts()["tables"][name].items()}
+    texts = {key: _in_one_line(text) for key, text in _entries("texts.toml")["tables"][name].items()}
     return Table(name, columns=columns, **{**texts, **options})
+
+
+def claim_row(
+    paper: str, name: str, reproduce: Callable[..., Any] | None = None,
+    cases: Mapping[str, tuple[Any, ...]] = MappingProxyType({"": ()}), printed: PublishedValue | None = None,
+) -> ClaimRow:  # fmt: skip
+    """Return the row of a claim whose statement, value, unit, place and note are in claims.toml.
+
+    `reproduce` and `cases` are those of ClaimRow; `printed` is the value where claims.toml states none.
+    """
+    entry: dict[str, Any] = dict(_entries("claims.toml")[paper][name])
+    entry |= {key: _in_one_line(value) for key, value in entry.items() if isinstance(value, str)}
+    options = {key: entry.pop(key) for key in ("tolerance", "chosen", "derived") if key in entry}
+    for key, criterion in (("equal", Equal), ("at_least", AtLeast), ("at_most", AtMost)):
+        printed = criterion(entry.pop(key), **options) if key in entry else printed
+    kind = Kind(entry.pop("kind", Kind.CLAIM.value))
+    return ClaimRow(printed=printed, reproduce=reproduce, cases=cases, kind=kind, **entry)
 
 
 def _in_one_line(text: str) -> str:

@@ -15,33 +15,15 @@ from ..report.claims import claims_of
 from . import saga2007_muscle as values
 from . import saga2007_pairs
 from .run import chapter_texts, titled
-from .saga2007_claims import ACCURACY_LIMIT, FIRST_PERCENT, HIGHER_PRESSURE, LITTLE_CHANGE, LOW_PRESSURE, ROWS
+from .saga2007_claims import ROWS
 from .saga2007_figures import plots
-from .saga2007_joint import LIMIT, feed_forward_table
+from .saga2007_joint import feed_forward_table
 from .saga2007_muscle import DEFAULT, INTERPRETATIONS, LINES, exact_meridian, with_rings
 from .saga2007_previous import previous_model_table
 
 CONTRACTIONS = np.array([0.001, 0.01, 0.05, 0.10, 0.20, 0.35])
 LOADS = (0.0, 100.0, 200.0)
 """Loads of the tables [N] (chosen)."""
-CHOSEN = (
-    ("wall thickness, fibres, fibre length, end diameter", "2 mm, 16, 72 mm, 12 mm", "Table 1"),
-    ("rubber, line A", r"\(0.1263\,\varepsilon + 0.3\) MPa", "text; the unit MPa is inferred from the axes of Fig. 4"),
-    ("rubber, line B", r"\(0.3\,\varepsilon + 0.1263\) MPa", "chosen: slope and intercept exchanged"),
-    ("fibre sum", "5.126", "chosen: (15) without the fibre beyond the half; the printed limit gives 4.931"),
-    ("rings", r"equal segments in series, width 0, diameter \(d_0\)", "chosen: not printed"),
-    ("loads", "0, 50, 100, 200 N", "chosen: Fig. 8 states none"),
-    ("limit of a low pressure", f"{LOW_PRESSURE / 1e6:g} MPa", "chosen: a quarter of the axis of Fig. 8"),
-    ("limit of accuracy in the comparisons", f"{100 * ACCURACY_LIMIT:g} % of the pressure", "chosen"),
-    ("contraction at which 200 N is a maximum of its own", f"{100 * FIRST_PERCENT:g} %", "chosen"),
-    ("little change of the pressure", f"{100 * LITTLE_CHANGE:g} % from 10 to 30 % contraction", "chosen"),
-    ("thicker wall", f"{1e3 * values.THICK_WALL:g} mm", "chosen"),
-    ("pressure that a muscle with rings withstands", f"{HIGHER_PRESSURE:g} times that without", "chosen"),
-    ("pressures and load of Fig. 1", "0.11 and 0.16 MPa, 100 N", "chosen"),
-    ("pair of muscles under feed-forward control", "radius 12 mm, 8 % at angle 0, 50 N, to 15 degrees", "chosen"),
-    ("error of the angle of this pair", f"{LIMIT:g} % of the greatest angle", "chosen"),
-    ("initial radius in the table of the previous model", r"\(r_i = r_0\) and \(r_i = 0.9\,r_0\)", "chosen"),
-)
 
 
 def chapter() -> Chapter:
@@ -62,7 +44,6 @@ def chapter() -> Chapter:
         ),
         plots=plots(),
         references=(SAGA_2007, FERRARESI_2001, DAERDEN_LEFEBER_2001),
-        chosen=CHOSEN,
         **chapter_texts(values.PAPER),
     )
 

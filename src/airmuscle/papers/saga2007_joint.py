@@ -15,7 +15,6 @@ import airmuscle as am
 from ..core import BLACK, DASHES, Array, legend_outside, new_figure
 from ..core import LINES as COLOURS
 from ..report.chapter import Plot, Table
-from ..report.claims import AtMost, ClaimRow, Kind
 from ..report.formula import to_mathtext
 from . import saga2007_muscle as values
 from .run import captioned, titled
@@ -32,8 +31,6 @@ LINE = tuple(np.radians(np.arange(1.0, 15.5)))
 Angles = tuple[float, ...]
 REACH = np.radians(25.0)
 """Greatest angle [rad] of the search for the angle that is reached: contractions of 0.7 % to 15.3 % (chosen)."""
-LIMIT = 10.0
-"""Error of the greatest angle [%] up to which feed-forward alone is called accurate (chosen)."""
 GRID = 31
 """Angles of the search, between which the torque is interpolated by a cubic spline."""
 
@@ -120,16 +117,6 @@ def relative_angle_error(name: str, line: str) -> tuple[float, str]:
     error = max_angle_error(name, line)
     slack = "With the pressures of this model both muscles are slack: the joint is not moved, error 100 %."
     return 100.0 * float(np.nan_to_num(error / ANGLES[-1], nan=1.0)), slack if np.isnan(error) else ""
-
-
-FEED_FORWARD = ClaimRow(
-    "Feed-forward control of a pair of muscles, greatest error of all angles relative to the greatest angle",
-    AtMost(LIMIT, chosen=True), "%", relative_angle_error,
-    f"Pulley radius {1e3 * RADIUS:g} mm, {100 * OFFSET:g} % contraction at angle 0, {TENSION:g} N in both muscles, "
-    f"angles to {np.degrees(ANGLES[-1]):g} degrees: chosen. The paper describes no control experiment.",
-    {f"{name}, line {line}": (name, line) for line in LINES for name in models(LINES[line])
-     if name != "exact meridian"}, Kind.FINDING,
-)  # fmt: skip
 
 
 def feed_forward_table() -> Table:

@@ -10,7 +10,6 @@ import airmuscle as am
 
 from ..core import BLACK, DASHES, LINES, ParameterError, SolveError, new_figure
 from ..report.chapter import Plot, Table
-from ..report.claims import AtLeast, ClaimRow
 from . import saga2007_pairs as pairs
 from .run import captioned
 from .saga2007_muscle import DIAMETER, LENGTH, PRESSURE, WALL, exact_meridian
@@ -22,8 +21,6 @@ FIG_1 = (PRESSURE, 0.16e6)
 """Gauge pressures [Pa] of Fig. 1 (chosen: that of the claims, and the end of the axis of Fig. 8)."""
 FIG_1_LOAD = 100.0
 """Load of Fig. 1 [N] (chosen)."""
-RADIUS_CHANGE = 1.05
-"""Ratio of two radii from which on the circle changes (chosen)."""
 INITIAL_RADIUS_RATIO = 0.9
 """Ratio of initial to end radius in the table, to show the term of the two radii (chosen)."""
 
@@ -144,14 +141,6 @@ def radii_at_contraction() -> tuple[float, str]:
         f"{held[1] / 1e6:.3g} MPa. The circle depends on the contraction only, by sin(φ)/φ = 1 − ε; the pressure of a "
         "wanted contraction and load is then explicit, also in this model."
     )
-
-
-PREVIOUS_MODEL = ClaimRow(
-    "Fig. 1: centre and radius of the circular meridian change with pressure: ratio of the radii",
-    AtLeast(RADIUS_CHANGE, chosen=True), "1", lambda radii: radii(), place="Fig. 1, equations (A) and (B)",
-    cases={f"line A, constant load of {FIG_1_LOAD:g} N": (radii_at_load,),
-           "line A, constant contraction": (radii_at_contraction,)},
-)  # fmt: skip
 
 
 def previous_model_table() -> Table:
