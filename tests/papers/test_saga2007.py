@@ -19,11 +19,10 @@ from airmuscle.core import autodiff, flatten, structure
 from airmuscle.errors import GeometryLimitError, ParameterError, SolveError
 from airmuscle.files import load
 from airmuscle.papers import chapter_texts
-from airmuscle.papers import saga2007_claims as claims
+from airmuscle.papers import saga2007 as claims
 from airmuscle.papers import saga2007_joint as joining
 from airmuscle.papers import saga2007_muscle as values
 from airmuscle.papers import saga2007_pairs as pairs
-from airmuscle.papers.saga2007 import chapter, virtual_work
 from airmuscle.papers.saga2007_muscle import (
     DEFAULT,
     circular_meridian,
@@ -460,7 +459,7 @@ def test_the_balances_break_virtual_work_by_as_much_as_the_reference_says():
     law = replace(exact_mechanics(LINE_A), rubber=RubberLine(0.0, 0.0))
     truth = 1e5 * exact_meridian(LINE_A).geometry.effective_area(0.2)
     assert law.force(1e5, 0.2) / truth - 1 == pytest.approx(0.143, abs=5e-4)
-    assert virtual_work(law, 1e5, 0.2) / truth - 1 == pytest.approx(-0.476, abs=5e-4)
+    assert claims.virtual_work(law, 1e5, 0.2) / truth - 1 == pytest.approx(-0.476, abs=5e-4)
 
 
 # The claims
@@ -494,7 +493,7 @@ def test_a_contraction_below_a_thousandth_is_found_with_its_note():
 
 @pytest.fixture(scope="module")
 def whole():
-    return chapter()
+    return claims.chapter()
 
 
 def test_the_accuracy_is_not_testable_and_compared_with_the_exact_meridian_on_every_line(whole):

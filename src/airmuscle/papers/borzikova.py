@@ -116,8 +116,10 @@ def initial_load(curves: PlaneCurves) -> tuple[None, str]:
     )
 
 
-_TABLE = dict(zip(CATALOGUE_TABLE["diameter [mm]"], CATALOGUE_TABLE["load at 3.5 bar [kg]"], strict=True))
-_TEXT = dict(zip(CATALOGUE_TEXT["diameter [mm]"], CATALOGUE_TEXT["load [kg]"], strict=True))
+_TABLE, _TEXT = (
+    dict(zip(each.columns["diameter [mm]"], each.columns[load], strict=True))
+    for each, load in ((CATALOGUE_TABLE, "load at 3.5 bar [kg]"), (CATALOGUE_TEXT, "load [kg]"))
+)
 _DIAMETERS = {load: diameter for diameter, load in _TEXT.items()}
 
 CURVES = tuple(

@@ -108,10 +108,14 @@ def captioned(name: str, figure: Any) -> Plot:
     return Plot(name, _in_one_line(_entries("texts.toml")["figures"][name]), figure)
 
 
-def titled(name: str, columns: Mapping[str, Any], **options: Any) -> Table:
-    """Return a table of a chapter with its title and note in texts.toml, except those among the `options`."""
-    texts = {key: _in_one_line(text) for key, text in _entries("texts.toml")["tables"][name].items()}
-    return Table(name, columns=columns, **{**texts, **options})
+def titled(name: str, columns: Mapping[str, Any] | None = None, **options: Any) -> Table:
+    """Return a table of a chapter with its title and note in texts.toml, except those among the `options`.
+
+    Without `columns`, it is a table that the paper prints, whose columns are in texts.toml, too.
+    """
+    entry = dict(_entries("texts.toml")["tables"][name])
+    columns = entry.pop("columns", columns)
+    return Table(name, columns=columns, **{**{key: _in_one_line(text) for key, text in entry.items()}, **options})
 
 
 def claim_row(

@@ -1,5 +1,9 @@
-"""Report chapter: Saga, Nakamura and Yaegashi 2007, the straight-fibre muscle, its tables and its verdict."""
+"""Report chapter: Saga, Nakamura and Yaegashi 2007, the straight-fibre muscle, its claims and tables.
 
+The function of each claim takes the model: the verdict follows from its fibre sum, projection factor and rubber.
+"""
+
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -11,15 +15,90 @@ from ..physics.muscle.characteristic.saga2007 import RUBBER_TEST_STRAIN
 from ..physics.muscle.geometry.meridian import FERRARESI_2001, SAGA_2007
 from ..physics.muscle.geometry.pleated import DAERDEN_LEFEBER_2001
 from ..report.chapter import Chapter, Table
-from ..report.claims import claims_of
+from ..report.claims import Claim, claims_of
 from . import saga2007_muscle as values
 from . import saga2007_pairs
-from .run import chapter_texts, titled
-from .saga2007_claims import ROWS
+from .run import chapter_texts, claim_row, titled
 from .saga2007_figures import plots
-from .saga2007_joint import feed_forward_table
-from .saga2007_muscle import DEFAULT, INTERPRETATIONS, LINES, exact_meridian, with_rings
-from .saga2007_previous import previous_model_table
+from .saga2007_joint import feed_forward_table, models, relative_angle_error
+from .saga2007_muscle import DEFAULT, INTERPRETATIONS, LINES, PAPER, PRESSURE, exact_meridian, with_rings
+from .saga2007_previous import FIG_1_LOAD, previous_model_table, radii_at_contraction, radii_at_load
+
+HIGHER_PRESSURE = 2.0
+"""Ratio of the pressure that a muscle with rings withstands to that of the muscle without (chosen)."""
+FIRST_PERCENT = 0.01
+"""Contraction at which the largest force is taken [1] (chosen): at 0 inextensible fibres hold any force."""
+
+B, A = values.interpretation_name(2, 1, "B"), values.interpretation_name(2, 1, "A")
+"""Names of the default, and of the printed model with line A."""
+MECHANICS = {f"exact mechanics, line {name}": values.exact_mechanics(line) for name, line in LINES.items()}
+EXACT = {f"exact meridian, line {name}": exact_meridian(line) for name, line in LINES.items()}
+PRINTED: dict[str, am.characteristic.Saga2007] = {B: DEFAULT, A: values.interpretation(LINES["A"], 2.0, 1.0)}
+LAWS: Mapping[str, values.Law] = {**PRINTED, **MECHANICS, **EXACT}
+"""Default, printed model, the two of exact mechanics, and the exact meridian with both rubber lines."""
+
+
+def _each(laws: Mapping[str, Any], *loads: float) -> dict[str, tuple[Any, ...]]:
+    """Return the cases of all laws, each with every load [N] if there are any."""
+    if not loads:
+        return {name: (law,) for name, law in laws.items()}
+    return {f"{name}, {load:g} N": (law, load) for name, law in laws.items() for load in loads}
+
+
+OUTLINE = "outline by (2), (3)"
+_REPRODUCED: Mapping[str, tuple[Any, ...]] = {
+    "contraction": (values.contraction, _each({B: DEFAULT, **EXACT})),
+    "lifting": (values.lifting, _each({B: DEFAULT, **INTERPRETATIONS, **EXACT})),
+    "max tension": (lambda: PRESSURE * float(exact_meridian(LINES["A"]).geometry.effective_area(0.35)),
+                    {"tension at 35 %, any rubber": ()}),
+    "largest force": (lambda law: float(values.tension(law, PRESSURE, FIRST_PERCENT)), _each(LAWS)),
+    "low start": (lambda law: values.initial_pressure(law) / 1e6, _each(PRINTED)),
+    "rings contract less": (values.ring_ratio, _each({B: DEFAULT}, 0.0, 100.0) | _each({A: PRINTED[A]}, 0.0)),
+    "strains": (lambda law, load: values.strength_ratio(law, load, lambda muscle, c: muscle.middle_strain(c)),
+                _each({B: DEFAULT}, 200.0)),
+    "tensions": (
+        lambda law, load: values.strength_ratio(law, load, lambda muscle, c: muscle.end_tension(PRESSURE, c, load)),
+        _each({B: DEFAULT}, 200.0)),
+    "ring force": (values.ring_force_ratio, {
+        f"{name}, {case}": (law, factor) for name, law in {**PRINTED, **EXACT}.items()
+        for factor, case in ((1.0, "equal pressure"), (HIGHER_PRESSURE, f"{HIGHER_PRESSURE:g} times the pressure"))}),
+    "accurate": (),
+    "deviates": (),
+    "cause": (),
+    "error below 20 %": (lambda law, load: values.pressure_error(law, load, 0.01, 0.20, 20),
+                         _each({**PRINTED, **MECHANICS}, 100.0)),
+    "error above 20 %": (lambda law, load: values.pressure_error(law, load, 0.25, 0.40, 16),
+                         _each({**PRINTED, **MECHANICS}, 100.0)),
+    "rubber test": (lambda: 100 * DEFAULT.contraction_at_strain(RUBBER_TEST_STRAIN), {OUTLINE: ()}),
+    "thickness": (lambda: 1 / (1 + float(DEFAULT.middle_strain(0.20))), {OUTLINE: ()}),
+    "thinning": (values.thinning,
+                 {f"exact mechanics, line B, 100 N, {100 * at:g} %": (at,) for at in (0.20, 0.40)}),
+    "outlines": (values.largest_radius, {OUTLINE: (DEFAULT,)}),
+    "feed-forward": (values.share_reached, _each({B: DEFAULT}, 100.0) | _each({A: PRINTED[A]}, 0.0)),
+    "feed-forward of a pair": (relative_angle_error, {
+        f"{name}, line {line}": (name, line) for line in LINES for name in list(models(LINES[line]))[:-1]}),
+    "high start": (lambda law: values.initial_pressure(law) / float(law.equilibrium_pressure(0.10, 0.0)),
+                   _each(PRINTED)),
+    "axis": (lambda law, load: float(np.max(law.equilibrium_pressure(np.linspace(0.0, 0.4, 81), load))) / 1e6,
+             _each({B: DEFAULT}, 0.0, 200.0)),
+    "expansion": (values.middle_strain, {
+        f"{name}, {at} %": (exact, at / 100) for at in (20, 35)
+        for name, exact in ((OUTLINE, False), ("exact outline without rubber", True))}),
+    "little change": (values.pressure_change, _each(LAWS, 0.0, 100.0)),
+    "thick wall": (values.wall_ratio, _each({**PRINTED, **EXACT})),
+    "previous model": (lambda radii: radii(), {
+        f"line A, constant load of {FIG_1_LOAD:g} N": (radii_at_load,),
+        "line A, constant contraction": (radii_at_contraction,)}),
+}  # fmt: skip
+"""The function of each claim and its cases, by the names in claims.toml and in the order of the report."""
+ROWS = {name: claim_row(PAPER, name, *given) for name, given in _REPRODUCED.items()}
+"""All rows by name."""
+
+
+def claim(row: str, *arguments: Any) -> Claim:
+    """Return the claim of one row for other arguments than those of its cases."""
+    return ROWS[row].claim(PAPER, "", *arguments)
+
 
 CONTRACTIONS = np.array([0.001, 0.01, 0.05, 0.10, 0.20, 0.35])
 LOADS = (0.0, 100.0, 200.0)
@@ -29,8 +108,8 @@ LOADS = (0.0, 100.0, 200.0)
 def chapter() -> Chapter:
     """Return the chapter of the report: claims with verdicts, tables, figures, and the sources of all values."""
     return Chapter(
-        values.PAPER,
-        claims=claims_of(ROWS.values(), values.PAPER),
+        PAPER,
+        claims=claims_of(ROWS.values(), PAPER),
         tables=(
             interpretation_table(),
             exact_table(),
@@ -44,7 +123,7 @@ def chapter() -> Chapter:
         ),
         plots=plots(),
         references=(SAGA_2007, FERRARESI_2001, DAERDEN_LEFEBER_2001),
-        **chapter_texts(values.PAPER),
+        **chapter_texts(PAPER),
     )
 
 
@@ -101,7 +180,7 @@ def limit_table() -> Table:
 
 def virtual_work_table() -> Table:
     """Return the tension of the balances and of virtual work, -p dV/dL - dU/dL, for the same outlines."""
-    contraction, pressure, line = saga2007_pairs.CONTRACTIONS, values.PRESSURE, LINES["B"]
+    contraction, pressure, line = saga2007_pairs.CONTRACTIONS, PRESSURE, LINES["B"]
     forces = {
         values.interpretation_name(2, 1, "B"): DEFAULT.force(pressure, contraction),
         "exact mechanics, line B": values.exact_mechanics(line).force(pressure, contraction),
