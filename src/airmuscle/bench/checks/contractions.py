@@ -27,8 +27,6 @@ MAX_CONTRACTION = 0.55
 """Greatest contraction at which a pneumatic muscle pulls: pleated muscles without membrane stretch reach at most
 2 (1 - E(1/2)/K(1/2)) = 54.3 %, that of a slender `PleatedTube` at zero force (Daerden and Lefeber 2001); braided ones
 at most 1 - 1/(sqrt(3) cos(angle)), 42 % (Chou and Hannaford 1996)."""
-PULLING = 0.05
-"""Force of a row that pulls, as a fraction of the maximum force (chosen)."""
 PRESSURE_LEVELS, MIN_RISING = 6, 0.8
 """Number of intervals of pressure in which the slope of the force over the contraction is judged, and minimum share of
 those in which the force rises (chosen)."""
@@ -63,7 +61,8 @@ def check_contraction_limit(recordings: Sequence[Recording]) -> Iterator[str]:
     """A muscle that pulls beyond `MAX_CONTRACTION`. Raises ColumnError where it pulls nowhere else."""
     given = recordings_with(recordings, *BenchRows._fields)
     rows = bench_rows(given)
-    beyond = rows.contraction[(rows.contraction > MAX_CONTRACTION) & (rows.force > PULLING * rows.greatest)]
+    pulling = rows.pulling.contraction
+    beyond = pulling[pulling > MAX_CONTRACTION]
     if not beyond.size or not rows.greatest > 0:
         return
     low, high = limits(beyond)
@@ -73,7 +72,7 @@ def check_contraction_limit(recordings: Sequence[Recording]) -> Iterator[str]:
         f"pneumatic muscle pulls beyond {100 * MAX_CONTRACTION:.3g} %. Check the units of the length and of the "
         "resting length (a length in cm under a heading in mm?)."
     )
-    if limits(rows.contraction[rows.force > PULLING * rows.greatest])[0] > MAX_CONTRACTION:
+    if limits(pulling)[0] > MAX_CONTRACTION:
         raise ColumnError(text)
     yield text
 
@@ -151,10 +150,8 @@ def check_missing_codes(recordings: Sequence[Recording]) -> Iterator[HintedText]
     """A column whose extreme reading is a code for a missing value, far from all other readings."""
     found: dict[tuple[str, float], list[tuple[str, int]]] = {}
     for each in recordings:
-        for name in each.columns:
-            code = find_missing_code(each, name)
-            if code is not None:
-                found.setdefault((name, code.value), []).append((each.origin, int(np.count_nonzero(code.rows))))
+        for name, code in _missing_codes(each).items():
+            found.setdefault((name, code.value), []).append((each.origin, int(np.count_nonzero(code.rows))))
     for (name, value), places in found.items():
         rows = counted(sum(count for _, count in places), "row")
         yield HintedText(
@@ -166,9 +163,14 @@ def check_missing_codes(recordings: Sequence[Recording]) -> Iterator[HintedText]
 
 def without_missing_codes(recordings: Sequence[Recording]) -> list[Recording]:
     """The recordings without the rows in which a value is missing."""
-    codes = [[code.rows for name in each.columns if (code := find_missing_code(each, name)) is not None]
-             for each in recordings]  # fmt: skip
-    return [each.rows(~np.any(own, axis=0)) if own else each for each, own in zip(recordings, codes, strict=True)]
+    missing = [[code.rows for code in _missing_codes(each).values()] for each in recordings]
+    return [each.rows(~np.any(own, axis=0)) if own else each for each, own in zip(recordings, missing, strict=True)]
+
+
+def _missing_codes(recording: Recording) -> dict[str, MissingCode]:
+    """The codes for missing values by column."""
+    codes = {name: find_missing_code(recording, name) for name in recording.columns}
+    return {name: code for name, code in codes.items() if code is not None}
 
 
 def find_missing_code(recording: Recording, name: str) -> MissingCode | None:

@@ -35,7 +35,7 @@ _STATE = Hint("To state the unit", "units", {"pressure": ...}, "ColumnMapping")
 
 def check_lowest_pressures(recordings: Sequence[Recording]) -> Iterator[HintedText]:
     """A lowest pressure of all files that is that of the atmosphere, where the muscle does not pull."""
-    unstated = [each for each in recordings_with(recordings, "pressure") if _is_unstated(each)]
+    unstated = [each for each in recordings_with(recordings, "pressure") if _states_reference(each) is False]
     if not unstated:
         return
     first = min(unstated, key=lambda each: float(each["pressure"].min()))
@@ -140,17 +140,12 @@ def _begins_at_ambient(recording: Recording, greatest: float) -> bool:
     return bool(near_rest.any() and slack[near_rest].all())
 
 
-def _is_unstated(recording: Recording) -> bool:
-    """Whether the file does not state gauge or absolute pressure."""
+def _states_reference(recording: Recording) -> bool | None:
+    """Whether the file states an absolute or a gauge pressure, which leaves no doubt; None for arrays."""
     unit = recording.units.get("pressure")
     with contextlib.suppress(UnitError):
-        return unit is not None and conversion(unit, "Pa").assumed_gauge
-    return False
-
-
-def _states_reference(recording: Recording) -> bool:
-    """Whether the file states an absolute or a gauge pressure, which leaves no doubt; False for arrays."""
-    return recording.units.get("pressure") is not None and not _is_unstated(recording)
+        return None if unit is None else not conversion(unit, "Pa").assumed_gauge
+    return True
 
 
 MAX_OFFSET = 0.05
@@ -219,11 +214,9 @@ def check_force_zero(recordings: Sequence[Recording]) -> Iterator[str]:
     rows = bench_rows(given)
     if not rows.force.size or not rows.greatest > 0:
         return
-    places = (
-        ("at zero pressure and shortened length", rows.slack),
-        ("over a range of contractions at constant pressure", of_bench.slack_plateaus(given)),
-    )
-    for place, slack in places:
+    places = {"at zero pressure and shortened length": rows.slack}
+    places["over a range of contractions at constant pressure"] = of_bench.slack_plateaus(given)
+    for place, slack in places.items():
         reading = float(np.median(slack.force)) if slack.force.size >= MIN_ROWS else 0.0
         low = -MAX_OFFSET * rows.greatest <= reading < -MAX_ZERO * rows.greatest and _is_constant(slack)
         if reading > MAX_ZERO * rows.greatest or low:
