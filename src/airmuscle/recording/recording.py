@@ -121,8 +121,7 @@ class Recording(NotebookDisplay):
         """A column in the given SI unit, shape (N,).
 
         A column of an unknown quantity, such as `height [mm]`, is stored without conversion. It is converted here from
-        the unit in its heading, unless `unit` is None, and its name may be given as 'height'. Raises ColumnError or
-        UnitError.
+        the unit in its heading, unless `unit` is None; its name may be 'height'. Raises ColumnError or UnitError.
         """
         for heading, values in self.columns.items():
             plain, heading_unit = split_unit(heading)
@@ -155,8 +154,7 @@ class Recording(NotebookDisplay):
         return pd.DataFrame({column_heading(name): values for name, values in self.columns.items()})
 
     def plot(self, *names: str, ax: Any = None) -> Any:
-        """Plot the named columns, or all, over time, or over the row number without time: one panel for each quantity,
-        with set points and measurements together.
+        """Plot the named columns, or all, over time or else the row number, each quantity in one panel.
 
         `ax` is a Matplotlib Axes, or a sequence of one for each panel; it is returned. Without it, a new figure is
         returned. Raises ColumnError for an unknown column, ParameterError if `ax` contains too few Axes.
@@ -169,8 +167,7 @@ class Recording(NotebookDisplay):
 
         The muscles bulge as their geometry does and are coloured by their pressure. `speed` is that of the display, 1
         for real time. `animation.save("run.gif")` writes it (.gif, .mp4, .html), `animation.still(time)` is the figure
-        at a time [s]; a notebook shows it. Raises ParameterError for another plant, ColumnError for a column that is
-        missing.
+        at a time [s]; a notebook shows it. Raises ParameterError for another plant, ColumnError for a missing column.
         """
         if not hasattr(plant, "animate"):
             raise ParameterError(f"animate: {one_line(plant)} is no plant; give the Plant of the run.")

@@ -94,10 +94,9 @@ class Claim:
 
     `case` names the interpretation, load or range for which the statement is evaluated; a statement with several cases
     counts once. `printed` is None if the paper gives no value to compare with, `reproduced` is None if no value can be
-    computed; in both cases the verdict is "not printed". `untestable` marks a statement that no
-    computation can decide, because its measurements are lost, its condition is not printed or every law fulfils it: its
-    verdict is "not testable". `place` is where the paper states it, `note` gives the reason of a difference, or the
-    values chosen.
+    computed; in both cases the verdict is "not printed". `untestable` marks a statement that no computation can decide,
+    because its measurements are lost, its condition is not printed or every law fulfils it: it is "not testable".
+    `place` is where the paper states it, `note` gives the reason of a difference, or the values chosen.
     """
 
     paper: str

@@ -5,8 +5,7 @@
                "settings": [...], "references": [...], "units": {...}}}
 
 Keys are the names with underscores: `rms error` is `rms_error`. `units` gives the SI unit of each value, `rms_error`,
-and of each column of a table, `parameters.value`; "by row" is that of the column `unit`. A long series is in its file
-in data/ alone.
+and of each column of a table, `parameters.value`; "by row" is that of the column `unit`. A long series is in its file.
 """
 
 import csv

@@ -39,8 +39,7 @@ _SUPERSCRIPTS = str.maketrans("0123456789ij", "⁰¹²³⁴⁵⁶⁷⁸⁹ⁱʲ"
 def format_number(value: Any, digits: int = DIGITS) -> str:
     """Return a number rounded to significant digits; integers and text unchanged, an en dash for None and NaN.
 
-    Magnitudes from 1e-4 to 1e6 are written without an exponent; zero has no sign. A truth value is yes or no, a pair a
-    range, `1 to 2`.
+    Magnitudes from 1e-4 to 1e6 have no exponent, zero has no sign. A truth value is yes or no, a pair `1 to 2`.
     """
     if value is None:
         return MISSING

@@ -46,8 +46,7 @@ class ShownColumn:
 def shown_columns(table: Table, *, chosen: bool = True, brief: bool = False) -> list[ShownColumn]:
     """The columns of a table as they are shown, in the units of the user's choice or, for a file, in the declared ones.
 
-    A meaning that is that of the row above, such as the one of all coefficients of a polynomial, is shown once. The
-    brief view has its rows and columns only.
+    A meaning that is that of the row above, as of the coefficients of a polynomial, is shown once.
     """
     rows = table.brief_rows if brief else list(range(len(table)))
     columns = {name: each for name, each in table.columns.items() if each.brief or not brief}

@@ -20,8 +20,7 @@ _UNIT = re.compile(r"\[[^\]]*\]")
 
 
 def as_text(chapters: Sequence[Chapter], width: int, rest: str = "the report") -> str:
-    """The brief view of the chapters; `rest` names the place of what it leaves out. A result that the chapter before
-    states as well is not repeated."""
+    """The brief view of the chapters, each result once; `rest` names the place of what it leaves out."""
     texts, stated = list[str](), tuple[str, ...]()
     for chapter in (each for each in chapters if each.brief):
         result = chapter.paragraphs[:1]
@@ -96,8 +95,7 @@ def _row(cells: Sequence[str], widths: Sequence[int], right: Sequence[bool], gap
 
 
 def _widths(headings: Sequence[str], cells: Sequence[Sequence[str]], width: int) -> tuple[list[int], int]:
-    """The widths of the columns and the space between them: headings are wrapped first, then cells, words and numbers
-    are not broken."""
+    """The widths of the columns and the space between them: headings are wrapped first, then cells between words."""
     of_cells = [max(map(cell_width, texts), default=1) for texts in cells]
     widths = [max(cell_width(heading), size) for heading, size in zip(headings, of_cells, strict=True)]
     words = [_longest_word(heading) for heading in headings]

@@ -28,8 +28,7 @@ MAX_CONTRACTION = 0.55
 2 (1 - E(1/2)/K(1/2)) = 54.3 %, that of a slender `PleatedTube` at zero force (Daerden and Lefeber 2001); braided ones
 at most 1 - 1/(sqrt(3) cos(angle)), 42 % (Chou and Hannaford 1996)."""
 PRESSURE_LEVELS, MIN_RISING = 6, 0.8
-"""Number of intervals of pressure in which the slope of the force over the contraction is judged, and minimum share of
-those in which the force rises (chosen)."""
+"""Number of intervals of pressure, and minimum share of those in which the force rises with contraction (chosen)."""
 MIN_LEVEL_ROWS, MIN_RANGE = 6, 0.02
 """Minimum number of rows and minimum range of the contraction of such an interval (chosen)."""
 

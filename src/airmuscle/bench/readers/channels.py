@@ -162,8 +162,7 @@ def _rounding(time: Array) -> float:
 
 
 def to_cells(values: Any) -> Cells:
-    """Values as cells of a RawTable: numbers as floats, dates as seconds from the first, durations in seconds, anything
-    else as text."""
+    """Values as cells of a RawTable: numbers as floats, dates and durations in seconds (from the first), or texts."""
     array = np.asarray(values)
     if array.dtype.kind in "Mm":
         durations = array - array[0] if array.dtype.kind == "M" else array

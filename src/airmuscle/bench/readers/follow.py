@@ -19,8 +19,7 @@ from .plausibility import CONTRACTION_RANGE, MAX_MAGNITUDE
 from .text_format import TextFormat, TextHeader, has_content, is_comment, parse_header, split_cells
 
 MAX_UNREADABLE, MAX_HEADER_LINES, MAX_LINE = 100, 1000, 65536
-"""Consecutive unreadable rows, lines before the first row of numbers, and characters of a line, after which a stream is
-refused (chosen)."""
+"""Unreadable rows in succession, lines before the first numbers, and characters of a line that are refused (chosen)."""
 
 
 class RowReader:
@@ -28,8 +27,7 @@ class RowReader:
 
     mapping  columns, units, constants and `skip_rows` of the stream; nothing else of a mapping applies to one
 
-    `skipped` counts rows that could not be read: a damaged or incomplete line of a serial log is left out. `notes` are
-    the assumptions on units, as of `read_csv`.
+    `skipped` counts rows that could not be read, such as damaged lines. `notes` are those of `read_csv` on units.
     """
 
     def __init__(self, origin: str, mapping: ColumnMapping = ColumnMapping()) -> None:
@@ -45,8 +43,7 @@ class RowReader:
     def read(self, line: str) -> dict[str, float] | None:
         """The quantities of a line [SI]; None for a line of the header, a comment, or a row that cannot be read.
 
-        Raises ColumnError, FileError or UnitError for a header without known quantities, or for too many unreadable
-        rows in succession.
+        Raises ColumnError, FileError or UnitError for a header without known quantities, or too many unreadable rows.
         """
         self._line += 1
         if not has_content(line) or self._line <= (self.mapping.skip_rows or 0):

@@ -24,8 +24,7 @@ from .time_base import TimeBase, seconds_from_clock
 MAX_QUOTED = 180
 """Maximum number of characters of headings in a message (chosen)."""
 MAX_LABELS, MIN_LABEL_ROWS = 8, 3
-"""Maximum number of different texts of a column that is kept, such as names of specimens, and minimum number of rows of
-each (chosen)."""
+"""Maximum number of different texts of a column that is kept, and minimum number of rows of each (chosen)."""
 
 
 def interpret(table: RawTable, mapping: ColumnMapping, constants: Mapping[str, float | str] | None = None) -> Recording:

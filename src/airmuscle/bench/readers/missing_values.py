@@ -117,8 +117,7 @@ class MissingValues(abc.ABC):
 
     @abc.abstractmethod
     def treat(self, table: RawTable, headings: Sequence[Heading]) -> RawTable:
-        """The table in which every cell of a known quantity is a number or a time. Raises ColumnError, which lists
-        the cells that are not."""
+        """The table with a number or time in each cell of a known quantity. Raises ColumnError, which lists others."""
 
 
 @dataclasses.dataclass(frozen=True)

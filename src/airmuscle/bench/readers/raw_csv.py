@@ -175,8 +175,7 @@ def read_text_stream(
 ) -> RawTable:
     """The table in a stream, such as a pipe, which is read once to its end and has an unknown length.
 
-    With Decimation, one row in 2, 4, 8, ... is kept as soon as more than `max_rows` rows have been read. Raises
-    FileError or ColumnError.
+    With Decimation, one row in 2, 4, 8, ... is kept as soon as there are more. Raises FileError or ColumnError.
     """
     beginning = stream.read(_HEADER_BYTES)
     if not beginning.strip():

@@ -148,8 +148,7 @@ def parse_header(origin: str, lines: NumberedLines, text_format: TextFormat) -> 
 def _lines_above_headings(body: NumberedLines, text_format: TextFormat) -> int:
     """The number of lines above the headings, such as the title and the settings of a logger.
 
-    The headings are where the user states them; otherwise the line above the first row of numbers that has as many
-    cells, or the line above the unit row.
+    The headings are where the user states them, else the line of as many cells above the first numbers or unit row.
     """
     cells_of = ((i, split_cells(line, text_format.detect_delimiter(line))) for i, line in body)
     stated = header.stated_heading_row(cells_of, text_format.named, text_format.skip_rows)

@@ -68,8 +68,7 @@ class TimeBase(abc.ABC):
 
     @abc.abstractmethod
     def apply(self, table: RawTable, time: Array) -> tuple[Array | None, str]:
-        """The time [s], shape (N,), or None without any, and a note, from the recorded time (N,). Raises
-        ColumnError."""
+        """The time [s], shape (N,), or None, and a note, from the recorded time (N,). Raises ColumnError."""
 
 
 @dataclasses.dataclass(frozen=True)

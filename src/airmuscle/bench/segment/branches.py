@@ -61,8 +61,7 @@ def find_branches(
     """The branches of a recording in order; empty if there is no pressure or if the driven quantity is constant.
 
     A reversal exceeds the fraction `reversal` of the range of the driven quantity and ten standard deviations of its
-    sensor; `sensor` is that of the pressure. `runs` are those of `find_runs`. Without time, the order of the rows is
-    taken as the history.
+    sensor; `sensor` is that of the pressure, `runs` are those of `find_runs`. Without time, rows are taken in order.
     """
     if "pressure" not in recording or len(recording) < 3:
         return ()

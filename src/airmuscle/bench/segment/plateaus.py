@@ -19,8 +19,7 @@ from .sensor import Sensor, count_rows, estimate_sensors
 SETTLING_TIME = 0.1
 MAX_CHANGE = 0.01
 NOISE_FACTOR = 5.7
-"""A difference of two readings below this multiple of the standard deviation of the sensor is noise: four standard
-deviations of the difference (chosen)."""
+"""Difference of two readings that is noise, in standard deviations of one: four of the difference (chosen)."""
 _MONITORED = ("pressure", *MOVED)
 
 

@@ -2,10 +2,9 @@
 
 A run with constant pressure is isobaric, with constant length or contraction isometric, with constant force isotonic. A
 quantity is constant if it stays within `RELATIVE_BAND` of its maximum (within `CONTRACTION_BAND` for a contraction), or
-within the noise of its sensor. A run is isotonic only if its motion was measured. A file may contain
-many consecutive runs, as tables of static points do: these are runs at the levels of the quantity that explains the
-most rows. A pressure that oscillates within `RIPPLE_BAND` while the muscle is moved is the ripple of its regulator, and
-counts as constant.
+within the noise of its sensor. A run is isotonic only if its motion was measured. A file may contain many consecutive
+runs, as tables of static points do: these are at the levels of the quantity that explains the most rows. A pressure
+that only oscillates within `RIPPLE_BAND` while the muscle is moved, the ripple of its regulator, counts as constant.
 """
 
 import dataclasses
@@ -80,8 +79,7 @@ def find_runs(recording: Recording, sensors: Mapping[str, Sensor] | None = None)
 
 
 def _runs_of_points(recording: Recording, points: StaticPoints) -> tuple[Run, ...]:
-    """The runs of static points at one pressure or length each, whose rows follow each other; one run of kind FREE if
-    neither do."""
+    """The runs of static points at one pressure or length each, whose rows follow each other; else one of kind FREE."""
     for kind, name, levels, swept in (
         (ISOBARIC, "pressure", points.pressure_level, points.moved),
         (ISOMETRIC, points.moved, points.length_level, "pressure"),

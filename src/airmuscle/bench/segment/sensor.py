@@ -28,8 +28,7 @@ class Sampling:
     """Number of rows, duration [s], sample time [s], jitter as a fraction of the median step, and irregularities.
 
     The sample time is the median step; where time stamps repeat without decreasing, as rounded ones do, the mean step.
-    Rows are counted from 0; the time of `repeated_rows` equals, and that of `backward_rows` precedes, the time of the
-    previous row.
+    Rows are counted from 0; the time of `repeated_rows` equals that of the row before, `backward_rows` have an earlier.
     """
 
     rows: int
@@ -131,8 +130,7 @@ def estimate_sensors(recordings: Recording | Sequence[Recording]) -> Mapping[str
     """The sensors of the columns of a recording, or of several recordings from one test rig, by column name.
 
     Several recordings show the limits more reliably, because a single run may hardly reach them. Resolution and noise
-    are medians over the recordings. Recordings without rows do not count; static points (`find_static_points`) show the
-    resolution only.
+    are medians over the recordings that have rows. Static points (`find_static_points`) show the resolution only.
     """
     given = (recordings,) if isinstance(recordings, Recording) else tuple(recordings)
     several = [recording for recording in given if len(recording)]
@@ -205,8 +203,7 @@ def _are_multiples(steps: Array, step: float) -> bool:
 def _upper_limit(runs: list[Array], resolution: float) -> float:
     """The upper limit at which readings saturate; infinite without saturation.
 
-    The readings must stay constant at the limit for many more consecutive rows than at any other reading, and the
-    sensor must have noise elsewhere.
+    Readings stay constant at a limit for many more consecutive rows than elsewhere, where the sensor has noise.
     """
     combined = np.concatenate(runs)
     top, tolerance = float(combined.max()), 0.25 * resolution

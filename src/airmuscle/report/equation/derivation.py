@@ -16,8 +16,7 @@ from .intervals import Bounds, traced_expression, within
 MAX_OPERATIONS = 600
 """Maximum number of operations of an equation that is shown (chosen)."""
 MIN_SHARED_OPERATIONS = 3
-"""Minimum number of operations of a part that occurs twice and gets a symbol of its own; one less for a part that
-occurs more often (chosen)."""
+"""Minimum operations of a part that occurs twice and gets its own symbol; one less if it occurs more often (chosen)."""
 MAX_INNER_TERMS = 6
 """Maximum number of terms of a sum inside a function or product; a longer one gets a symbol of its own (chosen)."""
 BAR = 1e5
@@ -88,8 +87,7 @@ def law_equation(
 
     The first has the parameters as symbols. If the law is a polynomial of scaled arguments, the second is the same
     polynomial in the physical quantities, the pressure in bar. No equation if the law has no closed form, or one of
-    more than `MAX_OPERATIONS` operations. Limits and extrapolations that are not reached within the ranges are left
-    out.
+    more than `MAX_OPERATIONS` operations. Limits and extrapolations beyond the ranges are left out.
     """
     traced = _trace(law, quantity, arguments, ranges)
     if traced is None:
