@@ -17,7 +17,7 @@ from ..core import DASHES, LINES, Array, new_figure
 from ..report.chapter import Plot, Table
 from ..report.formula import to_mathtext
 from . import hosovsky_plant as rig
-from .hosovsky_plant import MATRIX, ChosenValue, UnpublishedParameters, hanging_load, plant
+from .hosovsky_plant import MATRIX, Choice, UnpublishedParameters, hanging_load, plant
 from .run import captioned, titled
 
 SPACING = 4e-3
@@ -30,26 +30,20 @@ PHASES = {"filling": rig.FILLING, "discharging": rig.DISCHARGING}
 class SuspectedCauses:
     """Parameters of the suspected causes; the paper prints only the length of the line, that of the sensor."""
 
-    line_length: ChosenValue = ChosenValue(
-        1.0, 0.5, 2.0, "m", "line from valve to muscle", "printed for the sensor line"
-    )
-    line_diameter: ChosenValue = ChosenValue(4e-3, 2.5e-3, 6e-3, "m", "inner diameter of the line")
-    critical_ratio: ChosenValue = ChosenValue(0.25, 0.2, 0.5, "1", "critical pressure ratio of the valve with fittings")
-    index: ChosenValue = ChosenValue(0.65, 0.5, 0.7, "1", "subsonic index of the valve")
-    laminar_ratio: ChosenValue = ChosenValue(0.97, 0.96, 0.99, "1", "pressure ratio above which the flow is laminar")
-    heat_transfer: ChosenValue = ChosenValue(0.5, 0.1, 2.0, "W/K", "heat transfer coefficient times area, wall to air")
-    hardening: ChosenValue = ChosenValue(
-        100.0, 50.0, 200.0, "1", r"hardening \(h\) of the spring, \(k\,(1 + h\,\varepsilon^2)\)"
-    )
-    wall_compliance: ChosenValue = ChosenValue(2e-11, 5e-12, 5e-11, "m3/Pa", "compliance of the wall")
-    wall_time_constant: ChosenValue = ChosenValue(0.2, 0.05, 1.0, "s", "time constant of the viscoelastic wall")
-    series_stiffness: ChosenValue = ChosenValue(
-        1e5, 5e4, 3e5, "N/m", "series spring of Fig. 1, stiffness at zero stretch"
-    )
-    series_hardening: ChosenValue = ChosenValue(
+    line_length: Choice = Choice(1.0, 0.5, 2.0, "m", "line from valve to muscle", "printed for the sensor line")
+    line_diameter: Choice = Choice(4e-3, 2.5e-3, 6e-3, "m", "inner diameter of the line")
+    critical_ratio: Choice = Choice(0.25, 0.2, 0.5, "1", "critical pressure ratio of the valve with fittings")
+    index: Choice = Choice(0.65, 0.5, 0.7, "1", "subsonic index of the valve")
+    laminar_ratio: Choice = Choice(0.97, 0.96, 0.99, "1", "pressure ratio above which the flow is laminar")
+    heat_transfer: Choice = Choice(0.5, 0.1, 2.0, "W/K", "heat transfer coefficient times area, wall to air")
+    hardening: Choice = Choice(100.0, 50.0, 200.0, "1", r"hardening \(h\) of the spring, \(k\,(1 + h\,\varepsilon^2)\)")
+    wall_compliance: Choice = Choice(2e-11, 5e-12, 5e-11, "m3/Pa", "compliance of the wall")
+    wall_time_constant: Choice = Choice(0.2, 0.05, 1.0, "s", "time constant of the viscoelastic wall")
+    series_stiffness: Choice = Choice(1e5, 5e4, 3e5, "N/m", "series spring of Fig. 1, stiffness at zero stretch")
+    series_hardening: Choice = Choice(
         5e-3, 2e-3, 2e-2, "m", "series spring of Fig. 1, stretch at which the force is twice the linear one"
     )
-    dead_volume: ChosenValue = ChosenValue(2e-5, 5e-6, 4e-5, "m3", "volume of fittings and ports at the muscle")
+    dead_volume: Choice = Choice(2e-5, 5e-6, 4e-5, "m3", "volume of fittings and ports at the muscle")
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -42,7 +42,7 @@ MATRIX_CATALOGUE = published("matrix-821")
 
 
 @dataclasses.dataclass(frozen=True)
-class ChosenValue:
+class Choice:
     """A parameter that the paper does not print: value, range for the verdicts, unit, meaning and source."""
 
     value: float
@@ -57,22 +57,22 @@ class ChosenValue:
 class UnpublishedParameters:
     """All parameters of the simulated figures that the paper does not print."""
 
-    load: ChosenValue = ChosenValue(10.0, 2.0, 20.0, "kg", "load during fill and discharge")
-    stiffness: ChosenValue = ChosenValue(1000.0, 0.0, 4000.0, "N/m", "parallel spring, constant as in the paper")
-    damping: ChosenValue = ChosenValue(200.0, 100.0, 400.0, "N s/m", "damper, constant as in the paper")
-    length: ChosenValue = ChosenValue(0.300, 0.200, 0.400, "m", "resting length", "measured specimen; range chosen")
-    braid_angle: ChosenValue = ChosenValue(
+    load: Choice = Choice(10.0, 2.0, 20.0, "kg", "load during fill and discharge")
+    stiffness: Choice = Choice(1000.0, 0.0, 4000.0, "N/m", "parallel spring, constant as in the paper")
+    damping: Choice = Choice(200.0, 100.0, 400.0, "N s/m", "damper, constant as in the paper")
+    length: Choice = Choice(0.300, 0.200, 0.400, "m", "resting length", "measured specimen; range chosen")
+    braid_angle: Choice = Choice(
         0.42616, 0.38, 0.50, "rad", "braid angle, for the volume", "Martens and Boblan 2017; range chosen"
     )
-    low_pressure: ChosenValue = ChosenValue(200e3, 150e3, 250e3, "Pa", "lower initial gauge pressure of the release")
-    high_pressure: ChosenValue = ChosenValue(400e3, 350e3, 500e3, "Pa", "higher initial gauge pressure of the release")
+    low_pressure: Choice = Choice(200e3, 150e3, 250e3, "Pa", "lower initial gauge pressure of the release")
+    high_pressure: Choice = Choice(400e3, 350e3, 500e3, "Pa", "higher initial gauge pressure of the release")
 
     def with_value(self, name: str, value: float) -> "UnpublishedParameters":
         """Return the parameters with another value of one of them."""
         return dataclasses.replace(self, **{name: dataclasses.replace(getattr(self, name), value=value)})
 
 
-def chosen_values(parameters: Any) -> dict[str, ChosenValue]:
+def chosen_values(parameters: Any) -> dict[str, Choice]:
     """Return the chosen values of a dataclass by their names."""
     return {field.name: getattr(parameters, field.name) for field in dataclasses.fields(parameters)}
 

@@ -17,10 +17,8 @@ from .saga2007_muscle import LINES as RUBBER
 
 FIBRES = 16
 """Number of fibres of Table 1."""
-FIG_1 = (PRESSURE, 0.16e6)
-"""Gauge pressures [Pa] of Fig. 1 (chosen: that of the claims, and the end of the axis of Fig. 8)."""
-FIG_1_LOAD = 100.0
-"""Load of Fig. 1 [N] (chosen)."""
+FIG_1, FIG_1_LOAD = (PRESSURE, 0.16e6), 100.0
+"""Gauge pressures [Pa] and load [N] of Fig. 1 (chosen: pressure of the claims, and end of the axis of Fig. 8)."""
 INITIAL_RADIUS_RATIO = 0.9
 """Ratio of initial to end radius in the table, to show the term of the two radii (chosen)."""
 

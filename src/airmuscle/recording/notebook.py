@@ -9,16 +9,10 @@ from typing import Any
 
 from ..core import AirmuscleError, ShortRepr, rendered
 
-MAX_ROWS = 14
-"""Maximum number of rows of a table."""
-MAX_NOTES = 5
-"""Maximum number of notes."""
-MAX_TEXT = 600
-"""Maximum number of characters of a text in a card."""
-MAX_CHART = 130_000
-"""Maximum number of bytes of a chart; a larger one is drawn again with fewer pixels."""
-RESOLUTIONS = (100, 70, 45)
-"""Resolutions of a chart [dots per inch], the first that is small enough is taken."""
+MAX_ROWS, MAX_NOTES, MAX_TEXT = 14, 5, 600
+"""Maximum number of rows of a table, of notes, and of characters of a text in a card."""
+MAX_CHART, RESOLUTIONS = 130_000, (100, 70, 45)
+"""Maximum number of bytes of a chart, and its resolutions [dots per inch]: the first that keeps to it is taken."""
 
 
 @dataclasses.dataclass(frozen=True)

@@ -13,12 +13,10 @@ from .columns import ZERO_NOT_STATED, display_scale, quantity_of, split_unit
 from .notebook import Card, NotebookDisplay
 from .plot import plot_columns
 
-MAX_PANELS = 4
-"""Maximum number of panels of the chart."""
+MAX_PANELS, MAX_POINTS = 4, 20_000
+"""Maximum number of panels, and of rows of the chart; of more, every n-th row is drawn."""
 ROUNDING = 1e-12
 """Values below this fraction of the largest one of a column are shown as 0 (chosen)."""
-MAX_POINTS = 20_000
-"""Maximum number of rows of the chart; of more, every n-th row is drawn."""
 
 
 if TYPE_CHECKING:

@@ -24,10 +24,8 @@ MEANINGS = {
 """Meaning of each verdict."""
 
 MISSING = "–"
-P_VALUE = "p-value"
-"""Header of a column of p-values."""
-SMALLEST_P = 1e-3
-"""Below it a p-value is shown as a bound."""
+P_VALUE, SMALLEST_P = "p-value", 1e-3
+"""Header of a column of p-values, and the value below which one is shown as a bound."""
 _NUMBER = re.compile(r"[-+]?\d+(\.\d+)?(e[-+]?\d+)?")
 _EXPONENT = re.compile(r"(?:\b1|(\d(?:\.\d+)?))e([-+]?)0*(\d+)\b")
 _NUMBERS = re.compile(rf"{_NUMBER.pattern}((, | to ){_NUMBER.pattern})*")

@@ -123,10 +123,8 @@ CODES = (99.0, 999.0, 999.9, 9999.0, 9999.9, 99999.0, 999999.0, 32767.0, 32768.0
 """Magnitudes that loggers write for a missing value (chosen: the usual ones)."""
 MIN_CODE = 500.0
 """Minimum magnitude of a code that is recognised in another power of ten of the unit (chosen)."""
-MIN_DISTANCE = 0.2
-"""Minimum distance of a code from all other readings, as a fraction of their range (chosen)."""
-MAX_SHARE = 0.5
-"""Maximum share of the rows that are missing (chosen)."""
+MIN_DISTANCE, MAX_SHARE = 0.2, 0.5
+"""Minimum distance of a code from other readings, as a fraction of their range; maximum share of its rows (chosen)."""
 
 
 class MissingCode(NamedTuple):

@@ -16,10 +16,8 @@ from .channels import Cells, RawTable, taken
 from .constants import parse_constant_name
 from .time_base import seconds_from_clock
 
-MAX_QUOTED = 40
-"""Maximum number of characters of a cell among several (chosen)."""
-MAX_LISTED = 8
-"""Maximum number of cells or rows that a message lists (chosen)."""
+MAX_QUOTED, MAX_LISTED = 40, 8
+"""Maximum number of characters of a cell among several, and of cells or rows that a message lists (chosen)."""
 _MARKERS = re.compile(r"[-–—.?*/]*|nan|n/?a|null|none|missing|k\.?\s?a\.?|#[\w/]+[!?]?", re.IGNORECASE)
 Mask = npt.NDArray[np.bool_]
 

@@ -84,10 +84,8 @@ def _check_ordered(table: RawTable, time: Array) -> None:
         raise ColumnError(HintedText(message, *hints))
 
 
-SAME_MAGNITUDE = 1.5
-"""Maximum ratio at which the numbers of two files have the same magnitude (chosen)."""
-DIFFERENT_UNIT = 5.0
-"""Minimum ratio of two units that contradict each other (chosen: psi and kPa differ by a factor of 6.9)."""
+SAME_MAGNITUDE, DIFFERENT_UNIT = 1.5, 5.0
+"""Maximum ratio of numbers of one magnitude, minimum ratio of contradicting units (chosen: psi to kPa is 6.9)."""
 SUSPICIOUS_RATIO = 50.0
 """Minimum ratio of pressures or lengths in the same unit that causes a warning (chosen).
 

@@ -59,10 +59,8 @@ try:
 except ImportError:  # Windows, where the time is limited alone
     resource = None  # type: ignore[assignment]
 
-TIME_LIMIT = 60.0
-"""Time limit [s] of a file, and of every further 100 MB (chosen: 20 MB take less than one second)."""
-CPU_LIMIT = 15.0
-"""Limit of the time of the processor [s], in the same way (chosen)."""
+TIME_LIMIT, CPU_LIMIT = 60.0, 15.0
+"""Limits of time and processor time [s] of a file, and of every further 100 MB (chosen: 20 MB take less than 1 s)."""
 MEMORY_LIMIT, MEMORY_FACTOR = 6e9, 20.0
 """Limit of the memory [bytes], with this multiple of the size of the file (chosen)."""
 _worker = Worker(quiet=True)

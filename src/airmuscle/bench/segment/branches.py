@@ -20,12 +20,10 @@ from .interval import Interval, remembered, running_median
 from .runs import AT_REST, ISOBARIC, ISOMETRIC, ISOTONIC, Run, find_runs, moved_column
 from .sensor import Sensor, count_rows, estimate_noise
 
-REVERSAL_FRACTION = 0.05
-"""Fraction of the range by which the pressure must move back for a reversal (chosen)."""
+REVERSAL_FRACTION, EXIT_FRACTION = 0.05, 0.25
+"""Fraction of the range that the pressure moves back in a reversal, and fraction of that by which it leaves a dwell."""
 SPIKE_DURATION = 0.15
 """Overshoots of a valve pulse shorter than this [s] are not reversals (chosen)."""
-EXIT_FRACTION = 0.25
-"""Fraction of the reversal threshold by which the pressure leaves a dwell (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True)

@@ -22,10 +22,8 @@ MAX_NEIGHBOUR_DIFFERENCE = 0.25
 """Maximum difference between the rows before and after, as a fraction of the outlier's distance (chosen)."""
 MIN_EXTRAPOLATION_ERROR = 0.5
 """Minimum distance of an outlier from the extrapolated neighbours, as a fraction of its distance (chosen)."""
-SLOPE_STEPS = 5
-"""Number of steps between rows whose median is the slope before and after a row."""
-WINDOW = 3
-"""Number of rows before and after that are compared."""
+SLOPE_STEPS, WINDOW = 5, 3
+"""Number of steps whose median is the slope, and of rows that are compared, before and after a row."""
 MAX_LISTED = 8
 """Maximum number of outliers that a note lists (chosen)."""
 

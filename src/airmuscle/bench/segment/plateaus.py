@@ -83,16 +83,12 @@ def maximum_rate(recordings: Sequence[Recording], name: str) -> float:
 
 CONSTANT_COLUMNS = ("pressure", *MOVED, "force")
 """Columns that are constant in a plateau, where they were measured."""
-MIN_DURATION = 0.2
-"""Minimum duration of a plateau [s] (chosen)."""
+MIN_DURATION, MIN_ROWS = 0.2, 3
+"""Minimum duration [s] and number of rows of a plateau (chosen)."""
 MEDIAN_ROWS = 3
 """Width of the moving median before the search for levels, in rows."""
-MAX_DRIFT = 0.25
-"""Maximum drift of a plateau, as a fraction of its band (chosen)."""
-DRIFT_PARTS = 5
-"""Number of parts of a plateau whose medians show a drift; three if it is short."""
-MIN_ROWS = 3
-"""Minimum number of rows of a plateau (chosen)."""
+MAX_DRIFT, DRIFT_PARTS = 0.25, 5
+"""Maximum drift of a plateau, as a fraction of its band, and number of parts that show it; three if it is short."""
 
 
 @dataclasses.dataclass(frozen=True)

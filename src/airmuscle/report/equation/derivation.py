@@ -13,17 +13,14 @@ from . import expression
 from .expression import Expressions, Node, assemble, depends_on, expand, fold, in_order, summands
 from .intervals import Bounds, traced_expression, within
 
-MAX_OPERATIONS = 600
-"""Maximum number of operations of an equation that is shown (chosen)."""
+MAX_OPERATIONS, MAX_PARAMETERS = 600, 120
+"""Maximum number of operations and of parameters of an equation that is shown (chosen)."""
 MIN_SHARED_OPERATIONS = 3
 """Minimum operations of a part that occurs twice and gets its own symbol; one less if it occurs more often (chosen)."""
 MAX_INNER_TERMS = 6
 """Maximum number of terms of a sum inside a function or product; a longer one gets a symbol of its own (chosen)."""
 BAR = 1e5
 """Pressure unit of the physical form [Pa]."""
-MAX_PARAMETERS = 120
-"""Maximum number of parameters of an equation that is shown (chosen)."""
-
 
 _INDEX = re.compile(r"\[\d+\]$")
 

@@ -179,10 +179,8 @@ def _as_power(node: Node) -> tuple[Node, float]:
     return node, 1.0
 
 
-MAX_TERMS = 150
-"""Maximum number of monomials of a polynomial that is expanded (chosen)."""
-MIN_TERMS = 4
-"""Minimum number of monomials of a polynomial that is expanded with its coefficients as symbols (chosen)."""
+MAX_TERMS, MIN_TERMS = 150, 4
+"""Maximum number of monomials of an expanded polynomial, minimum one with its coefficients as symbols (chosen)."""
 Monomial = tuple[tuple[Node, int], ...]
 Polynomial = dict[Monomial, Fraction]
 
