@@ -21,7 +21,7 @@ SEEDS = range(100)
 USABLE = (surfaces.CORRECTED, surfaces.EXPONENTIAL, surfaces.MONOTONE)
 """Surfaces that are suitable for computations."""
 
-CATALOGUE_TABLE, CATALOGUE_TEXT = (titled(f"borzikova_catalogue_{source}") for source in ("table", "text"))
+CATALOGUE_TABLE, CATALOGUE_TEXT = titled("borzikova_catalogue_table"), titled("borzikova_catalogue_text")
 """Catalogue of the paper as its table and as its text print it."""
 
 
