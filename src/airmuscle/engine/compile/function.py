@@ -10,7 +10,6 @@ import numpy as np
 
 from ...core import Array
 from .cache.kernel import evaluate
-from .cache.store import load_module
 from .functions import PARAMETERS, POINT, Printer, TracedSystem
 from .ir import emission, jacobian
 from .ir.instructions import ZERO, Code, Instruction, Operand, Operation, finished, recorded
@@ -18,7 +17,7 @@ from .ir.interpreter import InterpretedBody
 from .ir.jacobian import Tape
 from .llvm import vector_math
 from .llvm.emit import LlvmLanguage, LlvmType
-from .program import CompiledSystem, Program, prepare_function
+from .program import CompiledSystem, Module, Program
 
 LANES = 8
 """Points of one call of a function in lanes: the widest register (chosen)."""
@@ -42,8 +41,8 @@ class Function:
         parts = [vector_math.definition(name, count, number) for name, count in printer.needed.items()]
         if lanes > 1:
             parts.insert(0, vector_math.declarations({number}))
-        self._engine = load_module("\n".join([*parts, printer.module()]))
-        self.address = int(self._engine.get_function_address("function"))
+        self._module = Module("\n".join([*parts, printer.module()]))
+        self.address = self._module.address("function")
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -57,7 +56,7 @@ class AugmentedRates:
     `constants` is the array c. Parameters and disturbances have no rates: they are constant but for noise.
     """
 
-    engine: Any
+    module: Module
     constants: Array
     rates: int
     measured: int
@@ -69,19 +68,9 @@ def augmented_rates(
 ) -> AugmentedRates:
     """The functions of a system; `measured` are columns among states and outputs, `parameters` indices of leaves and
     `disturbed` indices of states."""
-    text, held = _module(ready.program, measured, parameters, disturbed)
-    engine = load_module(text)
-    addresses = (int(engine.get_function_address(name)) for name in ("rates", "measured", "outputs"))
-    return AugmentedRates(engine, prepare_function(engine)(ready.parameters, held), *addresses)
-
-
-def _module(
-    program: Program, measured: Sequence[int], parameters: Sequence[int], disturbed: Sequence[int]
-) -> tuple[str, int]:
-    """LLVM text of the functions, and the length of `c`."""
     import casadi
 
-    t = program.traced
+    t = ready.program.traced
     n = t.x.numel()
     z = casadi.SX.sym("z", n + len(parameters) + len(disturbed))
     values = [t.p[i] for i in range(t.p.numel())]
@@ -96,7 +85,9 @@ def _module(
     printer.add("rates", point, {"f": casadi.densify(f), "A": _by_row(casadi.jacobian(f, z))})
     printer.add("measured", point, {"y": casadi.densify(y), "C": _by_row(casadi.jacobian(y, z))})
     printer.add("outputs", point, {"o": casadi.densify(o)})
-    return printer.module(), printer.held
+    module = Module(printer.module(), printer.held)
+    addresses = map(module.address, ("rates", "measured", "outputs"))
+    return AugmentedRates(module, module.prepare(ready.parameters), *addresses)
 
 
 def _by_row(matrix: Any) -> Any:

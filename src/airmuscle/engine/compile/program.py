@@ -6,7 +6,7 @@ import functools
 import math
 import threading
 import weakref
-from collections.abc import Callable, Hashable, Sequence
+from collections.abc import Hashable, Sequence
 from typing import Any
 
 import numpy as np
@@ -79,6 +79,29 @@ INPUT_TOLERANCE = 1e-9
 _FUNCTIONS = ("rhs", "jac", "factor", "solve", "stage", "df_dt", "outputs")
 
 
+class Module:
+    """Machine code of printed functions; their addresses are valid as long as it lives. It cannot be pickled."""
+
+    def __init__(self, text: str, held: int = 0) -> None:
+        self._engine = load_module(text)
+        self.held = held
+        """The length of `c`, what the functions need of the parameters."""
+
+    def address(self, name: str) -> int:
+        """The address of a function."""
+        return int(self._engine.get_function_address(name))
+
+    def prepare(self, parameters: Array) -> Array:
+        """The array `c` for a set of parameters."""
+        values = np.zeros(max(self.held, 1))
+        self._prepare(parameters.ctypes.data, address_of(values))
+        return values
+
+    @functools.cached_property
+    def _prepare(self) -> Any:
+        return ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(self.address("prepare"))
+
+
 class Program:
     """The compiled functions of one structure; it owns the machine code and cannot be pickled."""
 
@@ -95,14 +118,12 @@ class Program:
             extend = row_outputs(self._form) if rows > 1 else None
             text, self.sizes = functions.implicit_module(self._form, extend=extend)
         self.output_names = self._form.output_names
-        self._engine = load_module(text)
-        self.address = {name: int(self._engine.get_function_address(name)) for name in _FUNCTIONS}
-        at_rows = int(self._engine.get_function_address("row_outputs" if rows > 1 else "outputs"))
-        self.outputs_at_rows = at_rows, rows
+        self._module = Module(text, self.sizes.held)
+        self.address = {name: self._module.address(name) for name in _FUNCTIONS}
+        self.outputs_at_rows = self._module.address("row_outputs" if rows > 1 else "outputs"), rows
         """The address of the function that computes the outputs at rows, and at how many at once."""
-        self._prepare = prepare_function(self._engine)
-        self._steps: dict[Tableau, tuple[Any, int, Callable[[Array, int], Array], int]] = {}
-        self._lane_modules: dict[Any, tuple[Any, int]] = {}
+        self._steps: dict[Tableau, Module] = {}
+        self._lane_modules: dict[Any, Module] = {}
         self._compiling = threading.Lock()  # of two threads that need a step, one compiles it: an engine must stay
 
     @functools.cached_property
@@ -112,18 +133,15 @@ class Program:
 
     def precompute(self, parameters: Array) -> Array:
         """Values that the functions need of a set of parameters, computed once."""
-        return self._prepare(parameters, self.sizes.held)
+        return self._module.prepare(parameters)
 
     def step(self, tableau: Tableau, parameters: Array) -> tuple[int, Array]:
         """The address of an explicit step with this tableau, and the values that it needs of the parameters."""
         with self._compiling:
             if tableau not in self._steps:
-                text, size = self._step_module(tableau)
-                engine = load_module(text)
-                address = int(engine.get_function_address("step"))
-                self._steps[tableau] = engine, address, prepare_function(engine), size
-        _, address, prepare, size = self._steps[tableau]
-        return address, prepare(parameters, size)
+                self._steps[tableau] = Module(*self._step_module(tableau))
+        module = self._steps[tableau]
+        return module.address("step"), module.prepare(parameters)
 
     def _step_module(self, tableau: Tableau) -> tuple[str, int]:
         if isinstance(self._form, sensitivities.TangentSystem):
@@ -134,23 +152,9 @@ class Program:
         """The addresses of `prepare`, the explicit step and `outputs` in lanes, and the length of `c`."""
         with self._compiling:
             if (tableau, number) not in self._lane_modules:
-                text, size = lanes_module(self.traced, *tableau, number)
-                self._lane_modules[tableau, number] = load_module(text), size
-        engine, size = self._lane_modules[tableau, number]
-        prepare, step, outputs = (int(engine.get_function_address(n)) for n in ("prepare", "step", "outputs"))
-        return (prepare, step, outputs), size
-
-
-def prepare_function(engine: Any) -> Callable[[Array, int], Array]:
-    """The function `prepare` of an engine: from parameters to so many values for its other functions."""
-    function = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_void_p)(engine.get_function_address("prepare"))
-
-    def prepare(parameters: Array, size: int) -> Array:
-        values = np.zeros(max(size, 1))
-        function(parameters.ctypes.data, address_of(values))
-        return values
-
-    return prepare
+                self._lane_modules[tableau, number] = Module(*lanes_module(self.traced, *tableau, number))
+        module = self._lane_modules[tableau, number]
+        return (module.address("prepare"), module.address("step"), module.address("outputs")), module.held
 
 
 class Description:

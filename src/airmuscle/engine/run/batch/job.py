@@ -114,7 +114,7 @@ class BatchJob:
         values = [column for part in parts for column in part.T]
         with np.errstate(over="ignore"):  # a column in single precision
             for place, (name, column) in zip(self.kept.tolist(), self.columns.items(), strict=True):
-                if place < self._own:
+                if place < self.own:
                     column[index, :reached] = values[place]
                 else:
                     column[index, :reached] = more[name][:reached] if more else np.nan
@@ -124,7 +124,7 @@ class BatchJob:
             self.reasons[index] = self._reason(raw)
 
     @functools.cached_property
-    def _own(self) -> int:
+    def own(self) -> int:
         """The number of columns of the plant: states, outputs and inputs."""
         sizes = self.compiled.sizes
         return sizes.states + sizes.outputs + sizes.inputs
@@ -132,7 +132,7 @@ class BatchJob:
     @functools.cached_property
     def _needs_rows(self) -> bool:
         """Whether outputs or inputs are stored."""
-        return bool(((self.kept >= self.compiled.sizes.states) & (self.kept < self._own)).any())
+        return bool(((self.kept >= self.compiled.sizes.states) & (self.kept < self.own)).any())
 
     def _outputs_and_inputs(self, one: CompiledSystem, states: Array, segments: PiecewiseLinear) -> tuple[Array, Array]:
         """Outputs and inputs at the first rows (R, n) of a plant."""

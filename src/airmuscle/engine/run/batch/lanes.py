@@ -1,133 +1,32 @@
-"""Lanes: blocks of plants through one vectorised step together, one thread per core, in single or double precision."""
+"""Lanes: blocks of plants or control loops through one vectorised step together, one thread per core.
+
+Plants are computed in single or double precision, loops in double precision.
+"""
 
 import abc
 import dataclasses
-from collections.abc import Callable, Sequence
+import functools
+from collections.abc import Callable
 from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
-from ....core import ParameterError, Status
-from ...compile.cache.kernel import aligned_array, lanes
+from ....core import Array, ParameterError, Status, tree
+from ...compile.cache.kernel import aligned_array, lanes, loop_lanes
 from ...compile.llvm.emit import LlvmType
+from ...loop.control_law import ControlLaw
+from ..compiled_law import compiled_sample
 from ..integrators import ExplicitRungeKutta
+from ..sampled_loop import intervals_of
 from .job import BatchJob, Queue
+from .loops import LoopBatch
 
-
-class LaneBlock:
-    """The arrays of one thread for a block of lanes; it owns them as long as a kernel uses their addresses."""
-
-    def __init__(self, job: BatchJob, precision: "Precision", table: "SegmentTable") -> None:
-        number, sizes = precision.number, job.compiled.sizes
-        self.job, self.table, self.dtype = job, table, precision.dtype
-        assert isinstance(job.integrator, ExplicitRungeKutta)
-        self.step = job.integrator.step
-        self.addresses, precomputed = job.compiled.program.lanes(job.integrator.tableau(), number)
-        n, m, width = sizes.states, sizes.inputs, number.lanes
-        lengths = (sizes.parameters, precomputed, n, n, m, m, m, 1, sizes.outputs)
-        self.arrays = [aligned_array((length, width), self.dtype) for length in lengths]
-        self.bounded = np.flatnonzero(np.isfinite(job.lower_bounds)).astype(np.int64)
-        """States with a lower bound; their rows are checked after the run and not stored."""
-        self.kept = np.concatenate([job.kept, self.bounded])
-        self.rows = np.empty((self.kept.size, width, job.times.size), self.dtype)
-        self.final = np.empty((width, n), self.dtype)
-        self.status = np.empty(width, dtype=np.int64)
-        self.counters = (np.empty(width, np.int64), np.empty(width, np.int64), *(np.empty(width) for _ in range(3)))
-        self.width = width
-
-    def run(self, plants: npt.NDArray[np.intp], lane: npt.NDArray[np.intp], stop: npt.NDArray[np.int64]) -> None:
-        """Simulate one block of plants, of which `lane` names one for each lane."""
-        job, table = self.job, self.table
-        load_plants(job, self.arrays, lane)
-        ended = lanes(
-            *self.addresses, *self.arrays, table.ends, table.values, table.slopes, table.first[lane], table.last[lane],
-            job.start_time, self.step, job.times, self.kept, self.rows, self.final, self.status, stop,
-            *self.counters,
-        )  # fmt: skip
-        if ended == Status.INTERRUPTED:
-            return
-        for j, column in enumerate(job.columns.values()):
-            column[plants] = self.rows[j, : plants.size]
-        below = (self.final < job.lower_bounds).any(axis=1)
-        for rows, i in zip(self.rows[len(job.columns) :], self.bounded, strict=True):
-            below |= (rows < job.lower_bounds[i]).any(axis=1)
-        self.status[below] = Status.NEGATIVE_AIR_MASS
-        finish_block(job, plants, self.final, self.status)
-
-
-def load_plants(job: BatchJob, arrays: Sequence[npt.NDArray[Any]], lane: npt.NDArray[np.intp]) -> None:
-    """Write parameters and initial states of one plant a lane into the first and third array of a block."""
-    arrays[0][:] = job.compiled.parameters[:, None]
-    arrays[0][job.variations.places] = job.variations.values[lane].T
-    arrays[2][:] = job.initial_states[lane].T
-
-
-class SegmentTable:
-    """The segments of all plants, one after the other, and the range of those of each; equal inputs share theirs."""
-
-    def __init__(self, job: BatchJob) -> None:
-        by_identity = {id(segments): segments for segments in job.segments}
-        distinct, number = list(by_identity.values()), {key: i for i, key in enumerate(by_identity)}
-        self.ends = np.concatenate([s.ends for s in distinct])
-        self.values = np.ascontiguousarray(np.concatenate([s.values for s in distinct]))
-        self.slopes = np.ascontiguousarray(np.concatenate([s.slopes for s in distinct]))
-        ends = np.cumsum([s.ends.size for s in distinct])
-        own = np.array([number[key] for key in map(id, job.segments)])
-        self.first, self.last = np.append(0, ends)[own], ends[own]
-
-
-def block_workers(
-    make: Callable[[], Any], active: npt.NDArray[np.intp], cores: int
-) -> tuple[Queue, list[Callable[[int], Any]], int]:
-    """The queue of blocks of the active plants, one worker per core, and the number of plants in a block.
-
-    `make` makes a block, such as a `LaneBlock`. Unused lanes repeat its last plant.
-    """
-    first = make()
-    count = -(-active.size // first.width)
-    queue = Queue(count)
-
-    def worker(block: Any) -> Callable[[int], Any]:
-        def run(i: int) -> None:
-            plants = active[i * block.width : (i + 1) * block.width]
-            block.run(plants, np.pad(plants, (0, block.width - plants.size), "edge"), queue.stop)
-
-        return run
-
-    return queue, [worker(block) for block in (first, *(make() for _ in range(min(cores, count) - 1)))], first.width
-
-
-def finish_block(
-    job: BatchJob, plants: npt.NDArray[np.intp], final: npt.NDArray[Any], status: npt.NDArray[np.int64]
-) -> None:
-    """Write the final states (W, n) and the status (W,) of the plants of a block.
-
-    A plant that failed in its lane is simulated again, alone: for its rows, the time of failure and the reason.
-    """
-    job.final[plants] = final[: plants.size]
-    job.status[plants], job.reached[plants] = status[: plants.size], job.times.size
-    where = "in single precision, but not in double" if final.dtype == np.float32 else "in its lane, but not alone"
-    for i in np.flatnonzero(status[: plants.size]):
-        index, failure = int(plants[i]), Status(int(status[i]))
-        job.run_single(index)
-        if job.status[index] == Status.DONE:
-            job.mark_not_run(index, failure, f"{failure.message} {where}")
-
-
-def check_precision(precision: "Precision", integrator: object, *, loops: bool) -> None:
-    """Raise ParameterError for a precision in which an integrator or control loops cannot be computed."""
-    if precision.bits != 64 and loops:
-        raise ParameterError("simulate_batch: control loops are computed in double precision; omit the precision.")
-    if precision.bits != 64 and not isinstance(integrator, ExplicitRungeKutta):
-        raise ParameterError(
-            f"simulate_batch: {type(integrator).__name__} chooses its steps in double precision; {precision} requires "
-            "an integrator of fixed step, such as RungeKutta4(1e-3)."
-        )
-
-
+Plants = npt.NDArray[np.intp]
 BITS = 1024
 """Size of a vector of lanes: two of the widest registers, which alternate."""
+MAX_SAMPLES = 200_000
+"""Samples of a run up to which the set points, samples and commands of a block fit in memory (chosen)."""
 
 
 class Precision(abc.ABC):
@@ -161,3 +60,215 @@ class Single(Precision):
 
     bits: ClassVar[int] = 32
     note: ClassVar[str] = "single precision: rounding errors accumulate over a run; expect about four correct digits"
+
+
+class LaneArrays(abc.ABC):
+    """The arrays of one thread for a block of lanes; it owns them as long as a kernel uses their addresses.
+
+    more  sizes of further arrays after those of the step: parameters, what it needs of them, states (two), inputs,
+          their start and slopes, length, outputs
+    """
+
+    def __init__(self, job: BatchJob, precision: Precision, more: tuple[int, ...] = ()) -> None:
+        number, sizes, integrator = precision.number, job.compiled.sizes, job.integrator
+        assert isinstance(integrator, ExplicitRungeKutta)
+        self.job, self.step, self.width = job, integrator.step, number.lanes
+        self.addresses, held = job.compiled.program.lanes(integrator.tableau(), number)
+        n, m = sizes.states, sizes.inputs
+        lengths = (sizes.parameters, held, n, n, m, m, m, 1, sizes.outputs, *more)
+        self.arrays = [aligned_array((length, self.width), precision.dtype) for length in lengths]
+        self.status = np.empty(self.width, dtype=np.int64)
+
+    @abc.abstractmethod
+    def run(self, plants: Plants, lane: Plants, stop: npt.NDArray[np.int64]) -> None:
+        """Simulate one block of plants, of which `lane` names one for each lane."""
+
+    def load(self, lane: Plants) -> None:
+        """Take over parameters and initial states of one plant a lane."""
+        job, parameters = self.job, self.arrays[0]
+        parameters[:] = job.compiled.parameters[:, None]
+        parameters[job.variations.places] = job.variations.values[lane].T
+        self.arrays[2][:] = job.initial_states[lane].T
+
+    def finish(self, plants: Plants, final: npt.NDArray[Any]) -> None:
+        """Write the final states (W, n) and the status of plants.
+
+        A plant that failed in its lane is simulated again, alone: for its rows, the time of failure and the reason.
+        """
+        job, status = self.job, self.status[: plants.size]
+        job.final[plants], job.status[plants], job.reached[plants] = final[: plants.size], status, job.times.size
+        where = "in single precision, but not in double" if final.dtype == np.float32 else "in its lane, but not alone"
+        for i in np.flatnonzero(status):
+            index, failure = int(plants[i]), Status(int(status[i]))
+            job.run_single(index)
+            if job.status[index] == Status.DONE:
+                job.mark_not_run(index, failure, f"{failure.message} {where}")
+
+
+class LaneBlock(LaneArrays):
+    """A block of plants, each with its own segments and steps."""
+
+    def __init__(self, job: BatchJob, precision: Precision, table: "SegmentTable") -> None:
+        super().__init__(job, precision)
+        self.table, width, dtype = table, self.width, precision.dtype
+        self.bounded = np.flatnonzero(np.isfinite(job.lower_bounds)).astype(np.int64)
+        """States with a lower bound; their rows are checked after the run and not stored."""
+        self.kept = np.concatenate([job.kept, self.bounded])
+        self.rows = np.empty((self.kept.size, width, job.times.size), dtype)
+        self.final = np.empty((width, job.compiled.sizes.states), dtype)
+        self.counters = (np.empty(width, np.int64), np.empty(width, np.int64), *(np.empty(width) for _ in range(3)))
+
+    def run(self, plants: Plants, lane: Plants, stop: npt.NDArray[np.int64]) -> None:
+        job, table = self.job, self.table
+        self.load(lane)
+        ended = lanes(
+            *self.addresses, *self.arrays, table.ends, table.values, table.slopes, table.first[lane], table.last[lane],
+            job.start_time, self.step, job.times, self.kept, self.rows, self.final, self.status, stop,
+            *self.counters,
+        )  # fmt: skip
+        if ended == Status.INTERRUPTED:
+            return
+        for j, column in enumerate(job.columns.values()):
+            column[plants] = self.rows[j, : plants.size]
+        below = (self.final < job.lower_bounds).any(axis=1)
+        for rows, i in zip(self.rows[len(job.columns) :], self.bounded, strict=True):
+            below |= (rows < job.lower_bounds[i]).any(axis=1)
+        self.status[below] = Status.NEGATIVE_AIR_MASS
+        self.finish(plants, self.final)
+
+
+class LoopLaneBlock(LaneArrays):
+    """A block of control loops, whose sampling instants and segments are the same."""
+
+    def __init__(self, job: BatchJob, loops: LoopBatch) -> None:
+        first = loops.of_plant(0)
+        assert first.law is not None
+        law, memory = first.law, len(first.law.initial_memory)
+        k, s, c = len(law.measured_columns), len(law.setpoints), len(law.inputs)
+        super().__init__(job, Double(), (first.parameters.size, memory, memory, k, s, c, c, c, 1))
+        self.loops, self.first, self.prepared = loops, first, first.prepared
+        width, m = self.width, job.compiled.sizes.inputs
+        self.sample = compiled_sample(law, width)
+        intervals, segments = self.prepared.instants.size - 1, self.prepared.inputs.ends.size
+        self.setpoints = np.empty((intervals, s, width))
+        self.values, self.slopes = np.empty((segments, m, width)), np.empty((segments, m, width))
+        self.samples, self.commands = np.empty((intervals, k, width)), np.empty((intervals, c, width))
+        self.kept = job.kept[job.kept < job.own]
+        self.rows = np.empty((self.kept.size, width, job.times.size))
+        self.starts = self.prepared.inputs.starts(job.start_time)
+        self.row_segment = intervals_of(job.times, self.starts)
+
+    def load(self, lane: Plants) -> None:
+        super().load(lane)
+        loops, u = self.loops, self.arrays[4]
+        parameters, memory, _, _, _, _, low, high, period = self.arrays[9:]
+        for i, plant in enumerate(lane.tolist()):
+            loop = loops.of_plant(plant)
+            prepared, law = loop.prepared, loop.law
+            assert law is not None
+            parameters[:, i] = loop.parameters if loops.laws is None else loops.laws.parameters(plant)
+            memory[:, i] = list(law.initial_memory.values())
+            self.setpoints[:, :, i] = prepared.setpoint_values
+            self.values[:, :, i], self.slopes[:, :, i] = prepared.inputs.values, prepared.inputs.slopes
+            period[:, i], low[:, i], high[:, i], _ = loop.commanding
+        u[:] = self.values[0]
+
+    def run(self, plants: Plants, lane: Plants, stop: npt.NDArray[np.int64]) -> None:
+        job, prepared = self.job, self.prepared
+        self.load(lane)
+        ended = loop_lanes(
+            *self.addresses, self.sample.address, *self.arrays, prepared.instants, self.setpoints,
+            prepared.first_segments, self.starts, prepared.inputs.ends, self.values, self.slopes, self.step,
+            self.first.measuring[1], self.first.commanding[3], job.lower_bounds, job.times, self.row_segment, self.kept,
+            self.rows, self.samples, self.commands, self.status, stop,
+        )  # fmt: skip
+        if ended == Status.INTERRUPTED:
+            return
+        kept = iter(self.rows)
+        for place, (name, column) in zip(job.kept.tolist(), job.columns.items(), strict=True):
+            column[plants] = next(kept)[: plants.size] if place < job.own else self._of_loop(name, plants)
+        self.finish(plants, self.arrays[2].T)
+
+    def _of_loop(self, name: str, plants: Plants) -> Array:
+        """A column (R, T) of the set points, measurements or commands of plants."""
+        kind, index = self.loops.place_of(name)
+        if not kind:
+            return np.array([self.loops.of_plant(i).prepared.at_times[1][:, index] for i in plants.tolist()])
+        at = np.minimum(self.prepared.at_times[0], len(self.samples) - 1)
+        return np.asarray((self.samples if kind == 1 else self.commands)[at, index, : plants.size].T)
+
+
+class SegmentTable:
+    """The segments of all plants, one after the other, and the range of those of each; equal inputs share theirs."""
+
+    def __init__(self, job: BatchJob) -> None:
+        by_identity = {id(segments): segments for segments in job.segments}
+        distinct, number = list(by_identity.values()), {key: i for i, key in enumerate(by_identity)}
+        self.ends = np.concatenate([s.ends for s in distinct])
+        self.values = np.ascontiguousarray(np.concatenate([s.values for s in distinct]))
+        self.slopes = np.ascontiguousarray(np.concatenate([s.slopes for s in distinct]))
+        ends = np.cumsum([s.ends.size for s in distinct])
+        own = np.array([number[key] for key in map(id, job.segments)])
+        self.first, self.last = np.append(0, ends)[own], ends[own]
+
+
+def lane_workers(
+    job: BatchJob, active: Plants, precision: Precision, cores: int
+) -> tuple[Queue, list[Callable[[int], Any]], int] | None:
+    """The queue of blocks of the active plants, one worker per core, and the number of plants in a block.
+
+    Unused lanes repeat the last plant. None where these plants are computed one by one.
+    """
+    loops = job.loops
+    make: Callable[[], LaneArrays] | None = None
+    if loops is not None and run_in_lanes(job, active):
+        make = functools.partial(LoopLaneBlock, job, loops)
+    elif loops is None and isinstance(job.integrator, ExplicitRungeKutta):
+        make = functools.partial(LaneBlock, job, precision, SegmentTable(job))
+    if make is None:
+        return None
+    first = make()
+    count = -(-active.size // first.width)
+    queue = Queue(count)
+
+    def worker(block: LaneArrays) -> Callable[[int], Any]:
+        def run(i: int) -> None:
+            plants = active[i * block.width : (i + 1) * block.width]
+            block.run(plants, np.pad(plants, (0, block.width - plants.size), "edge"), queue.stop)
+
+        return run
+
+    return queue, [worker(block) for block in (first, *(make() for _ in range(min(cores, count) - 1)))], first.width
+
+
+def run_in_lanes(job: BatchJob, plants: Plants) -> bool:
+    """Whether the loops of these plants can be computed in lanes.
+
+    That is with a fixed step, control laws of one structure, no drivers, common sampling instants and segments, and at
+    most MAX_SAMPLES samples.
+    """
+    loops = job.loops
+    if loops is None or not isinstance(job.integrator, ExplicitRungeKutta):
+        return False
+    distinct = {id(loop): loop for loop in loops.loops}.values()
+    if any(loop.drivers or not isinstance(loop.controller, ControlLaw) for loop in distinct):
+        return False
+    structure, sample_time = tree.structure(loops.loops[0].controller), loops.loops[0].sample_time
+    if any(tree.structure(o.controller) is not structure or o.sample_time != sample_time for o in distinct):
+        return False
+    first = loops.of_plant(int(plants[0])).prepared
+    if first.instants.size > MAX_SAMPLES:
+        return False
+    ends = first.inputs.ends
+    return all(np.array_equal(loops.compiled(loop).prepared.inputs.ends, ends) for loop in distinct)
+
+
+def check_precision(precision: "Precision", integrator: object, *, loops: bool) -> None:
+    """Raise ParameterError for a precision in which an integrator or control loops cannot be computed."""
+    if precision.bits != 64 and loops:
+        raise ParameterError("simulate_batch: control loops are computed in double precision; omit the precision.")
+    if precision.bits != 64 and not isinstance(integrator, ExplicitRungeKutta):
+        raise ParameterError(
+            f"simulate_batch: {type(integrator).__name__} chooses its steps in double precision; {precision} requires "
+            "an integrator of fixed step, such as RungeKutta4(1e-3)."
+        )

@@ -12,7 +12,7 @@ from ...compile.program import CompiledSystem, Pool
 from ...loop import ControlLaw, ControlLoop, designed_loop
 from ..compiled_loop import CompiledLoop, CompiledRun
 from ..problem import Problem
-from ..sampled_loop import SampledLoop, first_rows_of, prepare_loop
+from ..sampled_loop import first_rows_of, prepare_loop
 from .variations import Variations, variations_of
 
 CONTROLLER = "controller."
@@ -37,13 +37,9 @@ class LoopBatch:
     _preparing: Any = dataclasses.field(default_factory=threading.Lock)
     _idle: Pool = dataclasses.field(default_factory=Pool)
 
-    def loop_of(self, index: int) -> ControlLoop:
-        """The loop of one plant."""
-        return self.loops[index if len(self.loops) > 1 else 0]
-
-    def prepared(self, loop: ControlLoop) -> SampledLoop:
-        """A loop prepared for runs with rows at the times of the batch."""
-        return self._loop(loop).prepared
+    def of_plant(self, index: int) -> CompiledLoop:
+        """The loop of one plant, prepared for runs with rows at the times of the batch."""
+        return self.compiled(self.loops[index if len(self.loops) > 1 else 0])
 
     def place_of(self, column: str) -> tuple[int, int]:
         """Whether a column that loops add is a set point (0), measurement (1) or command (2), and its number."""
@@ -53,7 +49,7 @@ class LoopBatch:
 
     def run(self, index: int, compiled: CompiledSystem, state: Array) -> CompiledRun:
         """The loop of one plant, integrated from its initial state (n,)."""
-        loop, start = self._loop(self.loop_of(index)), self.template.start_time
+        loop, start = self.of_plant(index), self.template.start_time
         parameters = loop.parameters.copy() if self.laws is None else self.laws.parameters(index)
         run: CompiledRun | None = self._idle.borrow(id(loop))
         if run is None:
@@ -69,7 +65,7 @@ class LoopBatch:
         """State that nothing of a run is needed any more; its arrays serve another one."""
         self._idle.give_back(id(run.loop), run)
 
-    def _loop(self, loop: ControlLoop) -> CompiledLoop:
+    def compiled(self, loop: ControlLoop) -> CompiledLoop:
         """A loop prepared for its runs, once for all plants that share it."""
         with self._preparing:
             if id(loop) not in self._prepared:

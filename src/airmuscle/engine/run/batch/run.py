@@ -15,8 +15,7 @@ from ..integrators import MAX_STEPS, ExplicitRungeKutta, Integrator, default_int
 from ..output_times import output_times as times_of
 from ..problem import Problem, check_input_range
 from .job import BatchJob, Queue, progress, run_workers
-from .lanes import Double, LaneBlock, Precision, SegmentTable, block_workers, check_precision
-from .loop_lanes import LoopLaneBlock, run_in_lanes
+from .lanes import Double, Precision, check_precision, lane_workers
 from .loops import LoopBatch, loops_of, vary
 from .solution import BatchSolution, InMemory, OnDisk
 from .variations import Variations, check_states, count_of_states, default_states, given_states
@@ -196,12 +195,8 @@ def _run(job: BatchJob, precision: Precision, cores: int) -> None:
     active = np.flatnonzero(np.isfinite(job.initial_states).all(axis=1))
     if not active.size:
         return
-    if job.loops is not None and run_in_lanes(job, active):
-        loops = job.loops
-        queue, workers, each = block_workers(lambda: LoopLaneBlock(job, loops), active, cores)
-    elif isinstance(job.integrator, ExplicitRungeKutta) and job.loops is None:
-        table = SegmentTable(job)
-        queue, workers, each = block_workers(lambda: LaneBlock(job, precision, table), active, cores)
+    if in_lanes := lane_workers(job, active, precision, cores):
+        queue, workers, each = in_lanes
     else:
         job.run_single(int(active[0]))  # what compiles, compiles here, before threads need it at once
         queue, each = Queue(active.size - 1), 1
