@@ -119,7 +119,7 @@ class Printer:
 
     def end(self, name: str, inputs: Sequence[str], outputs: Sequence[str], block: FunctionBlock) -> None:
         """Close a function; the argument that holds parameters becomes `c`."""
-        inputs = ["c" if a == PARAMETERS else a for a in inputs]
+        inputs = list(map(self._argument, inputs))
         if self._language.labels:
             self._name(block, inputs, outputs)
         self.text.append(self._language.function(name, inputs, outputs, block))
@@ -142,10 +142,6 @@ class Printer:
     @staticmethod
     def _argument(name: str) -> str:
         return "c" if name == PARAMETERS else name
-
-    def without_parameters(self, inputs: dict[str, Any], outputs: dict[str, Any]) -> tuple[Code, dict[Operand, int]]:
-        """The code of outputs without what depends on parameters alone, and where in `c` that stands."""
-        return self.set_apart(instructions(list(inputs.values()), list(outputs.values())), list(inputs))
 
     def set_apart(self, code: Code, names: Sequence[str]) -> tuple[Code, dict[Operand, int]]:
         """Code less what depends on parameters alone, which goes to `prepare`, and where in `c` that stands."""

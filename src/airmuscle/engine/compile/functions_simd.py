@@ -96,7 +96,7 @@ def lanes_module(
     """
     printer = Printer(LlvmLanguage(number))
     point = t.point
-    code, held = printer.without_parameters(point, {"f": t.f})
+    code, held = printer.set_apart(instructions(list(point.values()), [t.f]), POINT)
     step = _Step(t, code, held, number)
     text = step.printed(a, b)
     printer.add("outputs", point, {"o": t.o})

@@ -95,7 +95,12 @@ class ControlLoop(ShortRepr):
         check_input_signal(self.setpoint)
         check_input_signal(self.other_inputs)
         self._check_names()
-        WithDrivers(self.other_inputs, self.drivers)
+        _ = self.driven_inputs
+
+    @property
+    def driven_inputs(self) -> WithDrivers:
+        """The inputs that the controller does not command behind their drivers, and the drivers of all."""
+        return WithDrivers(self.other_inputs, self.drivers)
 
     def _check_names(self) -> None:
         controller = self.controller
@@ -120,7 +125,7 @@ class ControlLoop(ShortRepr):
             measured=(math.nan,) * len(controller.measured_columns),
             commanded=(0.0,) * len(controller.inputs),
             applied_inputs=(),
-            drivers=WithDrivers(self.other_inputs, self.drivers).init(start) if self.drivers else {},
+            drivers=self.driven_inputs.init(start),
         )
 
     def check_columns(self, columns: Sequence[str], inputs: Sequence[str]) -> None:

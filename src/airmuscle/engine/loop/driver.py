@@ -8,6 +8,7 @@ carrier at the start of a period.
 import abc
 import dataclasses
 import math
+import operator
 from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
@@ -64,10 +65,8 @@ class SolenoidDriver(Driver):
     def init(self, start: float) -> SolenoidState:
         return SolenoidState(coil=0.0, pending=INFINITY, target=0.0, opening=0.0)
 
-    @property
-    def settings(self) -> tuple[float, ...]:
-        """The parameters, in the order of the kernel."""
-        return self.opening_delay, self.closing_delay, self.opening_ramp, self.closing_ramp
+    settings = property(operator.attrgetter("opening_delay", "closing_delay", "opening_ramp", "closing_ramp"))
+    """The parameters, in the order of the kernel."""
 
     def step(
         self, state: SolenoidState, command: Sequence[Segment], start: float
@@ -106,10 +105,8 @@ class PWM(Driver):
     def init(self, start: float) -> PwmState:
         return PwmState(origin=start, begun=0.0, pulse_end=-INFINITY)
 
-    @property
-    def settings(self) -> tuple[float, ...]:
-        """The parameters, in the order of the kernel."""
-        return self.frequency, self.smallest_pulse
+    settings = property(operator.attrgetter("frequency", "smallest_pulse"))
+    """The parameters, in the order of the kernel."""
 
     def step(self, state: PwmState, command: Sequence[Segment], start: float) -> tuple[list[Segment], PwmState]:
         end = command[-1][0]

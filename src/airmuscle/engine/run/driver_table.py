@@ -8,18 +8,8 @@ import numpy as np
 
 from ...core import Array
 from ..compile.kernel_layout import DriverKind
-from ..loop.control_loop import ControlLoop, ControlLoopState
-from ..loop.driver import (
-    MAX_PERIODS,
-    PWM,
-    Driver,
-    PwmState,
-    SolenoidDriver,
-    SolenoidState,
-    WithDrivers,
-    apply_drivers,
-    check_command_range,
-)
+from ..loop import PWM, ControlLoopState, Driver, PwmState, SolenoidDriver
+from ..loop.driver import MAX_PERIODS, SolenoidState, apply_drivers, check_command_range
 from .sampled_loop import SampledLoop
 
 MAX_CAPACITY = 1_000_000
@@ -33,7 +23,7 @@ _STATES: dict[type, Any] = {PWM: PwmState, SolenoidDriver: SolenoidState}
 
 def are_called(prepared: SampledLoop) -> bool:
     """Whether a driver of a loop must be called from Python, because the kernel does not implement it."""
-    known = all(type(driver) in KINDS for chain in _chains(prepared.loop).values() for driver in chain)
+    known = all(type(driver) in KINDS for chain in prepared.loop.driven_inputs.chains.values() for driver in chain)
     return not known or greatest_capacity(prepared) > MAX_CAPACITY
 
 
@@ -41,7 +31,8 @@ def greatest_capacity(prepared: SampledLoop) -> int:
     """The maximum number of segments of an input within an interval, before and after each of its drivers."""
     duration = float(np.diff(prepared.instants).max())
     pieces = int(np.diff(prepared.first_segments).max())
-    return max((_capacity(chain, pieces, duration) for chain in _chains(prepared.loop).values()), default=pieces)
+    chains = prepared.loop.driven_inputs.chains.values()
+    return max((_capacity(chain, pieces, duration) for chain in chains), default=pieces)
 
 
 class DriverTable:
@@ -53,11 +44,9 @@ class DriverTable:
     called  whether the drivers are called from Python, in the signals of the kernel
     """
 
-    def __init__(
-        self, prepared: SampledLoop, state: ControlLoopState, capacity: int, called: bool = False
-    ) -> None:  # fmt: skip
+    def __init__(self, prepared: SampledLoop, state: ControlLoopState, capacity: int, called: bool = False) -> None:
         loop, inputs, names = prepared.loop, prepared.inputs, prepared.input_names
-        chains = _chains(loop)
+        chains = loop.driven_inputs.chains
         self.called, self._chains = called, chains
         self._indices = {name: names.index(name) for name in chains}
         self._order = [(name, driver) for name, chain in chains.items() for driver in chain if not called]
@@ -86,9 +75,7 @@ class DriverTable:
     def call(self, interval: int, begin: float) -> int:
         """Replace the signals of an interval by those behind the drivers; how many segments they have together."""
         counts = self.counts[0].tolist()
-        signals = [
-            list(zip(*self.columns[i, :, :count].tolist(), strict=True)) for i, count in enumerate(counts)
-        ]  # fmt: skip
+        signals = [list(zip(*self.columns[i, :, :count].tolist(), strict=True)) for i, count in enumerate(counts)]
         self._before, self._called_at = self._after, interval
         self._after = apply_drivers(self._chains, self._before, signals, self._indices, begin)
         counts = list(map(len, signals))
@@ -108,10 +95,6 @@ class DriverTable:
             kind = _STATES[type(driver)]
             by_name[name] = (*by_name[name], kind(*row[: len(kind._fields)]))
         return by_name
-
-
-def _chains(loop: ControlLoop) -> dict[str, tuple[Driver, ...]]:
-    return WithDrivers(loop.other_inputs, loop.drivers).chains
 
 
 def _table(rows: list[tuple[float, ...]]) -> Array:

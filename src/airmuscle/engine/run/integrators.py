@@ -110,14 +110,6 @@ class BoundIntegrator:
             rows[reached:] = np.nan
         return RawSolution(rows, reached, clock[0], self.state.copy(), ended, count[2], count[3])
 
-    def hold(self, state: Array, inputs: Array, duration: float) -> Status:
-        """Advance `state` (n,) in place by `duration` [s] with the inputs (m,) held. Not to be mixed with `run`."""
-        self.state[:] = state
-        self.held[:] = inputs
-        status = self.proceed(duration)
-        state[:] = self.state
-        return status
-
     def proceed(self, duration: float) -> Status:
         """Advance `self.state` by `duration` [s] with `self.held` held. Not to be mixed with `run`."""
         if duration != self._duration:

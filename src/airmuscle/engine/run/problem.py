@@ -12,7 +12,7 @@ import numpy.typing as npt
 from ...core import FEW, NUMBERS, Array, ParameterError, Reference, ShortRepr, System, as_float, cite
 from ...core.system import check_system, state_vector
 from ..compile.program import CompiledSystem, compile_system
-from ..loop import InputSignal, PiecewiseLinear, Schedule, WithDrivers, check_input_signal
+from ..loop import InputSignal, PiecewiseLinear, Schedule, check_input_signal
 from ..loop.control_loop import ControlLoop, ControlLoopState, designed_loop
 from .integrators import Integrator, default_integrator
 from .output_times import output_times
@@ -79,8 +79,7 @@ class Problem(ShortRepr):
     def _other_segments(self, loop: ControlLoop) -> PiecewiseLinear:
         """The signal of the inputs of a control loop that its controller does not command."""
         inputs = self.compiled.description.input_names
-        driven = WithDrivers(loop.other_inputs, loop.drivers)
-        return driven.checked_segments(inputs, self.start_time, self.duration)
+        return loop.driven_inputs.checked_segments(inputs, self.start_time, self.duration)
 
     def __getstate__(self) -> dict[str, Any]:
         """The fields alone: compiled code belongs to a process, and all else follows from the fields."""

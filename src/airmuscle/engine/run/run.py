@@ -145,10 +145,10 @@ def _hold(
         held[column] = value
     pool = known.cache.holders
     bound: BoundIntegrator = pool.borrow(integrator) or integrator.bind(compiled)
-    vector = np.array(x)
-    status = bound.hold(vector, np.array(held), dt)
+    bound.state[:], bound.held[:] = x, held
+    status = bound.proceed(dt)
+    final: list[float] = bound.state.tolist()
     pool.give_back(integrator, bound)
-    final: list[float] = vector.tolist()
     if status is not Status.DONE or any(map(operator.lt, final, known.state_limits.values())):
         return None
     return final

@@ -128,7 +128,7 @@ def describe_input(command: InputSignal | ControlLoop) -> str:
     if isinstance(command, ControlLoop):
         controller = command.controller
         name, inputs = type(controller).__name__, ", ".join(controller.inputs)
-        others = WithDrivers(command.other_inputs, command.drivers) if command.drivers else command.other_inputs
+        others = command.driven_inputs if command.drivers else command.other_inputs
         return (
             f"{name}, sample time {command.sample_time:g} s, manipulated inputs {inputs}; set point: "
             f"{describe_input(command.setpoint)}; other inputs: {describe_input(others)}"

@@ -11,7 +11,7 @@ from ...core import Array, ParameterError
 from ...engine.compile.kernel_text.printer import KernelPrinter
 from ...engine.compile.kernel_text.types import TypedKernel
 from ...engine.compile.program import Description
-from ...engine.loop import COMMAND, MEASURED, SETPOINT, PiecewiseLinear, WithDrivers
+from ...engine.loop import COMMAND, MEASURED, SETPOINT, PiecewiseLinear
 from ...engine.run import Problem
 from ...engine.run.driver_table import KINDS, MAX_CAPACITY, DriverTable, greatest_capacity
 from ...engine.run.integrators import ExplicitRungeKutta, Integrator, Rodas4
@@ -183,7 +183,7 @@ def export_loop(problem: Problem, name: str, title: str, tunable: Sequence[str] 
             "a run that continues another cannot be exported, because the program begins with the first sample of the "
             "loop; leave control_state out."
         )
-    for command, chain in WithDrivers(loop.other_inputs, loop.drivers).chains.items():
+    for command, chain in loop.driven_inputs.chains.items():
         for driver in chain:
             if type(driver) not in KINDS:
                 raise ParameterError(

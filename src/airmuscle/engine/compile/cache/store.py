@@ -36,7 +36,8 @@ def cache_folder() -> pathlib.Path | None:
     nobody else may write to it, because what is in it is executed; otherwise it is not used.
     """
     try:
-        folder = _chosen_folder()
+        named = os.environ.get("AIRMUSCLE_CACHE_DIR")
+        folder = pathlib.Path(named) if named else user_folder("cache") / "kernels"
         folder.mkdir(mode=0o700, parents=True, exist_ok=True)
         state = folder.stat()
     except (OSError, RuntimeError) as error:  # RuntimeError: the user has no home folder
@@ -46,12 +47,6 @@ def cache_folder() -> pathlib.Path | None:
         warn_not_stored(f"other users may write to {folder}")
         return None
     return folder
-
-
-def _chosen_folder() -> pathlib.Path:
-    if named := os.environ.get("AIRMUSCLE_CACHE_DIR"):
-        return pathlib.Path(named)
-    return user_folder("cache") / "kernels"
 
 
 def read_private(path: pathlib.Path) -> bytes | None:

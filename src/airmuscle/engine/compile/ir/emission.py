@@ -5,6 +5,8 @@ import functools
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from ....core import TraceError
 from .instructions import CALLED, Code, Instruction, Operand, Operation
 from .scheduling import ConditionalBlock, Item
@@ -22,6 +24,12 @@ _FUNCTIONS = {Operation.SQRT: "sqrt", Operation.ABS: "abs", Operation.FLOOR: "fl
 _COMPARISONS = {Operation.LESS: "<", Operation.LESS_EQUAL: "<=", Operation.EQUAL: "==", Operation.NOT_EQUAL: "!="}
 _EXTREMES = {Operation.FMIN: "<", Operation.FMAX: ">", Operation.MINIMUM: "<", Operation.MAXIMUM: ">"}
 """Strict comparison, as in the processor's instruction: of two equal values either may be returned."""
+
+
+def nearest_single(value: float) -> float:
+    """The nearest number in single precision; infinity where the value is too large for it."""
+    with np.errstate(over="ignore"):
+        return float(np.float32(value))
 
 
 class FunctionBlock(abc.ABC):

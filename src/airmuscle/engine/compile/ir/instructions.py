@@ -170,15 +170,10 @@ def _selects(body: Sequence[Instruction]) -> list[Instruction]:
 
     chosen = []
     for line in body:
-        first, second = (mask(a) for a in line.arguments) if line.operation == Operation.ADD else (None, None)
-        if first and second and negated(second.arguments[0]) == first.arguments[0]:
-            line = Instruction(
-                Operation.SELECT, line.result, (first.arguments[0], first.arguments[1], second.arguments[1])
-            )
-        elif first and second and negated(first.arguments[0]) == second.arguments[0]:
-            line = Instruction(
-                Operation.SELECT, line.result, (second.arguments[0], second.arguments[1], first.arguments[1])
-            )
+        masks = [found for a in line.arguments if line.operation == Operation.ADD and (found := mask(a))]
+        for one, other in (masks, masks[::-1]) if len(masks) == 2 else ():
+            if line.operation == Operation.ADD and negated(other.arguments[0]) == one.arguments[0]:
+                line = Instruction(Operation.SELECT, line.result, (*one.arguments, other.arguments[1]))
         chosen.append(line)
     return chosen
 

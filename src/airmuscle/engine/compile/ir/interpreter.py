@@ -6,12 +6,11 @@ library that Python uses.
 
 import math
 import operator
-import struct
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from .emission import FunctionBlock
+from .emission import FunctionBlock, nearest_single
 from .instructions import Operand
 
 
@@ -26,14 +25,6 @@ _OPERATORS: dict[str, Callable[[float, float], float]] = {
     "+": operator.add, "-": operator.sub, "*": operator.mul, "/": _divided, "<": operator.lt, "<=": operator.le,
     ">": operator.gt, "==": operator.eq, "!=": operator.ne,
 }  # fmt: skip
-
-
-def _to_single(value: float) -> float:
-    try:
-        single: float = struct.unpack("<f", struct.pack("<f", value))[0]
-    except OverflowError:
-        return math.copysign(math.inf, value)
-    return single
 
 
 class InterpretedBody(FunctionBlock):
@@ -52,7 +43,7 @@ class InterpretedBody(FunctionBlock):
 
     def _result(self, value: float) -> str:
         name = self.new_name()
-        self._values[name] = _to_single(value) if self._single else value
+        self._values[name] = nearest_single(value) if self._single else value
         return name
 
     def constant(self, value: float) -> str:

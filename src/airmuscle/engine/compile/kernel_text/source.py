@@ -64,11 +64,12 @@ class KernelSource:
 def read_kernels(module: str) -> dict[str, KernelSource]:
     """The functions of a module of `compile/kernels/`, by name."""
     text = resources.files(_PACKAGE).joinpath(f"{module}.py").read_text(encoding="utf-8")
-    return dict(_functions(text, f"{module}.py"))
+    return read_text(text, f"{module}.py")
 
 
 @functools.lru_cache(maxsize=8)
-def _functions(text: str, file: str) -> dict[str, KernelSource]:
+def read_text(text: str, file: str) -> dict[str, KernelSource]:
+    """The functions of the text of a module, by name; `file` is its name in messages."""
     nodes = ast.parse(text).body
     defined = [node for node in nodes if isinstance(node, ast.FunctionDef)]
     imported = {node.name: file.removesuffix(".py") for node in defined}
@@ -77,15 +78,8 @@ def _functions(text: str, file: str) -> dict[str, KernelSource]:
             imported |= {alias.name: node.module for alias in node.names}
     tokens = tokenize.generate_tokens(io.StringIO(text).readline)
     comments = {t.start[0]: t.string.lstrip("# ") for t in tokens if t.type == tokenize.COMMENT and t.start[1]}
-    comments = {
-        line: comment for line, comment in comments.items() if not comment.startswith(("fmt:", "type:", "noqa"))
-    }
+    comments = {line: text for line, text in comments.items() if not text.startswith(("fmt:", "type:", "noqa"))}
     return {node.name: KernelSource(file, node, _constants(nodes), imported, comments) for node in defined}
-
-
-def read_text(text: str, file: str) -> dict[str, KernelSource]:
-    """The functions of the text of a module, by name; `file` is its name in messages."""
-    return _functions(text, file)
 
 
 @functools.cache
@@ -98,10 +92,10 @@ def plain_kernels(module: str) -> Mapping[str, Callable[..., Any]]:
     defined = read_kernels(module)
     names: dict[str, Any] = {"np": math, "sqrt": math.sqrt}
     for source in defined.values():
-        called = {
-            name: other for name, other in source.imported.items() if other != module and name in read_kernels(other)
-        }
-        names |= {**source.constants, **{name: plain_kernels(other)[name] for name, other in called.items()}}
+        names |= source.constants
+        for name, other in source.imported.items():
+            if other != module and name in read_kernels(other):
+                names[name] = plain_kernels(other)[name]
     exec(compile(ast.fix_missing_locations(tree), str(path), "exec"), names)
     return {name: names[name] for name in defined}
 

@@ -5,7 +5,7 @@ import functools
 import struct
 from collections.abc import Callable, Mapping, Sequence
 
-from ..ir.emission import FunctionBlock, TargetLanguage
+from ..ir.emission import FunctionBlock, TargetLanguage, nearest_single
 from ..ir.instructions import CALLED, POWERS, Operand, Operation
 
 FLAGS = "nsz arcp contract reassoc afn"
@@ -68,7 +68,7 @@ class LlvmType:
     def literal(self, value: float) -> str:
         """A number as LLVM text; in single precision it is rounded first, because LLVM requires an exact value."""
         if self.bits == 32:
-            value = struct.unpack("<f", struct.pack("<f", value))[0]
+            value = nearest_single(value)
         return f"0x{struct.unpack('<Q', struct.pack('<d', value))[0]:016X}"
 
     def _of(self, element: str) -> str:

@@ -1,10 +1,9 @@
 """Text of printed functions for programs: C99 in double or single precision, ECMAScript modules, MATLAB and Octave."""
 
 import dataclasses
-import struct
 from collections.abc import Sequence
 
-from ..ir.emission import FunctionBlock
+from ..ir.emission import FunctionBlock, nearest_single
 from .body import TextBody, TextLanguage
 
 COMPLEX = ("sqrt", "log", "log1p", "asin", "acos", "pow")
@@ -38,11 +37,8 @@ class CBody(TextBody):
         """In single precision the nearest number; what is too large for it becomes infinite, as in arithmetic."""
         if not self._suffix:
             return repr(value)
-        try:
-            single: float = struct.unpack("<f", struct.pack("<f", value))[0]
-        except OverflowError:
-            return self.infinity
-        return f"{single:.9g}" + ("" if any(c in f"{single:.9g}" for c in ".e") else ".0") + self._suffix
+        text = f"{nearest_single(value):.9g}"
+        return self.infinity if text == "inf" else text + ("" if set(".e") & set(text) else ".0") + self._suffix
 
     def call(self, function: str, x: Sequence[str]) -> str:
         name = "fabs" if function == "abs" else function
