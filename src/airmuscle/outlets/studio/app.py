@@ -7,12 +7,12 @@ import collections
 import threading
 from collections.abc import Callable, Mapping
 from importlib import metadata
-from pathlib import Path
 from typing import Any
 
 from ...core import AirmuscleError
 from ...files.library.files import LAWS, PLANTS, list_laws, list_plants, read_toml
 from ..requests import BraidRequest, FitRequest, JointFitRequest, ReadingRequest, RequestError, form_fields
+from . import tasks
 from .fit_routes import FitService
 from .joint_sheet import joint_names, sheet_of_joint
 from .page import MAX_PAGE_SHEETS, self_contained_page, server_page, web_files
@@ -21,22 +21,12 @@ from .security import (
     Application,
     BadRequest,
     cookie_name,
-    decoded,
     given_token,
     json_answer,
-    limited_body,
+    limited_text,
     secured,
     table_of,
 )
-from .tasks import (
-    MAX_TEXT,
-    sheet_of_law,
-    sheet_of_law_text,
-    sheet_of_library_plant,
-    sheet_of_scenario_text,
-    size_form,
-    size_sheet,
-)  # fmt: skip
 from .worker import LimitError, WorkerPool
 
 WORKERS = 5
@@ -51,13 +41,13 @@ MAX_SHEETS = 100
 """Number of sheets that the server keeps (chosen)."""
 MAX_PAGE = 256 * 1024
 """Largest size of a request for a self-contained page [bytes] (chosen)."""
-LONG_TASKS = (sheet_of_joint, size_sheet)
+LONG_TASKS = (sheet_of_joint, tasks.size_sheet)
 """Tasks that leave the workers of the other sheets free."""
 
 
 SHEETS: Mapping[str, tuple[str, Callable[[], Any], Callable[[str], dict[str, Any]]]] = {
-    "law": ("muscle or law", list_laws, sheet_of_law),
-    "plant": ("plant", list_plants, sheet_of_library_plant),
+    "law": ("muscle or law", list_laws, tasks.sheet_of_law),
+    "plant": ("plant", list_plants, tasks.sheet_of_library_plant),
     "joint": ("joint", joint_names, sheet_of_joint),
 }
 """Sheets of the library by their address: what they are, their names, and the task that makes one."""
@@ -96,24 +86,22 @@ class Sheets:
         with self._lock:
             self._kept[sheet["id"]] = sheet
             self._kept.move_to_end(sheet["id"])
-            while len(self._kept) > MAX_SHEETS:
+            if len(self._kept) > MAX_SHEETS:
                 self._kept.popitem(last=False)
         return sheet
 
 
 def library_list() -> dict[str, Any]:
     """Names and titles of the laws and plants that the page offers."""
-    kinds = {"laws": (LAWS, list_laws()), "plants": (PLANTS, list_plants()), "joints": (PLANTS, joint_names())}
-    rows = {kind: [_row(folder, name) for name in names] for kind, (folder, names) in kinds.items()}
-    requests = (ReadingRequest, BraidRequest, FitRequest)
-    forms = {"size": size_form(), "fit": [field for each in requests for field in form_fields(each)],
-             "arm": form_fields(JointFitRequest)}  # fmt: skip
-    return {"version": metadata.version("airmuscle"), **rows, "forms": forms}
-
-
-def _row(folder: Path, name: str) -> dict[str, str]:
-    tables = read_toml(folder / f"{name}.toml")
-    return {"name": name, "title": tables["title"], "provenance": tables.get("provenance", "chosen")}
+    listed: dict[str, Any] = {"version": metadata.version("airmuscle"), "laws": [], "plants": [], "joints": []}
+    names_of = {"laws": (LAWS, list_laws()), "plants": (PLANTS, list_plants()), "joints": (PLANTS, joint_names())}
+    for kind, (folder, names) in names_of.items():
+        for name in names:
+            tables = read_toml(folder / f"{name}.toml")
+            row = {"name": name, "title": tables["title"], "provenance": tables.get("provenance", "chosen")}
+            listed[kind].append(row)
+    fit = [field for each in (ReadingRequest, BraidRequest, FitRequest) for field in form_fields(each)]
+    return {**listed, "forms": {"size": tasks.size_form(), "fit": fit, "arm": form_fields(JointFitRequest)}}
 
 
 def create_app(
@@ -136,16 +124,19 @@ def create_app(
         Route("/web/{name:path}", handlers.web),
         Route("/program/{name}", handlers.program),
         Route("/api/library", handlers.library),
-        Route("/api/law", handlers.of_text(sheet_of_law_text), methods=["POST"]),
-        Route("/api/plant", handlers.of_text(sheet_of_scenario_text), methods=["POST"]),
+        Route("/api/law", handlers.of_text(tasks.sheet_of_law_text), methods=["POST"]),
+        Route("/api/plant", handlers.of_text(tasks.sheet_of_scenario_text), methods=["POST"]),
         *(Route(f"/api/{kind}/{{name}}", handlers.of_library(kind)) for kind in SHEETS),
-        Route("/api/size", handlers.of_text(size_sheet, LIBRARY_LIMIT), methods=["POST"]),
+        Route("/api/size", handlers.of_text(tasks.size_sheet, LIBRARY_LIMIT), methods=["POST"]),
         Route("/api/page", handlers.save_page, methods=["POST"]),
         *(fits or FitService(pool)).routes(),
     ]
     errors: dict[Any, Any] = {
-        AirmuscleError: _refused, ClientDisconnect: _closed, 404: _missing, 405: _missing, 500: _failed,
-    }  # fmt: skip
+        AirmuscleError: _refused,
+        ClientDisconnect: _stating("the connection was closed.", 400),  # nobody receives it: the tab was closed
+        **{status: _stating("there is no such address.", status) for status in (404, 405)},
+        500: _stating("the server failed; its terminal states the reason.", 500),
+    }
     return secured(Starlette(routes=routes, exception_handlers=errors), access)
 
 
@@ -207,7 +198,7 @@ class Handlers:
         """The handler of the sheets that a task makes of texts of users."""
 
         async def handle(request: Any) -> Any:
-            text = decoded(await limited_body(request, MAX_TEXT))
+            text = await limited_text(request, tasks.MAX_TEXT)
             return await self._computed(self._sheets.of_text, task, text, limit)
 
         return handle
@@ -221,15 +212,14 @@ class Handlers:
         """One file of what is on the screen: the request names the sheets and the state of the page."""
         from starlette.responses import Response
 
-        wanted = read_page_request(decoded(await limited_body(request, MAX_PAGE)))
-        named = [self._sheets.get(identifier) for identifier in wanted["sheets"]]
-        sheets = [sheet for sheet in named if sheet is not None]
-        if len(sheets) < len(named):
+        names, state = _page_request(await limited_text(request, MAX_PAGE))
+        sheets = [sheet for sheet in map(self._sheets.get, names) if sheet is not None]
+        if len(sheets) < len(names):
             raise BadRequest("a program is no longer kept; reload the page.", 404)
-        return Response(self_contained_page(sheets, wanted["state"]), media_type="text/html")
+        return Response(self_contained_page(sheets, state), media_type="text/html")
 
 
-def read_page_request(text: str) -> dict[str, Any]:
+def _page_request(text: str) -> tuple[list[str], dict[str, Any]]:
     """The identifiers of sheets and the state in a request for a page, without that of fits. Raises BadRequest."""
     wanted = table_of(text)
     names, state = wanted.get("sheets"), wanted.get("state")
@@ -237,7 +227,7 @@ def read_page_request(text: str) -> dict[str, Any]:
         raise BadRequest("the request must contain sheets, a list of identifiers, and a state.")
     if not 1 <= len(names) <= MAX_PAGE_SHEETS:
         raise BadRequest(f"{len(names)} sheets are requested; allowed range: 1 to {MAX_PAGE_SHEETS}.")
-    return {"sheets": names, "state": {name: state for name, state in state.items() if name != "fit"}}
+    return names, {name: tab for name, tab in state.items() if name != "fit"}
 
 
 def _without_script(sheet: Mapping[str, Any]) -> dict[str, Any]:
@@ -251,14 +241,10 @@ async def _refused(request: Any, error: Exception) -> Any:
     return json_answer({"error": str(error.message), **field}, status)
 
 
-async def _missing(request: Any, error: Any) -> Any:
-    return json_answer({"error": "there is no such address."}, int(error.status_code))
+def _stating(text: str, status: int) -> Callable[[Any, Any], Any]:
+    """The handler of an error that has one text."""
 
+    async def answer(request: Any, error: Any) -> Any:
+        return json_answer({"error": text}, status)
 
-async def _closed(request: Any, error: Exception) -> Any:
-    """Nobody receives this answer: the tab was closed during its request."""
-    return json_answer({"error": "the connection was closed."}, 400)
-
-
-async def _failed(request: Any, error: Exception) -> Any:
-    return json_answer({"error": "the server failed; its terminal states the reason."}, 500)
+    return answer

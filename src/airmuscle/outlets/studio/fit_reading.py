@@ -1,9 +1,9 @@
-"""Reading of uploaded files: recordings, and every problem with the field of the page that it concerns."""
+"""Reading of uploaded files: recordings, and every problem in the words of the field of the page that it concerns."""
 
 import dataclasses
 import os
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 
 import airmuscle as am
@@ -14,10 +14,9 @@ from ...bench.readers.interpret import interpret, resolve_headings, unit_convers
 from ...bench.readers.mapping import apply_mapping
 from ...bench.readers.reader import check_bench, read_tables
 from ...bench.segment import Outlier, check_contents, find_bench_outliers
-from ...core import AMBIENT_PRESSURE, AirmuscleError, AirmuscleWarning, ColumnError, quantity
-from ...recording.columns import Heading, parse_heading
+from ...core import AMBIENT_PRESSURE, AirmuscleError, AirmuscleWarning, ColumnError, Hint, HintedText, quantity
+from ...recording.columns import parse_heading
 from ..requests.declaration import RequestError
-from .fit_hints import as_field_error, in_page_words
 from .fit_settings import FitSettings
 from .fit_uploads import FILES
 
@@ -129,8 +128,7 @@ def _read_file(path: Path, settings: FitSettings, read: ReadSet) -> None:
 
 def without_folder(text: str, folder: Path) -> str:
     """The text without the path of a folder, or its beginning, which a reader of another package may quote."""
-    path = str(folder)
-    text = text.replace(f"{path}{os.sep}", "")
+    path, text = str(folder), text.replace(f"{folder}{os.sep}", "")
     first_directory = folder.parents[-2] if len(folder.parents) > 1 else folder
     for length in range(len(path), len(f"{first_directory}{os.sep}"), -1):
         text = text.replace(path[:length], "…")
@@ -164,13 +162,11 @@ def _keys(table: RawTable) -> list[str]:
 def _columns(table: RawTable, settings: FitSettings) -> Iterator[FileColumn]:
     units = table.units or ("",) * len(table.headings)
     for key, heading, unit_row in zip(_keys(table), table.headings, units, strict=False):
-        chosen = settings.columns.get(key)
+        chosen, unit = settings.columns.get(key), ""
         name, stated, known = _name_and_unit(heading)
         stated = unit_row or stated
         if chosen:
             name, unit, known = _name_and_unit(chosen)
-        else:
-            unit = ""
         yield FileColumn(key, heading, name if known else heading, unit or stated, stated, known, chosen != "")
 
 
@@ -210,32 +206,75 @@ def _unit_problems(
         try:
             unit_conversion(table, heading, pressure)
         except AirmuscleError as error:
-            yield RequestError(_unit_text(column, heading, error), f"column:{column.key}")
-
-
-def _unit_text(column: FileColumn, heading: Heading, error: AirmuscleError) -> str:
-    if heading.unit is None:
-        return f"the unit of '{column.key}' ({heading.name}) is not stated in the file; write it into the field Unit."
-    return in_page_words(error.message).partition(": ")[2] or str(error.message)
+            text = in_page_words(error.message).partition(": ")[2] or str(error.message)
+            if heading.unit is None:
+                what = f"the unit of '{column.key}' ({heading.name})"
+                text = f"{what} is not stated in the file; write it into the field Unit."
+            yield RequestError(text, f"column:{column.key}")
 
 
 def _check_needed(recording: am.Recording, file: str, read: ReadSet) -> None:
     """Complain about each quantity that a static fit needs and the recording lacks."""
-    for name in NEEDED:
-        if name in recording:
-            continue
-        moved = next((each for each in ("length", "shortening") if each in recording.columns), "")
+    moved = next((each for each in ("length", "shortening") if each in recording.columns), "")
+    for name in (name for name in NEEDED if name not in recording):
+        text, field = f"no column is a {name}. Select its column.", "columns"
         if name == "contraction" and moved:
-            text = f"{recording.origin}: the resting length is not known, which converts the {moved} to a contraction."
-            read.complain(
-                RequestError(f"{text} Write it into the field 'Resting length', such as 300 mm.", "resting_length")
-            )
+            text = f"the resting length is not known, which converts the {moved} to a contraction. Write it into the "
+            text, field = f"{text}field 'Resting length', such as 300 mm.", "resting_length"
         elif name == "contraction":
-            text = (
-                f"{recording.origin}: there is neither a contraction nor a length. Select its column, which may "
-                "be a shortening or an elongation, or write the length at which the muscle was held into the row of "
-                "the file."
-            )
-            read.complain(RequestError(text, f"file:{file}"))
-        else:
-            read.complain(RequestError(f"{recording.origin}: no column is a {name}. Select its column.", "columns"))
+            text = "there is neither a contraction nor a length. Select its column, which may be a shortening or an "
+            text += "elongation, or write the length at which the muscle was held into the row of the file."
+            field = f"file:{file}"
+        read.complain(RequestError(f"{recording.origin}: {text}", field))
+
+
+# Remedies of the page: the hints of messages in the words of the fields of the tab Fit
+
+
+def _missing(hint: Hint) -> str:
+    """The field of a treatment of missing values, and that of its codes."""
+    codes = ", ".join(map(str, hint.value.codes))
+    choice = "interpolate short gaps" if isinstance(hint.value, am.bench.InterpolateMissing) else "leave out the rows"
+    return f"select '{choice}' in the field 'Missing values'" + (
+        f" and write {codes} into the field 'Codes of missing values'" if codes else ""
+    )
+
+
+_INSTRUCTIONS: Mapping[str, tuple[str, Callable[[Hint], str]]] = {
+    "units": ("columns", lambda hint: f"select it in the table Columns, row {', '.join(map(str, hint.value))}"),
+    "columns": ("columns", lambda hint: "select the quantity of each column in the table Columns"),
+    "constants": ("files", lambda hint: "write it into the row of the file, in the table Files"),
+    "file_name": ("file_name", lambda hint: f"write {hint.value} into the field 'Values in file names'"),
+    "time": ("time", lambda hint: "select another time base"),
+    "decimal": ("decimal", lambda hint: "select the decimal mark"),
+    "missing": ("missing", _missing),
+    "drop_outliers": ("outliers", lambda hint: "select 'leave out' in the field 'Suspected outliers'"),
+    "skip_rows": ("skip_rows", lambda hint: "write it into the field 'Lines above the headings'"),
+    "displacement_zero": (
+        "displacement_zero", lambda hint: "write it into the field 'Displacement at the resting length'"
+    ),
+    "resting_length": ("resting_length", lambda hint: "write it into the field 'Resting length'"),
+    **dict.fromkeys(("by", "leave_out"), (
+        "leave_out", lambda hint: f"select {hint.value.quantity} in the field 'Cross-validation leaves out'"
+    )),
+    "bench.fit_hysteresis": ("hysteresis", lambda hint: "mark 'Friction from both branches'"),
+}  # fmt: skip
+"""Field and instruction by the argument of a hint, or by its function."""
+
+
+def in_page_words(text: str) -> str:
+    """The text with hints that name fields of the page; a hint for which the page has no field is left out."""
+    if not isinstance(text, HintedText):
+        return text
+
+    def sentence(hint: Hint) -> str:
+        known = _INSTRUCTIONS.get(hint.argument or hint.function)
+        return f"{hint.purpose}, {known[1](hint)}." if known else ""
+
+    return text.written(sentence)
+
+
+def as_field_error(error: AirmuscleError, field: str = "") -> RequestError:
+    """The error with its field: its own, that of its hint, or else `field`."""
+    hinted = [_INSTRUCTIONS[hint.argument][0] for hint in error.message.hints if hint.argument in _INSTRUCTIONS]
+    return RequestError(in_page_words(error.message), getattr(error, "field", "") or next(iter(hinted), field))

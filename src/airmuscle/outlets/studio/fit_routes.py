@@ -27,7 +27,7 @@ from .fit_settings import FitSettings, read_settings
 from .fit_sheet import sheet_of_files
 from .fit_task import DOWNLOADS, RESULT, run_fit
 from .fit_uploads import UploadStore, check_file_name
-from .security import BadRequest, decoded, json_answer, limited_body, table_of
+from .security import BadRequest, json_answer, limited_text, table_of
 from .worker import LimitedWorker
 
 MAX_SETTINGS = 256 * 1024
@@ -86,7 +86,8 @@ class FitQueue:
                 raise BadRequest(f"{MAX_WAITING} fits wait already; try again later.", 503)
             task = FitTask(identifier, set_name, out, (str(folder), str(out), *arguments))
             self._tasks[identifier] = task
-            self._forget_old()
+            for old in self._in(DONE, FAILED, CANCELLED)[: max(0, len(self._tasks) - MAX_TASKS)]:
+                shutil.rmtree(self._tasks.pop(old.identifier).folder, ignore_errors=True)
             if len(self._threads) < self._count:
                 thread = threading.Thread(target=self._serve, name="airmuscle studio fit", daemon=True)
                 self._threads.append(thread)
@@ -97,10 +98,6 @@ class FitQueue:
     def _in(self, *states: str) -> list[FitTask]:
         """The tasks in these states, in the order of their arrival."""
         return [task for task in list(self._tasks.values()) if task.state in states]
-
-    def _forget_old(self) -> None:
-        for task in self._in(DONE, FAILED, CANCELLED)[: max(0, len(self._tasks) - MAX_TASKS)]:
-            shutil.rmtree(self._tasks.pop(task.identifier).folder, ignore_errors=True)
 
     def find(self, identifier: str) -> FitTask:
         """A task. Raises BadRequest if it is not kept."""
@@ -192,15 +189,13 @@ class FitService:
         """The routes for the application."""
         from starlette.routing import Route
 
-        return [
-            Route("/api/fit/file", self.add_file, methods=["POST"]),
-            Route("/api/fit/remove", self.remove_file, methods=["POST"]),
-            Route("/api/fit/read", self.read, methods=["POST"]),
-            Route("/api/fit/start", self.start, methods=["POST"]),
-            Route("/api/fit/task/{task}", self.status),
-            Route("/api/fit/task/{task}/cancel", self.cancel, methods=["POST"]),
-            Route("/api/fit/task/{task}/{name}", self.file),
-        ]
+        changing = {
+            "file": self.add_file, "remove": self.remove_file, "read": self.read, "start": self.start,
+            "task/{task}/cancel": self.cancel,
+        }  # fmt: skip
+        reading = {"task/{task}": self.status, "task/{task}/{name}": self.file}
+        routes = [Route(f"/api/fit/{path}", handler, methods=["POST"]) for path, handler in changing.items()]
+        return routes + [Route(f"/api/fit/{path}", handler) for path, handler in reading.items()]
 
     def stop(self) -> None:
         """End all tasks and remove all files."""
@@ -250,13 +245,11 @@ class FitService:
         from starlette.responses import FileResponse
 
         task, name = self._queue.find(request.path_params["task"]), request.path_params["name"]
-        path = task.folder / name
+        path, shown = task.folder / name, None if name == RESULT else name
         if name not in (RESULT, *DOWNLOADS) or task.state != DONE or not path.is_file():
             raise BadRequest("this fit has no such file.", 404)
         self._uploads.folder(task.set_name)  # a set whose result is read is not idle
-        kind = _TYPES[name.rpartition(".")[2]]
-        shown = None if name == RESULT else name
-        return FileResponse(path, media_type=kind, filename=shown)
+        return FileResponse(path, media_type=_TYPES[name.rpartition(".")[2]], filename=shown)
 
 
 def _settings(wanted: dict[str, Any]) -> FitSettings | ArmSettings:
@@ -275,4 +268,4 @@ def _name(wanted: dict[str, Any], key: str) -> str:
 
 async def _content(request: Any) -> dict[str, Any]:
     """The table in the body of a request. Raises BadRequest."""
-    return table_of(decoded(await limited_body(request, MAX_SETTINGS)))
+    return table_of(await limited_text(request, MAX_SETTINGS))

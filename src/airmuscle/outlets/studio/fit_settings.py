@@ -25,18 +25,19 @@ MAX_CHOICES = 500
 """Maximum number of corrected columns, or of files with facts of their own (chosen)."""
 TEXTS = tuple(each["name"] for each in form_fields(ReadingRequest))
 """Fields with a text that applies to all files."""
-CONSTANTS = {"resting_length": "300 mm", "ambient": "98 kPa", "displacement_zero": "12 mm"}
-"""Those that are constants of the runs, with an example."""
-BRAID = {"braid_radius": "10 mm", "braid_angle": "24.4 deg"}
-"""The geometry of a muscle whose law contains none, at rest, with examples."""
+BRAID = ("braid_radius", "braid_angle")
+"""The geometry of a muscle whose law contains none, at rest."""
+QUANTITIES = {
+    "resting_length": ("m", "300 mm"), "ambient": ("Pa", "98 kPa"), "displacement_zero": ("m", "12 mm"),
+    "braid_radius": ("m", "10 mm"), "braid_angle": ("rad", "24.4 deg"), "length": ("m", "300 mm"),
+}  # fmt: skip
+"""Fields and facts that are quantities, with their units and an example."""
 FILE_FACTS = ("resting_length", "length", "specimen")
 """Facts that may be stated for one file."""
 COLUMN_CHOICES = (*am.recording.QUANTITIES, "resting_length", "ambient")
 """Quantities of a column."""
 SPLITS: Mapping[str, am.bench.GroupSplit | None] = {"": None, **GROUPS}
 """Groups that are left out in turn; by default those that the data allow."""
-_UNITS = {"braid_angle": "rad", "ambient": "Pa"}
-"""Units of the facts; of others metres."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -98,29 +99,26 @@ def read_settings(data: Any) -> FitSettings:
     if not isinstance(data, dict):
         raise RequestError("the request must be a table of settings.")
     texts = {name: _text(data.get(name, ""), name) for name in (*TEXTS, *BRAID)}
-    facts = _table(data.get("files", {}), "files")
-    settings = FitSettings(
-        texts,
-        {key: _heading(key, value) for key, value in _table(data.get("columns", {}), "columns").items()},
-        {name: _facts(name, value) for name, value in facts.items()},
-        _rules(data.get("rules", [])),
-        _text(data.get("entry", ""), "entry"),
-        _text(data.get("leave_out", ""), "leave_out"),
-        data.get("hysteresis") is True,
-    )
+    facts = {name: _facts(name, value) for name, value in _table(data.get("files", {}), "files").items()}
+    columns = {key: _heading(key, value) for key, value in _table(data.get("columns", {}), "columns").items()}
+    rules = data.get("rules", [])
+    if not isinstance(rules, list) or len(rules) > MAX_RULES:
+        raise RequestError(f"at most {MAX_RULES} selections of rows are possible; remove some.", "rules")
+    entry, leave_out = (_text(data.get(name, ""), name) for name in ("entry", "leave_out"))
+    hysteresis = data.get("hysteresis") is True
+    settings = FitSettings(texts, columns, facts, tuple(map(_rule, rules)), entry, leave_out, hysteresis)
     _check(settings)
     return settings
 
 
 def _check(settings: FitSettings) -> None:
-    for name in (*CONSTANTS, *BRAID):
-        if settings.texts[name]:
+    for name in QUANTITIES:
+        if settings.texts.get(name):
             _check_quantity(settings.texts[name], name, name)
     _ = settings.braid  # checks it
     for file, facts in settings.facts.items():
-        for name in ("resting_length", "length"):
-            if facts.get(name):
-                _check_quantity(facts[name], name, f"file:{file}")
+        for name in (each for each in facts if each in QUANTITIES):
+            _check_quantity(facts[name], name, f"file:{file}")
     if settings.entry and settings.entry not in list_laws():
         raise RequestError(f"the library has no muscle or law '{settings.entry}'.", "entry")
     if settings.leave_out not in SPLITS:
@@ -131,10 +129,9 @@ def _check(settings: FitSettings) -> None:
 
 
 def _check_quantity(text: str, name: str, field: str) -> None:
-    words = name.replace("_", " ")
-    example = {**CONSTANTS, **BRAID}.get(name, "300 mm")
+    words, (unit, example) = _words(name), QUANTITIES[name]
     try:
-        value = quantity(text, _UNITS.get(name, "m"), ambient=0.0, where=words)
+        value = quantity(text, unit, ambient=0.0, where=words)
     except AirmuscleError as error:
         raise RequestError(f"{error.message} Write a number with its unit, such as {example}.", field) from None
     signed = name == "displacement_zero"
@@ -145,9 +142,7 @@ def _check_quantity(text: str, name: str, field: str) -> None:
 
 def _text(value: Any, field: str, longest: int = 200) -> str:
     if not isinstance(value, str) or len(value) > longest or not value.isprintable():
-        raise RequestError(
-            f"{field.replace('_', ' ')} must be a text of at most {longest} printable characters.", field
-        )
+        raise RequestError(f"{_words(field)} must be a text of at most {longest} printable characters.", field)
     return value.strip()
 
 
@@ -174,16 +169,9 @@ def _facts(file: str, value: Any) -> dict[str, str]:
     facts = _table(value, f"file:{file}")
     unknown = [name for name in facts if name not in FILE_FACTS]
     if unknown:
-        raise RequestError(
-            f"'{str(unknown[0])[:40]}' is no fact of a file; allowed: {', '.join(FILE_FACTS)}.", f"file:{file}"
-        )
+        text = f"'{str(unknown[0])[:40]}' is no fact of a file; allowed: {', '.join(FILE_FACTS)}."
+        raise RequestError(text, f"file:{file}")
     return {name: text for name in FILE_FACTS if (text := _text(facts.get(name, ""), f"file:{file}"))}
-
-
-def _rules(value: Any) -> tuple[Rule, ...]:
-    if not isinstance(value, list) or len(value) > MAX_RULES:
-        raise RequestError(f"at most {MAX_RULES} selections of rows are possible; remove some.", "rules")
-    return tuple(map(_rule, value))
 
 
 def _rule(value: Any) -> Rule:
@@ -193,8 +181,10 @@ def _rule(value: Any) -> Rule:
         rows = value.get("rows")
         if rows is not None:
             first, stop = rows
-            rows = (_index(first), _index(stop))
-        if rows is None and not ranges:
+            if not all(type(row) is int and row >= 0 for row in (first, stop)):
+                raise ValueError
+            rows = (first, stop)
+        elif not ranges:
             raise ValueError
         return Rule(recordings, ranges, rows, value.get("keep") is True)
     except (AttributeError, TypeError, ValueError):
@@ -210,12 +200,6 @@ def _interval(value: Any) -> tuple[float, float]:
     return low, high
 
 
-def _index(value: Any) -> int:
-    if not isinstance(value, int) or isinstance(value, bool) or value < 0:
-        raise ValueError
-    return value
-
-
 # What the rules leave of a recording
 
 Mask = npt.NDArray[np.bool_]
@@ -223,16 +207,14 @@ Mask = npt.NDArray[np.bool_]
 
 def inside(rule: Rule, recording: am.Recording) -> Mask:
     """The rows of a recording that a rule describes, shape (N,)."""
-    mask = np.ones(len(recording), dtype=bool)
+    mask = np.full(len(recording), rule.rows is None)
     if rule.rows is not None:
-        mask[:] = False
         mask[slice(*rule.rows)] = True
         return mask
     for name, (low, high) in rule.ranges.items():
         if name not in recording:
-            raise RequestError(
-                f"{recording.origin}: no column '{name[:40]}', which a selection of rows names.", "rules"
-            )
+            text = f"{recording.origin}: no column '{name[:40]}', which a selection of rows names."
+            raise RequestError(text, "rules")
         mask &= (recording[name] >= low) & (recording[name] <= high)
     return mask
 
@@ -242,10 +224,9 @@ def used_rows(recording: am.Recording, rules: Sequence[Rule], outliers: Sequence
     column."""
     used = kept_rows(recording, outliers)
     for rule in rules:
-        if rule.recordings and recording.origin not in rule.recordings:
-            continue
-        rows = inside(rule, recording)
-        used &= rows if rule.keep else ~rows
+        if not rule.recordings or recording.origin in rule.recordings:
+            rows = inside(rule, recording)
+            used &= rows if rule.keep else ~rows
     return used
 
 

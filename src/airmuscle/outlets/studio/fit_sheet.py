@@ -14,8 +14,7 @@ from ...bench.segment import Inspection, Outlier, Run, inspect_all, kept_rows
 from ...core import AirmuscleError
 from ...recording.columns import display_scale
 from ..requests.declaration import RequestError
-from .fit_hints import in_page_words
-from .fit_reading import ReadSet, read_set
+from .fit_reading import FileColumn, ReadSet, in_page_words, read_set
 from .fit_settings import FitSettings, Rule, used_rows
 from .fit_uploads import FILES
 
@@ -64,44 +63,40 @@ def _selected_rows(read: ReadSet, rules: Sequence[Rule]) -> list[Any]:
     return used
 
 
-def _column(column: Any) -> dict[str, Any]:
+def _column(column: FileColumn) -> dict[str, Any]:
     factor, shown = display_scale(column.name) if column.known else (1.0, "")
-    return {
-        "key": column.key, "heading": column.heading, "quantity": column.name if column.known else "",
-        "unit": column.unit, "stated": column.stated, "used": column.used, "factor": factor, "shown_unit": shown,
-    }  # fmt: skip
+    own = {key: getattr(column, key) for key in ("key", "heading", "unit", "stated", "used")}
+    return {**own, "quantity": column.name if column.known else "", "factor": factor, "shown_unit": shown}
 
 
 def _recording(
     recording: am.Recording, file: str, inspection: Inspection | None, used: Any, outliers: Sequence[Outlier], step: int
 ) -> dict[str, Any]:
-    columns = [name for name in SHOWN if name in recording]
+    columns, constants, ranges = [name for name in SHOWN if name in recording], {}, {}
+    for name, value in recording.constants.items():
+        factor, unit = display_scale(CONSTANT_QUANTITIES.get(name, ""))
+        constants[name] = f"{value * factor:.5g} {unit}".strip() if isinstance(value, float | int) else str(value)
+    for name in recording if len(recording) else ():
+        factor, _ = display_scale(name)
+        ranges[name] = [float(recording[name].min()) * factor, float(recording[name].max()) * factor]
     return {
-        "origin": recording.origin,
-        "file": file,
-        "rows": len(recording),
-        "used": int(np.count_nonzero(used)),
-        "constants": {name: _constant(name, value) for name, value in recording.constants.items()},
-        "notes": [in_page_words(note) for note in recording.notes],
-        "ranges": {name: _range(name, recording) for name in recording if len(recording)},
+        "origin": recording.origin, "file": file, "rows": len(recording), "used": int(np.count_nonzero(used)),
+        "constants": constants, "notes": [in_page_words(note) for note in recording.notes], "ranges": ranges,
         **({} if inspection is None else _inspected(inspection)),
         "left_out": [int(row) for row in np.flatnonzero(~kept_rows(recording, outliers)) if row % step == 0],
         "points": {name: [float(f"{x:.{DIGITS}g}") for x in recording[name][::step]] for name in columns},
-    }
+    }  # fmt: skip
 
 
 def _inspected(inspection: Inspection) -> dict[str, Any]:
-    sampling = inspection.sampling
+    sampling, findings = inspection.sampling, inspection.findings[:MAX_LISTED]
     return {
-        "runs": [_run(run) for run in inspection.runs[:MAX_LISTED]],
-        "run_count": len(inspection.runs),
+        "runs": [_run(run) for run in inspection.runs[:MAX_LISTED]], "run_count": len(inspection.runs),
         "branches": len(inspection.branches),
         "sampling": None if sampling is None else {"rate": sampling.rate, "duration": sampling.duration},
         "outliers": len({each.row for each in inspection.outliers}),
-        "findings": [
-            {"text": in_page_words(each.text), "serious": each.serious} for each in inspection.findings[:MAX_LISTED]
-        ],
-    }
+        "findings": [{"text": in_page_words(each.text), "serious": each.serious} for each in findings],
+    }  # fmt: skip
 
 
 def _run(run: Run) -> dict[str, Any]:
@@ -109,17 +104,5 @@ def _run(run: Run) -> dict[str, Any]:
     if run.constant_column is not None and run.constant_value is not None:
         factor, unit = display_scale(run.constant_column)
         level = f"{run.constant_column} {run.constant_value * factor:.4g} {unit}"
-    return {
-        "kind": run.kind.name, "level": level, "swept": list(run.swept_columns),
-        "rows": [run.interval.start, run.interval.stop],
-    }  # fmt: skip
-
-
-def _constant(name: str, value: float | str) -> str:
-    factor, unit = display_scale(CONSTANT_QUANTITIES.get(name, ""))
-    return f"{value * factor:.5g} {unit}".strip() if isinstance(value, float | int) else str(value)
-
-
-def _range(name: str, recording: am.Recording) -> list[float]:
-    factor, _ = display_scale(name)
-    return [float(recording[name].min()) * factor, float(recording[name].max()) * factor]
+    rows = [run.interval.start, run.interval.stop]
+    return {"kind": run.kind.name, "level": level, "swept": list(run.swept_columns), "rows": rows}

@@ -30,8 +30,7 @@ from ...report.formula import to_display_mathml
 from ...report.write import write_into
 from ..requests import FitRequest, RequestError, fit_requested, problem_of_lengths
 from .arm_task import ArmSettings, run_arm_fit
-from .fit_hints import as_field_error, in_page_words
-from .fit_reading import read_set
+from .fit_reading import as_field_error, in_page_words, read_set
 from .fit_settings import SPLITS, FitSettings, selected
 
 Report = Callable[[float, str], None]
@@ -111,7 +110,6 @@ def _recordings(folder: Path, settings: FitSettings) -> tuple[list[am.Recording]
 
 def _friction(recordings: Sequence[am.Recording], folder: Path, report: Report) -> dict[str, Any]:
     """The friction of the loops, with its report; the reason if there is no loop."""
-
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always", AirmuscleWarning)
         try:
@@ -127,32 +125,20 @@ def _friction(recordings: Sequence[am.Recording], folder: Path, report: Report) 
 
     fits = [fit_loop(loop, progress=progress) for loop in loops]
     joint = fit_jointly(fits, progress=progress)
-    _write_friction(folder, fits, joint)
-    return {
-        "reason": "",
-        "loops": [_loop(fit) for fit in fits],
-        "joint": _sheet(joint_friction_chapter(joint, loops_not_joined(fits))) if joint else None,
-        "remarks": remarks,
-    }
-
-
-def _sheet(chapter: Chapter) -> dict[str, Any]:
-    return as_sheet(in_words(chapter, in_page_words))
-
-
-def _write_friction(folder: Path, fits: Sequence[LoopFit], joint: Any) -> None:
-    chapters = [in_words(chapter, in_page_words) for chapter in hysteresis_chapters(fits, joint)]
-    write_into(_made(folder / "friction"), chapters, title="Friction")
+    own, chapters = folder / "friction", hysteresis_chapters(fits, joint)
+    own.mkdir()
+    write_into(own, [in_words(chapter, in_page_words) for chapter in chapters], title="Friction")
+    (own / "report.html").replace(folder / "friction.html")
     chosen = select_friction(fits, joint)
     if chosen is not None:
         text = f"# {chosen.verdict}\n{part_toml('friction', chosen.friction)}"
         (folder / "friction.toml").write_text(text, encoding="utf-8")
-    (folder / "friction" / "report.html").replace(folder / "friction.html")
+    together = _sheet(joint_friction_chapter(joint, loops_not_joined(fits))) if joint else None
+    return {"reason": "", "loops": [_loop(fit) for fit in fits], "joint": together, "remarks": remarks}
 
 
-def _made(folder: Path) -> Path:
-    folder.mkdir()
-    return folder
+def _sheet(chapter: Chapter) -> dict[str, Any]:
+    return as_sheet(in_words(chapter, in_page_words))
 
 
 def _loop(fit: LoopFit) -> dict[str, Any]:
@@ -161,13 +147,9 @@ def _loop(fit: LoopFit) -> dict[str, Any]:
     direction = motion_direction(fit.loop.friction_path.displacement(recording), recording.columns.get("time"))
     rows = slice(None, None, max(1, -(-len(recording) // MAX_POINTS)))
     return {
-        **_sheet(loop_chapter(fit)),
-        "justified": fit.recommended is not None,
-        "varied": varied,
-        "x": recording[varied][rows],
-        "force": recording["force"][rows],
-        "direction": np.asarray(direction)[rows],
-    }
+        **_sheet(loop_chapter(fit)), "justified": fit.recommended is not None, "varied": varied,
+        "x": recording[varied][rows], "force": recording["force"][rows], "direction": np.asarray(direction)[rows],
+    }  # fmt: skip
 
 
 def _pack(folder: Path) -> list[str]:
@@ -184,64 +166,45 @@ def _pack(folder: Path) -> list[str]:
 
 def result_sheet(selection: LawSelection, fit: am.Fit) -> dict[str, Any]:
     """The selection and the recommended fit as plain data."""
-    best = selection.recommended
+    best, (equations, _) = selection.recommended, equation_section(fit)
     return {
-        "recommended": best.candidate.name,
-        "parameters": best.parameter_count,
-        "error": best.cross_validated_rmse,
+        "recommended": best.candidate.name, "parameters": best.parameter_count, "error": best.cross_validated_rmse,
         "reason": selection.reason,
         "comparisons": [
             {"purpose": each.purpose, "group": each.leave_out.group_name, **_sheet(each.chapter())}
             for each in selection.comparisons
         ],
         "fit": _sheet(fit.chapter()),
-        "equations": _equations(fit),
-        "parity": _parity(fit),
-        "bands": _bands(fit),
-    }
-
-
-def _equations(fit: am.Fit) -> list[dict[str, Any]]:
-    shown, _ = equation_section(fit)
-    return [
-        {
-            "title": each.title, "note": each.note, "lines": [to_display_mathml(line) for line in each.lines],
-            "sources": dict(each.sources),
-        }
-        for each in shown
-    ]  # fmt: skip
+        "equations": [
+            {"title": each.title, "note": each.note, "lines": [to_display_mathml(line) for line in each.lines],
+             "sources": dict(each.sources)}
+            for each in equations
+        ],
+        "parity": _parity(fit), "bands": _bands(fit),
+    }  # fmt: skip
 
 
 def _parity(fit: am.Fit) -> dict[str, Any]:
-    quantity = fit.fitted_quantity
-    step = max(1, math.ceil(fit.rows_used / MAX_PARITY_POINTS))
-    rows = slice(None, None, step)
-    return {
-        "quantity": quantity.name,
-        "unit": quantity.unit,
-        "step": step,
-        "measured": fit.recording[quantity.name][rows],
-        "modelled": fit.modelled[rows],
-        "residual": fit.residuals[rows],
-        "censored": (fit.censoring != 0)[rows],
-        **{name: fit.recording[name][rows] for name in ("pressure", "contraction", "force")},
-    }
+    quantity, step = fit.fitted_quantity, max(1, math.ceil(fit.rows_used / MAX_PARITY_POINTS))
+    columns = {
+        "measured": fit.recording[quantity.name], "modelled": fit.modelled, "residual": fit.residuals,
+        "censored": fit.censoring != 0, **{name: fit.recording[name] for name in ("pressure", "contraction", "force")},
+    }  # fmt: skip
+    shown = {name: column[::step] for name, column in columns.items()}
+    return {"quantity": quantity.name, "unit": quantity.unit, "step": step, **shown}
 
 
 def _bands(fit: am.Fit) -> dict[str, Any] | None:
     curves = band_curves(fit)
     if not curves:
         return None
-    return {
-        "constant": curves[0].constant,
-        "varying": curves[0].varying,
-        "basis": fit.error_basis,
-        "curves": [
-            {
-                "level": each.level, "x": each.points, "value": each.confidence.value,
-                "low": each.confidence.low, "high": each.confidence.high,
-                "prediction_low": each.prediction.low, "prediction_high": each.prediction.high,
-            }
-            for each in curves
-        ],
-    }  # fmt: skip
+    rows = [
+        {
+            "level": each.level, "x": each.points, "value": each.confidence.value, "low": each.confidence.low,
+            "high": each.confidence.high, "prediction_low": each.prediction.low,
+            "prediction_high": each.prediction.high,
+        }
+        for each in curves
+    ]  # fmt: skip
+    constant, varying = curves[0].constant, curves[0].varying
+    return {"constant": constant, "varying": varying, "basis": fit.error_basis, "curves": rows}

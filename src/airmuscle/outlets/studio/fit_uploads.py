@@ -4,7 +4,6 @@ A set has a random identifier, which only the page that uploaded it knows; it is
 A file appears under its name when it is complete. The folder of a server that was killed is removed by the next one.
 """
 
-import contextlib
 import os
 import re
 import secrets
@@ -131,8 +130,14 @@ class UploadStore:
         return self._top() / identifier / FILES
 
     def _top(self) -> Path:
+        """A folder that only this user can read; those of servers that were killed are removed before it is made."""
         if self._root is None:
-            self._root = _new_root(self._parent)
+            parent = self._parent or Path(tempfile.gettempdir())
+            for old in parent.glob(f"{_PREFIX}*"):
+                process = old.name.removeprefix(_PREFIX).partition("-")[0]
+                if process.isdecimal() and not old.is_symlink() and not is_running(int(process)):
+                    shutil.rmtree(old, ignore_errors=True)
+            self._root = Path(tempfile.mkdtemp(prefix=f"{_PREFIX}{os.getpid()}-", dir=parent))
         return self._root
 
 
@@ -148,14 +153,3 @@ async def _write_parts(path: Path, name: str, parts: AsyncIterator[bytes], allow
             file.write(part)
     if not size:
         raise BadRequest(f"{name} is empty.")
-
-
-def _new_root(parent: Path | None) -> Path:
-    """A folder that only this user can read; those of servers that were killed are removed."""
-    parent = Path(tempfile.gettempdir()) if parent is None else parent
-    for old in parent.glob(f"{_PREFIX}*"):
-        process = old.name.removeprefix(_PREFIX).partition("-")[0]
-        if process.isdecimal() and not old.is_symlink() and not is_running(int(process)):
-            with contextlib.suppress(OSError):
-                shutil.rmtree(old, ignore_errors=True)
-    return Path(tempfile.mkdtemp(prefix=f"{_PREFIX}{os.getpid()}-", dir=parent))

@@ -80,8 +80,7 @@ class ValveSet:
 
 def valve_set(plant: am.Plant) -> ValveSet:
     """The valves of a joint. Raises ParameterError for a circuit that the tab does not know."""
-    names, circuit = [muscle.name for muscle in plant.muscles], plant.circuits[0]
-    first, second = names
+    circuit, (first, second) = plant.circuits[0], (muscle.name for muscle in plant.muscles)
     kinds = {type(each) for each in plant.circuits}
     regulators = am.physics.ProportionalRegulator | am.physics.PressureRegulator
     if len(kinds) == 1 and isinstance(circuit, regulators):
@@ -97,7 +96,7 @@ def valve_set(plant: am.Plant) -> ValveSet:
         inner = am.control.ProportionalFeedback(pressures, commands, 3.0 / BAR)
         return ValveSet(pressures, inner, False, {commands[0]: shift, commands[1]: -shift})
     if kinds == {am.FillDischarge}:
-        valves = tuple(am.engine.SplitRange(f"{name}.fill", f"{name}.discharge") for name in names)
+        valves = tuple(am.engine.SplitRange(f"{name}.fill", f"{name}.discharge") for name in (first, second))
         inner = am.control.ProportionalFeedback(pressures, valves, 3.0 / BAR, 0.03 * BAR)
         offsets = {f"{first}.fill": OPENING, f"{second}.discharge": OPENING}
         return ValveSet(pressures, inner, True, offsets)
@@ -120,38 +119,29 @@ def joint_controllers(plant: am.Plant, statics: am.physics.JointStatics) -> tupl
     """The controllers of a joint, whose pressures are within the range of its statics less a part at both ends."""
     valves, (low, high) = valve_set(plant), statics.pressure_range
     pressure_range = (low + SPARE * (high - low), high - SPARE * (high - low))
-    affine = all(function.affine for function in statics.unlimited)
-    steps = 1 if affine else INVERSE_STEPS
+    steps = 1 if all(function.affine for function in statics.unlimited) else INVERSE_STEPS
     inverse = am.control.AntagonisticInverse(plant.muscles, plant.mechanism, *pressure_range, steps=steps)
     ahead = am.control.SetpointCommand(valves.pressures, AHEAD)
-    controllers = []
+    controllers, half = [], 0.5 * (pressure_range[1] - pressure_range[0])
     pid = am.PID("angle", DIFFERENCE, gain=2.0 * BAR, integral_time=0.3, derivative_time=0.05, derivative_filter=5.0)
-    for key, outer, gains, inside in (
-        ("pid", pid, PID_GAINS, ""),
-        ("cascade", _speed_cascade(), SPEED_GAINS, "inner."),
-    ):
-        half = 0.5 * (pressure_range[1] - pressure_range[0])
-        alone = am.control.Cascade(
-            outer, am.control.CoContraction(valves.pressures, 0.0, "mean_pressure"), (-half,), (half,)
+    inner = am.PID("angular_speed", DIFFERENCE, gain=0.1 * BAR, integral_time=0.1)
+    cascade = am.control.Cascade(am.PID("angle", "angular_speed", gain=6.0), inner, (-MAX_SPEED,), (MAX_SPEED,))
+    for key, outer, gains, inside in (("pid", pid, PID_GAINS, ""), ("cascade", cascade, SPEED_GAINS, "inner.")):
+        alone, offset = (
+            am.control.Cascade(outer, am.control.CoContraction(valves.pressures, 0.0, *mean), (-half,), (half,))
+            for mean in (("mean_pressure",), ())
         )
-        controllers.append(_with_valves(valves, pressure_range, key, alone, "outer.", inside, gains))
-        added = am.control.WithFeedForward(
-            ahead, am.control.Cascade(outer, am.control.CoContraction(valves.pressures, 0.0), (-half,), (half,))
-        )
-        controllers.append(
-            _with_valves(valves, pressure_range, f"{key}-ahead", added, "feedback.outer.", inside, gains)
-        )
+        added = am.control.WithFeedForward(ahead, offset)
+        controllers += [
+            _with_valves(valves, pressure_range, key, alone, "outer.", inside, gains),
+            _with_valves(valves, pressure_range, f"{key}-ahead", added, "feedback.outer.", inside, gains),
+        ]
     law = am.control.AngleAndStiffness(
         inverse, valves.pressures, 15.0, 0.3, 0.5, speed_column="angular_speed",
         acceleration_setpoint="angular_acceleration",
     )  # fmt: skip
     controllers.append(_with_valves(valves, pressure_range, "stiffness", law, "", "", TORQUE_GAINS, bias=False))
     return tuple(controllers)
-
-
-def _speed_cascade() -> am.control.Cascade:
-    inner = am.PID("angular_speed", DIFFERENCE, gain=0.1 * BAR, integral_time=0.1)
-    return am.control.Cascade(am.PID("angle", "angular_speed", gain=6.0), inner, (-MAX_SPEED,), (MAX_SPEED,))
 
 
 PID_GAINS = (

@@ -13,7 +13,6 @@ The functions write into arrays that they are given; c is what `prepare(p, c)` m
 """
 
 import dataclasses
-import hashlib
 import json
 from collections.abc import Mapping
 from typing import Any
@@ -24,7 +23,7 @@ import airmuscle as am
 
 from ...core import ParameterError, leaves, tree
 from ...design.control_benchmark import STANDARD_TASKS, ControlTask
-from ...engine.compile.functions import Printer, TracedSystem
+from ...engine.compile.functions import Printer
 from ...engine.compile.kernel_text import JavaScriptKernels
 from ...engine.compile.program import compile_system
 from ...engine.compile.text.programs import JavaScriptLanguage
@@ -33,6 +32,7 @@ from ...files.library import list_plants, plant_tables
 from ...files.scenario.scenario import TABLES, build_scenario
 from ...physics.analysis.joint_torque import load_function, torque_functions
 from .joint_laws import JointController, joint_controllers, statics_within_valves, valve_set
+from .law_sheet import identifier_of
 from .plant_sheet import sheet_of_tables
 
 PAIR = (
@@ -60,24 +60,18 @@ def sheet_of_joint(name: str) -> dict[str, Any]:
     statics = statics_within_valves(plant)
     controllers = joint_controllers(plant, statics)
     measured = tuple(dict.fromkeys(column for each in controllers for column in each.law.measured_columns))
-    programs = _programs(plant, controllers, measured)
-    script = _extended(sheet.pop("script"), programs)
-    old = sheet.pop("id")
+    rows = ",\n".join(f"{json.dumps(key)}: {text}" for key, text in _programs(plant, controllers, measured).items())
+    script, old, valves = sheet.pop("script"), sheet.pop("id"), valve_set(plant)
+    script += f'airmusclePrograms["{old}"].joint = {{\n{rows}\n}};\n'
     sheet |= {
-        "tab": "joint",
-        **{key: str(tables.get(key, "")) for key in ("provenance", "note", "warning")},
+        "tab": "joint", **{key: str(tables.get(key, "")) for key in ("provenance", "note", "warning")},
         "parameters": [{**row, "path": row["path"].replace(".inner.", ".")} for row in sheet["parameters"]],
-        "measured": list(measured),
-        "pressure_range": list(statics.pressure_range),
-        "controllers": [_controller_row(each) for each in controllers],
-        "region": reachable_region(statics),
-        "pair": list(PAIR),
-        "offsets": valve_set(plant).offsets,
-        "regulated": valve_set(plant).inner is None,
-        "switching": valve_set(plant).switching,
-        "tasks": [_task_row(task) for task in STANDARD_TASKS if task.stuck is None],
-    }
-    sheet["id"] = hashlib.sha256((script + json.dumps(sheet)).encode()).hexdigest()[:32]
+        "measured": list(measured), "pressure_range": list(statics.pressure_range),
+        "controllers": [_controller_row(each) for each in controllers], "region": _reachable_region(statics),
+        "pair": list(PAIR), "offsets": valves.offsets, "regulated": valves.inner is None,
+        "switching": valves.switching, "tasks": [_task_row(task) for task in STANDARD_TASKS if task.stuck is None],
+    }  # fmt: skip
+    sheet["id"] = identifier_of(sheet, script)
     return {**sheet, "script": script.replace(old, sheet["id"])}
 
 
@@ -89,7 +83,7 @@ def joint_tables(tables: Mapping[str, Any]) -> dict[str, Any]:
     return {**kept, "plant": plant, "input": {}, "run": {"duration": DURATION, "initial_state": run["initial_state"]}}
 
 
-def reachable_region(statics: am.physics.JointStatics) -> dict[str, list[float]]:
+def _reachable_region(statics: am.physics.JointStatics) -> dict[str, list[float]]:
     """Minimum and maximum stiffness [N m/rad] at angles [rad] without a load, where both muscles are taut."""
     angles = np.linspace(*statics.angle_range, REGION_ANGLES)
     least, greatest = statics.stiffness_limits(angles)
@@ -99,77 +93,49 @@ def reachable_region(statics: am.physics.JointStatics) -> dict[str, list[float]]
 
 
 def _programs(plant: am.Plant, controllers: tuple[JointController, ...], measured: tuple[str, ...]) -> dict[str, str]:
-    """The programs of the tab as expressions of JavaScript, by name."""
-    compiled = compile_system(plant)
-    states = compiled.description.state_names
+    """The programs of the tab as expressions of JavaScript, by name; `inputs` is the kernel that cuts the inputs which
+    no controller commands into the segments of a sample."""
+    inputs = JavaScriptKernels().text("driven_inputs", ["cut_segments"])
     programs = {
-        "linear": linear_program(compiled.program.traced, states, measured), "statics": pair_program(plant),
-        "inputs": inputs_program(),
+        "linear": _linear_program(plant, measured), "statics": _pair_program(plant),
+        "inputs": f"(() => {{\n{inputs}\nreturn {{ cut_segments }};\n}})()",
     }  # fmt: skip
     for each in controllers:
         same = each.law is each.averaged
-        programs[each.key] = law_program(each.law, sample=True, slopes=same)
+        programs[each.key] = _law_program(each.law, sample=True, slopes=same)
         if not same:
-            programs[f"{each.key}-averaged"] = law_program(each.averaged, sample=False, slopes=True)
+            programs[f"{each.key}-averaged"] = _law_program(each.averaged, sample=False, slopes=True)
     return programs
-
-
-def _extended(script: str, programs: Mapping[str, str]) -> str:
-    """The script of a plant with further programs in its entry of the table."""
-    rows = ",\n".join(f"{json.dumps(name)}: {text}" for name, text in programs.items())
-    head = script.partition(" = ")[0].splitlines()[-1]
-    return f"{script}{head}.joint = {{\n{rows}\n}};\n"
 
 
 def _controller_row(controller: JointController) -> dict[str, Any]:
     law, averaged = controller.law, controller.averaged
     known, inner = list(leaves(law)), list(leaves(averaged))
     prefix = "law." if hasattr(law, "law") else ""
+    bounds = {leaf.path: [float(x) if np.isfinite(x) else None for x in leaf.declared.bounds] for leaf in inner}
     return {
-        "key": controller.key,
-        "setpoints": list(law.setpoints),
-        "measured": list(law.measured_columns),
-        "inputs": list(law.inputs),
-        "memory": list(law.initial_memory),
+        "key": controller.key, "setpoints": list(law.setpoints), "measured": list(law.measured_columns),
+        "inputs": list(law.inputs), "memory": list(law.initial_memory),
         "initial_memory": [float(value) for value in law.initial_memory.values()],
-        "paths": [leaf.path for leaf in known],
-        "values": [float(leaf.value) for leaf in known],
-        "prefix": prefix,
-        "averaged_paths": [leaf.path for leaf in inner],
-        "averaged_memory": list(averaged.initial_memory),
+        "paths": [leaf.path for leaf in known], "values": [float(leaf.value) for leaf in known], "prefix": prefix,
+        "averaged_paths": [leaf.path for leaf in inner], "averaged_memory": list(averaged.initial_memory),
         "averaged_start": [float(value) for value in averaged.initial_memory.values()],
-        "balance": controller.balance,
-        "bias": f"{prefix}{controller.bias}" if controller.bias else "",
-        "gains": [{**dataclasses.asdict(gain), "path": f"{prefix}{gain.path}", "bounds": _bounds(averaged, gain.path)}
+        "balance": controller.balance, "bias": f"{prefix}{controller.bias}" if controller.bias else "",
+        "gains": [{**dataclasses.asdict(gain), "path": f"{prefix}{gain.path}", "bounds": bounds[gain.path]}
                   for gain in controller.gains],
     }  # fmt: skip
-
-
-def _bounds(law: Any, path: str) -> list[float | None]:
-    """The bounds of a parameter; None where there is none."""
-    low, high = next(leaf.declared.bounds for leaf in leaves(law) if leaf.path == path)
-    return [float(bound) if np.isfinite(bound) else None for bound in (low, high)]
 
 
 def _task_row(task: ControlTask) -> dict[str, Any]:
     """A task of the control benchmark as plain data."""
     return {
-        "name": task.name,
-        "motion": {"kind": type(task.motion).__name__, **dataclasses.asdict(task.motion)},
-        "duration": task.duration,
-        "begin": task.begin,
-        "torque": [list(point) for point in task.torque],
-        "stiffening": [list(point) for point in task.stiffening],
-    }
+        "name": task.name, "motion": {"kind": type(task.motion).__name__, **dataclasses.asdict(task.motion)},
+        "duration": task.duration, "begin": task.begin, "torque": list(map(list, task.torque)),
+        "stiffening": list(map(list, task.stiffening)),
+    }  # fmt: skip
 
 
-def inputs_program() -> str:
-    """The kernel that cuts the inputs which no controller commands into the segments of a sample."""
-    text = JavaScriptKernels().text("driven_inputs", ["cut_segments"])
-    return f"(() => {{\n{text}\nreturn {{ cut_segments }};\n}})()"
-
-
-def law_program(law: am.engine.ControlLaw, *, sample: bool, slopes: bool) -> str:
+def _law_program(law: am.engine.ControlLaw, *, sample: bool, slopes: bool) -> str:
     """The functions of a control law; its parameters are the vector p, in the order of its leaves."""
     import casadi
 
@@ -190,25 +156,22 @@ def law_program(law: am.engine.ControlLaw, *, sample: bool, slopes: bool) -> str
     return _module(printer, [name for name, wanted in (("sample", sample), ("slopes", slopes)) if wanted])
 
 
-def linear_program(traced: TracedSystem, state_names: tuple[str, ...], columns: tuple[str, ...]) -> str:
-    """The linearisation of a traced system for the columns that control laws measure.
+def _linear_program(plant: am.Plant, columns: tuple[str, ...]) -> str:
+    """The linearisation of a plant for the columns that control laws measure.
 
     Raises ParameterError for a column that depends on an input at once.
     """
     import casadi
 
-    rows = []
-    for name in columns:
-        known = name in state_names
-        rows.append(traced.x[state_names.index(name)] if known else traced.o[traced.output_names.index(name)])
-    measured = casadi.vertcat(*rows)
+    compiled = compile_system(plant)
+    traced, states = compiled.program.traced, compiled.description.state_names
+    rows = casadi.vertsplit(casadi.vertcat(traced.o, traced.x))
+    known = dict(zip((*traced.output_names, *states), rows, strict=True))
+    measured = casadi.vertcat(*(known[name] for name in columns))
     if any(casadi.which_depends(measured, traced.u, 1, False)):
         raise ParameterError(f"a column among {', '.join(columns)} depends on an input at once; it cannot be measured.")
-    tables = {
-        "A": casadi.jacobian(traced.f, traced.x),
-        "B": casadi.jacobian(traced.f, traced.u),
-        "C": casadi.jacobian(measured, traced.x),
-    }
+    tables = {"A": casadi.jacobian(traced.f, traced.x), "B": casadi.jacobian(traced.f, traced.u),
+              "C": casadi.jacobian(measured, traced.x)}  # fmt: skip
     printer = Printer(JavaScriptLanguage(exported=False))
     outputs = {"f": traced.f, **{name: casadi.densify(casadi.vec(table.T)) for name, table in tables.items()}}
     values = casadi.cse(list(outputs.values()))
@@ -216,22 +179,19 @@ def linear_program(traced: TracedSystem, state_names: tuple[str, ...], columns: 
     return _module(printer, ["linear"])
 
 
-def pair_program(plant: am.Plant) -> str:
+def _pair_program(plant: am.Plant) -> str:
     """The statics of a joint as a function of the angle and of both pressures, and the torque that a motion needs."""
     import casadi
 
     x = casadi.SX.sym("x", 3)
-    names = ("torque", "stiffness", "torque_by_pressure", "stiffness_by_pressure", "tension", "shut_valves")
-    first, second = (
+    both = [
         dict(zip(function.names, casadi.horzsplit(function.function(x[0], x[i])), strict=True))
         for i, function in enumerate(torque_functions(plant), 1)
-    )
-    torque, stiffness, by_pressure, bending, tension, shut = names
+    ]
+    torque, stiffness, shut = (both[0][name] + both[1][name] for name in ("torque", "stiffness", "shut_valves"))
+    each = (muscle[name] for name in ("torque_by_pressure", "stiffness_by_pressure", "tension") for muscle in both)
     load = load_function(plant).function(x[0])
-    values = [
-        first[torque] + second[torque], first[stiffness] + second[stiffness], first[by_pressure], second[by_pressure],
-        first[bending], second[bending], first[tension], second[tension], first[shut] + second[shut], load[0], load[1],
-    ]  # fmt: skip
+    values = [torque, stiffness, *each, shut, load[0], load[1]]
     printer = Printer(JavaScriptLanguage(exported=False))
     printer.add("pair", {"x": x}, {"f": casadi.cse(casadi.densify(casadi.vertcat(*values)))})
     motion = casadi.SX.sym("x", 5)

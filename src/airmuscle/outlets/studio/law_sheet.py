@@ -1,7 +1,18 @@
-"""Sheet of a law: all that the page shows of a muscle or a law, as plain data; TOML text with places for numbers.
+"""Sheet of a law: all that the page shows of a muscle or a law, as plain data; TOML text with places for numbers; the
+printed law and its outline as JavaScript functions of arrays, parameters as inputs.
 
 A template is a list of texts and integers: an integer is the place of the parameter of this index, which is written
-as Python writes a float, so that a page fills in numbers without a server.
+as Python writes a float, so that a page fills in numbers without a server. The functions write into arrays that they
+are given; x are the arguments, c is what `prepare(p, c)` made of the parameters:
+
+    force(x, c, f)          x = (p, eps), f = (F, dF/dp, dF/deps)
+    contraction(x, c, f)    x = (p, F),   f = (eps, deps/dp, deps/dF)
+    pressure(x, c, f)       x = (eps, F), f = (p, dp/deps, dp/dF)
+    limits(c, f)            f = search ranges of pressure, contraction and force
+    outline(x, c, f)        x = (eps, t), f = (axial position, radius), t from -1 to 1 along a segment
+    volume(x, c, f)         x = (eps),    f = (V, dV/deps)
+
+A direction that the law does not give in closed form is missing; the page searches for its root.
 """
 
 import dataclasses
@@ -10,19 +21,20 @@ import json
 import math
 import re
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
 import airmuscle as am
 
-from ...core import Array, Leaf, ParameterError, TraceError, cite, conversion, leaves, tree
+from ...core import AirmuscleError, Array, Leaf, ParameterError, TraceError, autodiff, cite, conversion, leaves, tree
+from ...engine.compile.functions import Printer
+from ...engine.compile.text.programs import JavaScriptLanguage
 from ...files.library import Entry, to_toml
 from ...physics.muscle.characteristic.validity_range import validity_range_of
 from ...physics.muscle.geometry.straight_fibre import FibreTube
 from ..export.targets import FORMS
-from .law_program import law_and_geometry, parameter_model, print_law
 
 _FIRST = 7.0e250
 """The first of the marks: numbers that no file contains."""
@@ -39,6 +51,9 @@ SHOWN_UNITS: dict[str, tuple[tuple[float, str], ...]] = {
 """Units in which numbers below a limit are shown, by SI unit (chosen)."""
 OUTLINE_CONTRACTIONS, OUTLINE_POINTS = 61, 41
 """Grid of an outline that is not in closed form (chosen)."""
+DIRECTIONS = ("force", "contraction", "pressure")
+_UNTRACEABLE = (AirmuscleError, RuntimeError, TypeError, ValueError)
+"""Errors of a direction that needs numbers, as a root search does."""
 
 
 def law_sheet(entry: Entry) -> dict[str, Any]:
@@ -48,41 +63,39 @@ def law_sheet(entry: Entry) -> dict[str, Any]:
     TraceError for one without a validity range.
     """
     law, errors = _in_closed_form(entry)
-    geometry = entry.geometry
-    program = print_law(law, geometry)
-    rows = _parameter_leaves(law, geometry)
-    limits = validity_range_of(law, entry.validity_range)
+    geometry, kind, ratings = entry.geometry, type(entry.characteristic), entry.ratings
+    text, functions, held = print_law(law, geometry)
+    rows = [(f"characteristic.{leaf.path}", leaf) for leaf in leaves(law)]
+    if parameter_model(law, geometry) is not law:
+        rows += [(f"geometry.{leaf.path}", leaf) for leaf in leaves(geometry)]
+    limits, fixed = validity_range_of(law, entry.validity_range), bool(errors) or len(rows) > MAX_PARAMETERS
     sheet: dict[str, Any] = {
-        "name": entry.name,
-        "title": entry.title,
-        "provenance": entry.provenance,
-        "note": entry.note,
-        "warning": entry.warning,
-        "law": type(entry.characteristic).__name__,
-        "formula": (type(entry.characteristic).__doc__ or "").strip().partition("\n")[0],
-        "kind": next(method for kind, method, *_ in FORMS if isinstance(law, kind)),
-        "functions": list(program.functions),
-        "held": program.held,
-        "limits": list(program.limits),
-        "values": [leaf.value for _, leaf in rows],
-        "parameters": [] if errors or len(rows) > MAX_PARAMETERS else _parameter_rows(rows, entry),
+        **{key: getattr(entry, key) for key in ("name", "title", "provenance", "note", "warning")},
+        "law": kind.__name__, "formula": (kind.__doc__ or "").strip().partition("\n")[0],
+        "kind": next(method for form, method, *_ in FORMS if isinstance(law, form)),
+        "functions": functions, "held": held, "limits": [float(limit) for limit in _limits(law)],
+        "values": [leaf.value for _, leaf in rows], "parameters": [] if fixed else _parameter_rows(rows, entry),
         "resting_length": next((i for i, (path, _) in enumerate(rows) if path.endswith("resting_length")), None),
         "validity_range": None if limits is None else dataclasses.asdict(limits),
-        "ratings": {name: getattr(entry.ratings, name) for name in (entry.ratings.stated if entry.ratings else ())},
-        "geometry": None if geometry is None else _geometry_sheet(geometry, "outline" in program.functions),
-        "references": [str(reference) for reference in cite(entry)],
-        "approximation": errors,
-        "toml": _toml(entry, bool(errors) or len(rows) > MAX_PARAMETERS),
-    }
-    sheet["id"] = hashlib.sha256((program.text + json.dumps(sheet)).encode()).hexdigest()[:32]
-    sheet["script"] = script_text(sheet["id"], program.text, ("prepare", *program.functions))
-    return sheet
+        "ratings": {name: getattr(ratings, name) for name in (ratings.stated if ratings else ())},
+        "geometry": None if geometry is None else _geometry_sheet(geometry, "outline" in functions),
+        "references": [str(reference) for reference in cite(entry)], "approximation": errors,
+        "toml": _toml(entry, fixed),
+    }  # fmt: skip
+    return with_script(sheet, text, ("prepare", *functions))
 
 
-def script_text(identifier: str, text: str, functions: tuple[str, ...]) -> str:
-    """A program as a script that enters its functions into the table of the page."""
-    result = f"return {{ {', '.join(functions)} }};"
-    return f'"use strict";\nairmusclePrograms["{identifier}"] = (() => {{\n{text}\n{result}\n}})();\n'
+def identifier_of(sheet: Mapping[str, Any], text: str = "") -> str:
+    """The identifier of a sheet and of the text of its program, a hash of both."""
+    return hashlib.sha256((text + json.dumps(sheet)).encode()).hexdigest()[:32]
+
+
+def with_script(sheet: Mapping[str, Any], text: str, functions: Sequence[str]) -> dict[str, Any]:
+    """A sheet with its identifier, and its program as a script that enters functions into the table of the page."""
+    identifier, result = identifier_of(sheet, text), f"return {{ {', '.join(functions)} }};"
+    text = re.sub(r"^export ", "", text, flags=re.MULTILINE)
+    script = f'"use strict";\nairmusclePrograms["{identifier}"] = (() => {{\n{text}\n{result}\n}})();\n'
+    return {**sheet, "id": identifier, "script": script}
 
 
 def _in_closed_form(entry: Entry) -> tuple[am.characteristic.Characteristic, dict[str, Any] | None]:
@@ -99,45 +112,21 @@ def _in_closed_form(entry: Entry) -> tuple[am.characteristic.Characteristic, dic
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         approximation: am.characteristic.PolynomialSurrogate = am.characteristic.as_force_law(law, limits)
-    return approximation.surface, {
-        "max_error": approximation.max_error, "rms_error": approximation.rms_error, "coverage": approximation.coverage,
-        "degree": approximation.surface.degree,
-    }  # fmt: skip
-
-
-def _parameter_leaves(
-    law: am.characteristic.Characteristic, geometry: am.geometry.Geometry | None
-) -> list[tuple[str, Leaf]]:
-    """The parameters in the order of the program, each with its path in the file of the entry."""
-    rows = [(f"characteristic.{leaf.path}", leaf) for leaf in leaves(law)]
-    if parameter_model(law, geometry) is not law:
-        rows += [(f"geometry.{leaf.path}", leaf) for leaf in leaves(geometry)]
-    return rows
+    errors = {key: getattr(approximation, key) for key in ("max_error", "rms_error", "coverage")}
+    return approximation.surface, {**errors, "degree": approximation.surface.degree}
 
 
 def parameter_row(path: str, leaf: Leaf, source: str) -> dict[str, Any]:
     """One parameter for the page: symbol, unit, meaning, bounds, source, and the unit in which it is shown."""
-    unit = leaf.declared.unit
-    shown = display_unit(float(leaf.value), unit)
-    return {
-        "path": path,
-        "symbol": leaf.declared.symbol,
-        "unit": unit,
-        "meaning": leaf.declared.meaning,
-        "bounds": [bound if math.isfinite(bound) else None for bound in leaf.declared.bounds],
-        "value": float(leaf.value),
-        "shown_unit": shown[0],
-        "factor": shown[1],
-        "source": source,
-    }
-
-
-def display_unit(value: float, unit: str) -> tuple[str, float]:
-    """The unit in which a number is shown, and its factor."""
+    declared, value = leaf.declared, float(leaf.value)
+    unit = declared.unit
     shown = next((shown for limit, shown in SHOWN_UNITS.get(unit, ()) if abs(value) < limit), unit)
-    if shown == unit:
-        return "" if unit == "1" else unit, 1.0
-    return shown, conversion(shown, unit).factor
+    return {
+        "path": path, "symbol": declared.symbol, "unit": unit, "meaning": declared.meaning,
+        "bounds": [bound if math.isfinite(bound) else None for bound in declared.bounds], "value": value,
+        "shown_unit": "" if shown == unit == "1" else shown,
+        "factor": 1.0 if shown == unit else conversion(shown, unit).factor, "source": source,
+    }  # fmt: skip
 
 
 def _parameter_rows(rows: list[tuple[str, Leaf]], entry: Entry) -> list[dict[str, Any]]:
@@ -175,24 +164,18 @@ def _toml(entry: Entry, fixed: bool) -> dict[str, Any]:
 
     Standard errors, checks and the validity range of a fit belong to the parameters of the entry alone.
     """
+    note = f"Parameters of {entry.name} ({entry.provenance}) changed in airmuscle studio. {entry.note}".strip()
     changed = dataclasses.replace(
-        entry,
-        title=f"{entry.title}, parameters changed",
-        provenance="chosen",
-        uncertainty=None,
-        checks=(),
-        warning="",
-        note=f"Parameters of {entry.name} ({entry.provenance}) changed in airmuscle studio. {entry.note}".strip(),
-    )
-    return {"unchanged": to_toml(entry), "changed": [] if fixed else _changed_template(changed)}
+        entry, title=f"{entry.title}, parameters changed", provenance="chosen", uncertainty=None, checks=(), warning="",
+        note=note,
+    )  # fmt: skip
 
-
-def _changed_template(entry: Entry) -> Template:
     def write(model: Any) -> str:
         law, geometry = law_and_geometry(model, entry.geometry)
-        return to_toml(dataclasses.replace(entry, characteristic=law, geometry=geometry))
+        return to_toml(dataclasses.replace(changed, characteristic=law, geometry=geometry))
 
-    return toml_template(write, parameter_model(entry.characteristic, entry.geometry))
+    model = parameter_model(entry.characteristic, entry.geometry)
+    return {"unchanged": to_toml(entry), "changed": [] if fixed else toml_template(write, model)}
 
 
 def toml_template(write: Callable[[Any], str], model: Any) -> Template:
@@ -200,8 +183,7 @@ def toml_template(write: Callable[[Any], str], model: Any) -> Template:
     marks = [_FIRST + i * _STEP for i, _ in enumerate(leaves(model))]
     place = {repr(mark): i for i, mark in enumerate(marks)}
     text = write(tree.unflatten(model, marks))
-    template: Template = []
-    end = 0
+    template, end = list[str | int](), 0
     for match in _MARK.finditer(text):
         template += [text[end : match.start()], place[match.group()]]
         end = match.end()
@@ -215,3 +197,84 @@ def toml_template(write: Callable[[Any], str], model: Any) -> Template:
 def fill_template(template: Template, values: list[float]) -> str:
     """The text with these values, as the page fills it in."""
     return "".join(repr(values[item]) if isinstance(item, int) else item for item in template)
+
+
+# The printed law
+
+
+def print_law(
+    law: am.characteristic.Characteristic, geometry: am.geometry.Geometry | None
+) -> tuple[str, list[str], int]:
+    """The program of a traceable law, and of the outline where the geometry is in closed form, as JavaScript text; the
+    names of its functions, and the length of `c`.
+
+    Parameters are the leaves of the law, then those of the geometry unless it is part of the law. Raises TraceError
+    for a law without a closed form.
+    """
+    model, p = autodiff.symbolic(parameter_model(law, geometry))
+    model, shape = law_and_geometry(model, geometry)
+    printer, names = Printer(JavaScriptLanguage(exported=False)), []
+    for name, inputs, outputs in _functions(model, shape):
+        printer.add(name, {**inputs, "p": p}, {"f": outputs})
+        names.append(name)
+    if not set(names) & set(DIRECTIONS):
+        raise TraceError(f"{type(law).__name__} has no direction in closed form.")
+    return printer.module(), names, printer.held
+
+
+def parameter_model(law: am.characteristic.Characteristic, geometry: am.geometry.Geometry | None) -> Any:
+    """What has the parameters of the page as leaves: the law, or the pair with a geometry that is not part of it."""
+    return law if geometry is None or geometry == getattr(law, "geometry", None) else (law, geometry)
+
+
+def law_and_geometry(model: Any, geometry: am.geometry.Geometry | None) -> tuple[Any, Any]:
+    """The law and its geometry in what `parameter_model` has made of them."""
+    return model if isinstance(model, tuple) else (model, None if geometry is None else model.geometry)
+
+
+def _functions(model: Any, shape: Any) -> list[tuple[str, dict[str, Any], Any]]:
+    """Name, arguments and results of every function that can be traced."""
+    import casadi
+
+    functions = []
+    a, b = casadi.SX.sym("a"), casadi.SX.sym("b")
+    for name in DIRECTIONS:
+        value = _traced(getattr(model, name), a, b)
+        if value is not None:
+            x = casadi.vertcat(a, b)
+            functions.append((name, {"x": x}, casadi.vertcat(value, casadi.jacobian(value, x).T)))
+    limits = _traced(lambda: casadi.vertcat(*_limits(model)))
+    if limits is not None:
+        functions.append(("limits", {}, limits))
+    volume = _traced(shape.volume, a) if shape is not None and shape.traceable else None
+    if volume is not None:
+        functions.append(("volume", {"x": a}, casadi.vertcat(volume, casadi.jacobian(volume, a))))
+    outline = _traced(lambda: casadi.vertcat(*_outline(shape, a, b))) if shape is not None else None
+    if outline is not None:
+        functions.append(("outline", {"x": casadi.vertcat(a, b)}, outline))
+    return [(name, inputs, casadi.densify(casadi.cse(outputs))) for name, inputs, outputs in functions]
+
+
+def _traced(function: Callable[..., Any], *arguments: Any) -> Any:
+    """The expression of a function, None where it needs numbers."""
+    import casadi
+
+    try:
+        value = casadi.SX(function(*arguments))
+        autodiff.check_finite(value, "law")
+    except _UNTRACEABLE:
+        return None
+    return value
+
+
+def _limits(model: Any) -> Sequence[Any]:
+    return (*model.pressure_range, *model.contraction_range, *model.force_range)
+
+
+def _outline(shape: Any, contraction: Any, t: Any) -> tuple[Any, Any]:
+    """Axial position from the middle of a segment [m] and radius [m]. Raises TraceError for another geometry."""
+    if isinstance(shape, am.geometry.Braid):
+        return t * shape.resting_length * (1.0 - contraction) / 2, shape.radius_at(contraction)
+    if isinstance(shape, FibreTube) and shape.traceable:
+        return shape.profile(contraction, t)
+    raise TraceError(f"{type(shape).__name__}: the outline is not in closed form.")

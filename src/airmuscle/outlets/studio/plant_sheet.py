@@ -1,9 +1,7 @@
 """Sheet of a plant: a scenario with its printed program, names, units and start, for a run in the page."""
 
 import base64
-import hashlib
 import io
-import json
 import re
 from collections.abc import Mapping
 from typing import Any
@@ -12,17 +10,15 @@ import numpy as np
 
 import airmuscle as am
 
-from ...core import AirmuscleError, Leaf, ParameterError, cite, leaves
+from ...core import AirmuscleError, ParameterError, cite, leaves
 from ...files.library import Location, part_toml, tables_toml
 from ...files.scenario.scenario import TABLES, Scenario, build_scenario, initial_pressure
 from ...recording.columns import display_scale
 from ...report.formatting import format_number
 from ..export.write import make_run
-from .law_sheet import parameter_row, sampled_outline, script_text, toml_template
+from .law_sheet import parameter_row, sampled_outline, toml_template, with_script
 
-NAMES = (
-    "states", "inputs", "outputs", "run", "Solver", "prepare", "outputsOf", "SIZES",
-)  # fmt: skip
+NAMES = ("states", "inputs", "outputs", "run", "Solver", "prepare", "outputsOf", "SIZES")
 """What the page uses of a printed program; of one with a controller also the run of the loop."""
 MAX_DURATION = 1000.0
 """Longest run in the page [s] (chosen)."""
@@ -32,8 +28,6 @@ OUTLINE_CONTRACTIONS, OUTLINE_POINTS = 31, 25
 """Grid of an outline (chosen)."""
 OPENED = 0.01
 """Opening of the filling valves at whose closed position a loop has no slope (chosen)."""
-_EXPORT = re.compile(r"^export ", re.MULTILINE)
-_SOURCES = ("the file of the user", "chosen")
 
 
 def sheet_of_tables(
@@ -48,33 +42,25 @@ def sheet_of_tables(
         )
     program = make_run(scenario.problem, name="plant", title=scenario.title, with_loop=True)
     module = am.outlets.JavaScript().run_files(program)["plant.mjs"]
-    plant = scenario.plant
+    plant, system = scenario.plant, program.system
     sheet: dict[str, Any] = {
-        "plant": True,
-        "name": name,
-        "title": scenario.title,
-        "provenance": str(tables.get("provenance", _SOURCES[0])),
-        "note": str(tables.get("note", "")),
-        "warning": str(tables.get("warning", "")),
-        "start_equilibrium": initial_pressure(tables, location, scenario.plant) is not None,
-        "duration": scenario.problem.duration,
-        "values": program.system.defaults.tolist(),
+        "plant": True, "name": name, "title": scenario.title,
+        "provenance": str(tables.get("provenance", "the file of the user")),
+        **{key: str(tables.get(key, "")) for key in ("note", "warning")},
+        "start_equilibrium": initial_pressure(tables, location, plant) is not None,
+        "duration": scenario.problem.duration, "values": system.defaults.tolist(),
         "temperature_index": [leaf.path for leaf in leaves(plant)].index("ambient.temperature"),
-        "parameters": _parameter_rows(plant, sources),
-        "inputs": _input_rows(plant),
-        "controlled": program.loop is not None,
-        "columns": _column_rows(program.system.known.column_names, program.system.units),
-        "muscles": [_muscle_row(plant, i) for i in range(len(plant.muscles))],
-        "mechanism": _mechanism_row(plant),
+        "parameters": _parameter_rows(plant, sources), "inputs": _input_rows(plant),
+        "controlled": program.loop is not None, "columns": _column_rows(system.known.column_names, system.units),
+        "muscles": [_muscle_row(plant, i) for i in range(len(plant.muscles))], "mechanism": _mechanism_row(plant),
         "references": [str(reference) for reference in cite(plant)],
-        "toml": _toml(scenario, tables),
-        "own_text": text,
-        "loop": _loop_row(scenario),
-    }
-    sheet["id"] = hashlib.sha256((module + json.dumps(sheet)).encode()).hexdigest()[:32]
-    names = (*NAMES, "simulate") if program.loop else NAMES
-    sheet["script"] = script_text(sheet["id"], _EXPORT.sub("", module), names)
-    return sheet
+        "toml": {
+            "plant": toml_template(lambda model: part_toml("plant", model), plant),
+            "input": tables_toml({"input": tables.get("input", {})}), "run": tables_toml({"run": tables["run"]}),
+        },
+        "own_text": text, "loop": _loop_row(scenario),
+    }  # fmt: skip
+    return with_script(sheet, module, (*NAMES, "simulate") if program.loop else NAMES)
 
 
 def sheet_of_plant(tables: Mapping[str, Any], location: Location, name: str) -> dict[str, Any]:
@@ -101,29 +87,22 @@ def _parameter_rows(plant: am.Plant, sources: Mapping[str, str]) -> list[dict[st
         if twin is not None and known[twin].value == leaf.value:
             continue
         shared = [places[own]] if own != leaf.path and own in places and known[places[own]].value == leaf.value else []
-        rows.append({**parameter_row(leaf.path, leaf, _source(leaf, sources)), "places": [i, *shared]})
+        path = re.sub(r"\[\d+\]", "", leaf.path)  # its source is that of the longest path in [sources] that begins it
+        matching = [key for key in sources if path == key or path.startswith(f"{key}.")]
+        source = sources[max(matching, key=len)] if matching else "the model or its entry"
+        rows.append({**parameter_row(leaf.path, leaf, source), "places": [i, *shared]})
     order = ("mechanism", "circuit", "ambient", "gas", "muscle", "")
     rows.sort(key=lambda row: next(i for i, part in enumerate(order) if row["path"].startswith(part)))
     return rows[:MAX_PARAMETERS]
 
 
-def _source(leaf: Leaf, sources: Mapping[str, str]) -> str:
-    """The source of a number: the longest path in [sources] that its path begins with."""
-    path = re.sub(r"\[\d+\]", "", leaf.path)
-    matching = [key for key in sources if path == key or path.startswith(f"{key}.")]
-    return sources[max(matching, key=len)] if matching else "the model or its entry"
-
-
 def _input_rows(plant: am.Plant) -> list[dict[str, Any]]:
-    return [
-        {
-            "name": variable.name,
-            "unit": "" if variable.unit == "1" else variable.unit,
-            "minimum": variable.minimum if np.isfinite(variable.minimum) else None,
-            "maximum": variable.maximum if np.isfinite(variable.maximum) else None,
-        }
-        for variable in plant.input_variables
-    ]
+    rows = []
+    for each in plant.input_variables:
+        low, high = (end if np.isfinite(end) else None for end in (each.minimum, each.maximum))
+        unit = "" if each.unit == "1" else each.unit
+        rows.append({"name": each.name, "unit": unit, "minimum": low, "maximum": high})
+    return rows
 
 
 def _column_rows(columns: Any, units: Mapping[str, str]) -> list[dict[str, Any]]:
@@ -157,19 +136,14 @@ def _mechanism_row(plant: am.Plant) -> dict[str, Any]:
     mechanism: Any = plant.mechanism
     while hasattr(mechanism, "inner"):
         mechanism = mechanism.inner
-    count = len(plant.muscles)
-    kind = "muscles"
-    if isinstance(mechanism, am.physics.AntagonisticJoint) and count == 2:
-        kind = "joint"
-    elif isinstance(mechanism, am.HangingMass) and count == 1:
-        kind = "lift"
+    kinds = {1: (am.HangingMass, "lift"), 2: (am.physics.AntagonisticJoint, "joint")}
+    drawn, word = kinds.get(len(plant.muscles), ((), ""))
     radius = getattr(mechanism, "radius", None)
     return {
-        "model": type(plant.mechanism).__name__,
-        "kind": kind,
+        "model": type(plant.mechanism).__name__, "kind": word if isinstance(mechanism, drawn) else "muscles",
         "coordinates": [c.name for c in plant.mechanism.coordinates],
         "radius": float(radius) if isinstance(radius, float) else 0.04,
-    }
+    }  # fmt: skip
 
 
 def _loop_row(scenario: Scenario) -> dict[str, Any] | None:
@@ -206,12 +180,3 @@ def svg_uri(figure: Any) -> str:
     text = io.BytesIO()
     figure.savefig(text, format="svg", metadata={"Date": None})
     return f"data:image/svg+xml;base64,{base64.b64encode(text.getvalue()).decode()}"
-
-
-def _toml(scenario: Scenario, tables: Mapping[str, Any]) -> dict[str, Any]:
-    """Parts of the scenario file: the plant with places for its parameters, input and run as they are."""
-    return {
-        "plant": toml_template(lambda model: part_toml("plant", model), scenario.plant),
-        "input": tables_toml({"input": tables.get("input", {})}),
-        "run": tables_toml({"run": tables["run"]}),
-    }

@@ -8,11 +8,12 @@ loopback address as well. The Host of every request is compared, so that another
 no use.
 """
 
+import contextlib
 import dataclasses
 import ipaddress
 import json
 import secrets
-from collections.abc import Awaitable, Callable, Mapping, MutableMapping
+from collections.abc import Awaitable, Callable, MutableMapping
 from http.cookies import CookieError, SimpleCookie
 from typing import Any
 from urllib.parse import parse_qs, urlsplit
@@ -70,11 +71,14 @@ class Access:
         """Status and reason if a request is not allowed."""
         headers = {n.decode("latin-1").lower(): value.decode("latin-1") for n, value in scope["headers"]}
         host = headers.get("host", "")
-        if self.hosts and _without_port(host).lower().removesuffix(".") not in self.hosts:
+        name, _, port = host.rpartition(":")
+        bare = name if name and port.isdecimal() else host
+        if self.hosts and bare.lower().removesuffix(".") not in self.hosts:
             return 421, "This server does not answer for this host."
         if len(scope.get("raw_path") or scope["path"]) > MAX_TARGET:
             return 414, "The path is too long."
-        if self.token and not self._knows_token(scope, headers):
+        tokens = [cookie_value(headers.get("cookie", ""), cookie_name(scope)), *given_token(scope)]
+        if self.token and not any(secrets.compare_digest(each.encode(), self.token.encode()) for each in tokens):
             return 401, "A token is required; open the address that the command printed."
         if scope["method"] in READING and not scope["path"].startswith(COMPUTING):
             return None
@@ -82,23 +86,17 @@ class Access:
             return 405, "This method is not allowed."
         if headers.get("x-airmuscle") != "1" or headers.get("sec-fetch-site", "same-origin") != "same-origin":
             return 403, "This request does not come from the page of this server."
-        origin = headers.get("origin")
-        if origin is not None and urlsplit_netloc(origin) != host:
-            return 403, "This request comes from another origin."
-        return None
-
-    def _knows_token(self, scope: Scope, headers: Mapping[str, str]) -> bool:
-        given = [cookie_value(headers.get("cookie", ""), cookie_name(scope)), *given_token(scope)]
-        return any(secrets.compare_digest(text.encode(), self.token.encode()) for text in given)
+        with contextlib.suppress(ValueError):  # an origin that is no address
+            if "origin" not in headers or urlsplit(headers["origin"]).netloc == host:
+                return None
+        return 403, "This request comes from another origin."
 
 
 def given_token(scope: Scope) -> list[str]:
     """The token in the query of a request."""
-    query = scope.get("query_string", b"").decode("latin-1")
-    try:
-        return parse_qs(query, max_num_fields=5).get("token", [])
-    except ValueError:
-        return []
+    with contextlib.suppress(ValueError):
+        return parse_qs(scope.get("query_string", b"").decode("latin-1"), max_num_fields=5).get("token", [])
+    return []
 
 
 def cookie_name(scope: Scope) -> str:
@@ -109,24 +107,10 @@ def cookie_name(scope: Scope) -> str:
 def cookie_value(text: str, name: str) -> str:
     """The token in a header Cookie; empty if there is none."""
     cookie: SimpleCookie = SimpleCookie()
-    try:
+    with contextlib.suppress(CookieError):
         cookie.load(text)
-    except CookieError:
-        return ""
-    return cookie[name].value if name in cookie else ""
-
-
-def urlsplit_netloc(origin: str) -> str:
-    """Host and port of an origin; empty for one that is no address."""
-    try:
-        return urlsplit(origin).netloc
-    except ValueError:
-        return ""
-
-
-def _without_port(host: str) -> str:
-    name, _, port = host.rpartition(":")
-    return name if name and port.isdecimal() else host
+        return cookie[name].value if name in cookie else ""
+    return ""
 
 
 def secured(application: Application, access: Access) -> Application:
@@ -135,30 +119,25 @@ def secured(application: Application, access: Access) -> Application:
     async def handle(scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] == "lifespan":
             await application(scope, receive, send)
-            return
         if scope["type"] != "http":
             return
 
         async def send_with_headers(message: MutableMapping[str, Any]) -> None:
             if message["type"] == "http.response.start":
-                own = {name for name, _ in HEADERS}
-                kept = [row for row in message.get("headers", []) if row[0].lower() not in own]
+                kept = [row for row in message.get("headers", []) if row[0].lower() not in dict(HEADERS)]
                 message = {**message, "headers": [*kept, *HEADERS]}
             await send(message)
 
         refusal = access.refusal(scope)
-        if refusal is not None:
-            await _answer(send_with_headers, *refusal)
-        else:
+        if refusal is None:
             await application(scope, receive, send_with_headers)
+            return
+        status, text = refusal
+        headers = [(b"content-type", b"text/plain; charset=utf-8")]
+        await send_with_headers({"type": "http.response.start", "status": status, "headers": headers})
+        await send({"type": "http.response.body", "body": text.encode()})
 
     return handle
-
-
-async def _answer(send: Send, status: int, text: str) -> None:
-    headers = [(b"content-type", b"text/plain; charset=utf-8")]
-    await send({"type": "http.response.start", "status": status, "headers": headers})
-    await send({"type": "http.response.body", "body": text.encode()})
 
 
 class BadRequest(AirmuscleError):
@@ -169,19 +148,13 @@ class BadRequest(AirmuscleError):
         self.status = status
 
 
-async def limited_body(request: Any, limit: int) -> bytes:
-    """The body of a request. Raises BadRequest as soon as it exceeds the limit [bytes]."""
-    parts, size = [], 0
+async def limited_text(request: Any, limit: int) -> str:
+    """The body of a request. Raises BadRequest as soon as it exceeds the limit [bytes], and unless it is UTF-8."""
+    body = b""
     async for part in request.stream():
-        size += len(part)
-        if size > limit:
+        body += part
+        if len(body) > limit:
             raise BadRequest(f"the text is larger than {limit // 1024} kB.", 413)
-        parts.append(part)
-    return b"".join(parts)
-
-
-def decoded(body: bytes) -> str:
-    """A body as text. Raises BadRequest unless it is UTF-8."""
     try:
         return body.decode("utf-8-sig")
     except UnicodeDecodeError as error:

@@ -5,8 +5,6 @@ the machine of the server.
 """
 
 import dataclasses
-import hashlib
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -25,7 +23,7 @@ from ...physics.muscle.characteristic.validity_range import validity_range_of
 from ...physics.muscle.isobars import compute_isobars
 from ...report.data import as_sheet, csv_text
 from ..requests import JOINT, LIFT, SizeRequest, build, form_fields, options_of
-from .law_sheet import law_sheet
+from .law_sheet import identifier_of, law_sheet
 from .plant_sheet import sheet_of_plant, sheet_of_tables
 from .security import table_of
 
@@ -37,6 +35,11 @@ TEXT_KEYS = ("title", "provenance", "note", "warning", "source", "sources", "ref
 """Keys of texts that are shown and not read as names."""
 UPLOADED = Location("muscle.toml", "", Path())
 """The location of a text of a user in messages."""
+
+
+def sheet_of_law(name: str) -> dict[str, Any]:
+    """The sheet of a muscle or a law, by its name in the library or by its path."""
+    return law_sheet(load_law(name))
 
 
 def sheet_of_library_plant(name: str) -> dict[str, Any]:
@@ -66,13 +69,8 @@ def sheet_of_any(name: str) -> dict[str, Any]:
     tables = read_toml(path) if is_path(name) else {}
     if "plant" in tables:
         return sheet_of_tables(tables, Location(str(path), "", path.parent), path.stem, {}, path.read_text("utf-8-sig"))
-    sheet = law_sheet(load_law(name))
+    sheet = sheet_of_law(name)
     return {**sheet, "own_text": sheet["toml"]["unchanged"]} if is_path(name) else sheet
-
-
-def sheet_of_law(name: str) -> dict[str, Any]:
-    """The sheet of a muscle or a law, by its name in the library or by its path."""
-    return law_sheet(load_law(name))
 
 
 def sheet_of_law_text(text: str) -> dict[str, Any]:
@@ -149,20 +147,13 @@ def size_sheet(text: str) -> dict[str, Any]:
     result = request.evaluate()
     chapter = sizing_chapter(result, sizing_scenario(result.choices, "in the page"))
     sheet: dict[str, Any] = {
-        "tab": "size",
-        "name": "sizing",
-        "provenance": "the library",
-        "request": given,
-        "form": size_form(),
-        "own_text": text,
-        **as_sheet(chapter),
-        "title": result.requirement.describe(),
+        "tab": "size", "name": "sizing", "provenance": "the library", "request": given, "form": size_form(),
+        "own_text": text, **as_sheet(chapter), "title": result.requirement.describe(),
         "csv": "\n".join(csv_text(table) for table in chapter.tables[1:3]),
         "choices": [_choice(choice) for choice in result.choices[:MAX_CHOICES]],
         "left_out": max(0, len(result.choices) - MAX_CHOICES),
-    }
-    sheet["id"] = hashlib.sha256(json.dumps(sheet).encode()).hexdigest()[:32]
-    return {**sheet, "script": '"use strict";\n'}
+    }  # fmt: skip
+    return {**sheet, "id": identifier_of(sheet), "script": '"use strict";\n'}
 
 
 def read_request(text: str) -> dict[str, str]:
@@ -183,13 +174,9 @@ def _choice(choice: am.design.MuscleChoice) -> dict[str, Any]:
         scenario, reason = "", str(error.message)
     radius = choice.design.radius
     of_radius = "" if radius is None else f", pulley radius {1e3 * radius:.4g} mm"
-    return {
-        "name": choice.entry.name,
-        "label": f"{choice.total_count} × {product_of(choice)}, {1e3 * choice.length:.4g} mm{of_radius}",
-        "chart": _chart(choice),
-        "scenario": scenario,
-        "reason": reason,
-    }
+    label = f"{choice.total_count} × {product_of(choice)}, {1e3 * choice.length:.4g} mm{of_radius}"
+    name, chart = choice.entry.name, _chart(choice)
+    return {"name": name, "label": label, "chart": chart, "scenario": scenario, "reason": reason}
 
 
 def _chart(choice: am.design.MuscleChoice) -> dict[str, Any]:

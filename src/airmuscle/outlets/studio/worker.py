@@ -25,10 +25,14 @@ class LimitError(InputError):
 
 
 class LimitedWorker:
-    """A process that runs one task at a time, with limits of time and memory and messages for a page."""
+    """A process that runs one task at a time, with limits of time and memory and messages for a page.
+
+    `kill` ends it from another thread, and the call that waits for it raises LimitError; `stop` ends it between calls.
+    """
 
     def __init__(self) -> None:
         self._worker = Worker(_prepare)
+        self.kill, self.stop = self._worker.kill, self._worker.stop
 
     def call(
         self, task: Callable[..., Any], arguments: tuple[Any, ...], limit: float, report: Report | None = None
@@ -40,14 +44,6 @@ class LimitedWorker:
             late = f"takes more than {limit:g} s; give a smaller model or file."
             memory = "ended without a result, for lack of memory; give a smaller model."
             raise LimitError(f"the computation {late if error.late else memory}") from None
-
-    def kill(self) -> None:
-        """End the process from another thread; the call that waits for it raises LimitError."""
-        self._worker.kill()
-
-    def stop(self) -> None:
-        """End the process; the next task starts another one."""
-        self._worker.stop()
 
 
 def run_task(task: Callable[..., Any], *arguments: Any) -> Any:
