@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar
 
 import gymnasium
 import numpy as np
@@ -23,14 +23,6 @@ from .task import EnvironmentTask
 
 Booleans = npt.NDArray[np.bool_]
 Autoreset = gymnasium.vector.AutoresetMode
-
-
-class _Stock(NamedTuple):
-    """The next episode of every plant: whether it is drawn (N,), its parameters (N, P) and initial state (N, n)."""
-
-    drawn: Booleans
-    parameters: Array
-    states: Array
 
 
 class PlantVectorEnv(gymnasium.vector.VectorEnv):  # type: ignore[misc, unused-ignore]
@@ -82,7 +74,9 @@ class PlantVectorEnv(gymnasium.vector.VectorEnv):  # type: ignore[misc, unused-i
         self._over: Booleans = np.zeros(num_envs, bool)
         self._generators: list[np.random.Generator] = []
         sizes = plants.parameters.shape[1], plants.states.shape[1]
-        self._stock = _Stock(np.zeros(num_envs, bool), *(np.empty((num_envs, size)) for size in sizes))
+        # the next episode of every plant: whether it is drawn (N,), its parameters (N, P) and initial state (N, n)
+        self._drawn: Booleans = np.zeros(num_envs, bool)
+        self._next_parameters, self._next_states = (np.empty((num_envs, size)) for size in sizes)
 
     def reset(
         self, *, seed: int | list[int | None] | None = None, options: dict[str, Any] | None = None
@@ -94,25 +88,21 @@ class PlantVectorEnv(gymnasium.vector.VectorEnv):  # type: ignore[misc, unused-i
         """
         mask = (options or {}).get("reset_mask")
         if mask is not None:
-            return self._reset_some(mask, seed), {}
+            chosen = np.asarray(mask)
+            if chosen.shape != (self.num_envs,) or chosen.dtype != bool or seed is not None or not self._generators:
+                raise ParameterError(
+                    f"reset: reset_mask has the shape {chosen.shape} and the type {chosen.dtype}; give {self.num_envs} "
+                    "booleans, no seed, and call reset() without a mask first."
+                )
+            self._begin(np.flatnonzero(chosen))
+            self._over[chosen] = False
+            return self._observed()[0], {}
         self._seed(seed)
         filling = np.arange(self.num_envs, self._plants.blocks * self._plants.width)  # the last block
         self._place(filling, *self._draw.begin(np.full((1, self._draw.dimension), 0.5)))
         self._begin(np.arange(self.num_envs))
         self._over[:] = False
         return self._observed()[0], {}
-
-    def _reset_some(self, mask: Any, seed: Any) -> npt.NDArray[np.float32]:
-        """Begin an episode of the plants of a mask; the observations (N, k) of all."""
-        chosen = np.asarray(mask)
-        if chosen.shape != (self.num_envs,) or chosen.dtype != bool or seed is not None or not self._generators:
-            raise ParameterError(
-                f"reset: reset_mask has the shape {chosen.shape} and the type {chosen.dtype}; give {self.num_envs} "
-                "booleans, no seed, and call reset() without a mask first."
-            )
-        self._begin(np.flatnonzero(chosen))
-        self._over[chosen] = False
-        return self._observed()[0]
 
     def step(self, actions: Any) -> tuple[npt.NDArray[np.float32], Array, Booleans, Booleans, dict[str, Any]]:
         """Hold an action (N, m) of every plant for one period: observations (N, k), rewards, terminated and truncated
@@ -122,8 +112,11 @@ class PlantVectorEnv(gymnasium.vector.VectorEnv):  # type: ignore[misc, unused-i
         if not self._generators:
             raise ParameterError("the environment has no state yet; call reset() before the first step.")
         actions = np.asarray(actions)
-        if actions.shape != (self.num_envs, count) or not np.isfinite(actions).all():
-            raise self._wrong_actions(actions, count)
+        if actions.shape != (self.num_envs, count):
+            raise ParameterError(f"the actions have the shape {actions.shape}; give ({self.num_envs}, {count}).")
+        if not np.isfinite(actions).all():
+            row = int(np.flatnonzero(~np.isfinite(actions).all(axis=1))[0])
+            raise ParameterError(f"the actions, row {row}: {actions[row]}; give {count} finite numbers from -1 to 1.")
         np.clip(actions, -1.0, 1.0, out=self._inputs[:, :count], casting="same_kind")
         self._elapsed += 1
         np.multiply(self._elapsed, self.task.period, out=self._inputs[:, count], casting="same_kind")
@@ -147,7 +140,8 @@ class PlantVectorEnv(gymnasium.vector.VectorEnv):  # type: ignore[misc, unused-i
         info = _masked(terms, ~over)
         if over.any():
             info |= _final(observations, over) | {"final_info": _masked(terms, over), "_final_info": over.copy()}
-            observations = self._begun_at_once(observations, over)
+            self._begin(np.flatnonzero(over))
+            observations = np.where(over[:, None], self._observed()[0], observations)
         return observations, rewards, terminated, truncated, info
 
     @property
@@ -169,32 +163,21 @@ class PlantVectorEnv(gymnasium.vector.VectorEnv):  # type: ignore[misc, unused-i
         if len(seeds) != self.num_envs:
             raise ParameterError(f"there are {len(seeds)} seeds for {self.num_envs} plants; give one for each.")
         self._generators = [seeding.np_random(one)[0] for one in seeds]
-        self._stock.drawn[:] = False
+        self._drawn[:] = False
 
     def _begin(self, plants: npt.NDArray[np.intp]) -> None:
         """Begin an episode of these plants, and compute the outputs of all."""
-        stock = self._stock
-        if not stock.drawn[plants].all():
-            self._refill()
-        self._place(plants, stock.parameters[plants], stock.states[plants])
-        stock.drawn[plants] = False
+        if not self._drawn[plants].all():  # all plants that have no next episode take little more time than one
+            empty = np.flatnonzero(~self._drawn)
+            uniform = np.array([self._generators[i].random(self._draw.dimension) for i in empty])
+            self._next_parameters[empty], self._next_states[empty] = self._draw.begin(uniform)
+            self._drawn[empty] = True
+        self._place(plants, self._next_parameters[plants], self._next_states[plants])
+        self._drawn[plants] = False
         self._elapsed[plants] = 0
         self._inputs[plants] = 0.0
         self._plants.inputs[...] = self._given.transpose(0, 2, 1)
         self._plants.advance(0)
-
-    def _begun_at_once(self, observations: npt.NDArray[np.float32], over: Booleans) -> npt.NDArray[np.float32]:
-        """The observations (N, k) after new episodes have begun in place of those that are over (N,)."""
-        self._begin(np.flatnonzero(over))
-        return np.where(over[:, None], self._observed()[0], observations)
-
-    def _refill(self) -> None:
-        """Draw the next episode of all plants that have none, which takes little more time than one draw."""
-        stock, size = self._stock, self._draw.dimension
-        plants = np.flatnonzero(~stock.drawn)
-        uniform = np.array([self._generators[i].random(size) for i in plants])
-        stock.parameters[plants], stock.states[plants] = self._draw.begin(uniform)
-        stock.drawn[plants] = True
 
     def _place(self, plants: npt.NDArray[np.intp], parameters: Array, states: Array) -> None:
         """Write parameters (R, P) and states (R, n) of plants into their lanes."""
@@ -213,12 +196,6 @@ class PlantVectorEnv(gymnasium.vector.VectorEnv):  # type: ignore[misc, unused-i
         if impossible.any():
             observations[impossible], rewards[impossible], terminated[impossible] = 0.0, 0.0, True
         return observations, rewards, terminated
-
-    def _wrong_actions(self, actions: npt.NDArray[Any], count: int) -> ParameterError:
-        if actions.shape != (self.num_envs, count):
-            return ParameterError(f"the actions have the shape {actions.shape}; give ({self.num_envs}, {count}).")
-        row = int(np.flatnonzero(~np.isfinite(actions).all(axis=1))[0])
-        return ParameterError(f"the actions, row {row}: {actions[row]}; give {count} finite numbers from -1 to 1.")
 
 
 def _masked(terms: dict[str, Array], present: Booleans) -> dict[str, Any]:

@@ -145,46 +145,6 @@ class FitUncertainty(ShortRepr, Randomisation):
         return {leaf.path: np.clip(x, *leaf.declared.bounds) for leaf, x in zip(chosen, drawn.T, strict=True)}
 
 
-class ParameterDraw:
-    """Parameters (R, P) of a task under its randomisations.
-
-    Raises ParameterError for an unknown path, a path that is named twice, or a range beyond the declared one.
-    """
-
-    def __init__(self, task: EnvironmentTask, randomisations: tuple[Randomisation, ...]) -> None:
-        leaves = list(tree.leaves(task))
-        self.nominal, self.randomisations = tree.flatten(task), randomisations
-        self.low, self.high = (np.array([leaf.declared.bounds[i] for leaf in leaves]) for i in (0, 1))
-        places = {leaf.path: i for i, leaf in enumerate(leaves)}
-        self.places = [np.array([_place(path, places) for path in r.paths], dtype=np.intp) for r in randomisations]
-        self.varied = np.concatenate([*self.places, np.empty(0, dtype=np.intp)])
-        self.dimension = sum(r.dimension for r in randomisations)
-        for index in np.flatnonzero(np.bincount(self.varied, minlength=1) > 1):
-            raise ParameterError(f"randomisation: '{leaves[index].path}' is varied twice; name it once.")
-        for r, at in zip(randomisations, self.places, strict=True):
-            if not isinstance(r, FitUncertainty):
-                self._check_limits(r, at, [leaf.path for leaf in leaves])
-
-    def _check_limits(self, r: Randomisation, at: npt.NDArray[np.intp], paths: list[str]) -> None:
-        for end in (0.0, 1.0):
-            values = r.values(self.nominal[at], np.full((1, r.dimension), end))[0]
-            for value, i in zip(values, at, strict=True):
-                if not self.low[i] <= value <= self.high[i]:
-                    raise ParameterError(
-                        f"randomisation: '{paths[i]}' would be {value:.4g}; allowed range: {self.low[i]:.4g} to "
-                        f"{self.high[i]:.4g}."
-                    )
-
-    def values(self, uniform: Array) -> Array:
-        """Parameters (R, P) from uniform numbers (R, D); a normal draw is limited to the declared range."""
-        table, first = np.repeat(self.nominal[None, :], len(uniform), axis=0), 0
-        for r, at in zip(self.randomisations, self.places, strict=True):
-            drawn = r.values(self.nominal[at], uniform[:, first : first + r.dimension])
-            table[:, at] = np.clip(drawn, self.low[at], self.high[at])
-            first += r.dimension
-        return table
-
-
 def _place(path: str, places: Mapping[str, T]) -> T:
     for known in (path, path.replace("plant.muscle[0].", "plant.muscle.")):
         if known in places:
@@ -200,6 +160,9 @@ class EpisodeDraw:
 
     task            the task
     randomisations  distributions of parameters; () for the nominal plant
+
+    Raises ParameterError for an unknown path, a path that is named twice, a range beyond the declared one, and an
+    initial state that is impossible.
     """
 
     def __init__(self, task: EnvironmentTask, randomisations: tuple[Randomisation, ...]) -> None:
@@ -213,39 +176,57 @@ class EpisodeDraw:
                 "(FactorRange(('plant.mechanism.inertia',), 0.8, 1.2),)."
             )
         check_actions(task.actions)
-        self.task, self._parameters = task, ParameterDraw(task, randomisations)
-        self._names = tuple(task.initial_ranges)
-        self.dimension = self._parameters.dimension + len(self._names)
+        leaves = list(tree.leaves(task))
+        self.task, self._nominal, self._randomisations = task, tree.flatten(task), randomisations
+        self._low, self._high = (np.array([leaf.declared.bounds[i] for leaf in leaves]) for i in (0, 1))
+        places = {leaf.path: i for i, leaf in enumerate(leaves)}
+        self._places = [np.array([_place(path, places) for path in r.paths], dtype=np.intp) for r in randomisations]
+        self._varied = np.concatenate([*self._places, np.empty(0, dtype=np.intp)])
+        for index in np.flatnonzero(np.bincount(self._varied, minlength=1) > 1):
+            raise ParameterError(f"randomisation: '{leaves[index].path}' is varied twice; name it once.")
+        for r, at in zip(randomisations, self._places, strict=True):
+            if not isinstance(r, FitUncertainty):
+                self._check_limits(r, at, [leaf.path for leaf in leaves])
+        self.dimension = sum(r.dimension for r in randomisations) + len(task.initial_ranges)
         """Number of uniform numbers D that an episode takes."""
         self.begin(np.full((1, self.dimension), 0.5))  # raises for an initial state that is impossible
 
+    def _check_limits(self, r: Randomisation, at: npt.NDArray[np.intp], paths: list[str]) -> None:
+        for end in (0.0, 1.0):
+            values = r.values(self._nominal[at], np.full((1, r.dimension), end))[0]
+            for value, i in zip(values, at, strict=True):
+                if not self._low[i] <= value <= self._high[i]:
+                    raise ParameterError(
+                        f"randomisation: '{paths[i]}' would be {value:.4g}; allowed range: {self._low[i]:.4g} to "
+                        f"{self._high[i]:.4g}."
+                    )
+
     def begin(self, uniform: Array) -> tuple[Array, Array]:
-        """Parameters (R, P) and initial states (R, n) from uniform numbers (R, D) in [0, 1)."""
-        parameters = self._parameters.values(uniform)
-        count = len(uniform)
-        plants: EnvironmentTask = self._with(parameters)
-        drawn = uniform[:, self._parameters.dimension :]
+        """Parameters (R, P) and initial states (R, n) from uniform numbers (R, D) in [0, 1); a normal draw is limited
+        to the declared range."""
+        parameters, first = np.repeat(self._nominal[None, :], len(uniform), axis=0), 0
+        for r, at in zip(self._randomisations, self._places, strict=True):
+            drawn = r.values(self._nominal[at], uniform[:, first : first + r.dimension])
+            parameters[:, at] = np.clip(drawn, self._low[at], self._high[at])
+            first += r.dimension
+        values: list[Any] = self._nominal.tolist()
+        for i in self._varied:
+            values[i] = parameters[:, i].view(Column)
+        plants: EnvironmentTask = tree.unflatten(self.task, values)
         initial = {}
-        for i, (name, (low, high)) in enumerate(plants.initial_ranges.items()):
-            initial[name] = low + (high - low) * drawn[:, i]
+        for i, (name, (low, high)) in enumerate(plants.initial_ranges.items(), first):
+            initial[name] = low + (high - low) * uniform[:, i]
         plant = plants.plant
         pressures = [initial.pop(f"{prefix}pressure") for prefix in plant.prefixes]
         start: dict[str, Any] = {n: 0.0 for c in plant.mechanism.coordinates for n in (c.name, c.speed)} | initial
         settled, volumes = plant.settle_muscles(pressures, start)
         filled = plant.fill_muscles(pressures, volumes, settled)
-        states = np.empty((count, len(plant.states)))
+        states = np.empty((len(uniform), len(plant.states)))
         for i, state in enumerate(self.task.states):
             states[:, i] = filled[state.name]
         if not np.isfinite(states).all():
             raise ParameterError("the initial state of an episode is not finite; narrow the ranges of the task.")
         return parameters, states
-
-    def _with(self, parameters: Array) -> EnvironmentTask:
-        """The task with a column (R,) in place of every parameter that varies."""
-        values: list[Any] = self._parameters.nominal.tolist()
-        for i in self._parameters.varied:
-            values[i] = parameters[:, i].view(Column)
-        return tree.unflatten(self.task, values)
 
 
 def whole_steps(task: EnvironmentTask, integrator: RungeKutta4) -> int:

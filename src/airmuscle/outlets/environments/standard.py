@@ -5,7 +5,7 @@ import functools
 import math
 import warnings
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, TypeVar
 
 from ...core import AirmuscleWarning, ParameterError, Value, bar, model, ops, parameter
 from ...files.library import Entry, PlantEntry, ValveEntry, load
@@ -98,13 +98,12 @@ class JointTracking(EnvironmentTask):
 
     @property
     def observations(self) -> tuple[Observation, ...]:
-        reference = "reference angle"
         return (
             Observation("angle", "rad", -3.2, 3.2, "joint angle"),
             Observation("angular_speed", "rad/s", -50.0, 50.0, "speed of the joint angle"),
             *(Observation(f"{p}pressure", "bar", -1.1, 20.0, "gauge pressure") for p in self.plant.prefixes),
-            Observation("target", "rad", -3.2, 3.2, reference),
-            Observation("next_target", "rad", -3.2, 3.2, f"{reference} one period later"),
+            Observation("target", "rad", -3.2, 3.2, "reference angle"),
+            Observation("next_target", "rad", -3.2, 3.2, "reference angle one period later"),
         )
 
     @property
@@ -183,13 +182,14 @@ class ArmReaching(EnvironmentTask):
         return sum(ops.where(angle > self.largest_angle, 1.0, 0.0) for angle in angles) > 0.5
 
 
+LibraryEntry = TypeVar("LibraryEntry", Entry, PlantEntry, ValveEntry)
 TaskWithRandomisation = tuple[JointTracking | LoadLifting | ArmReaching, tuple[Randomisation, ...]]
 
 
 @functools.cache
 def joint_task() -> TaskWithRandomisation:
     """Tracking by joint-dmsp-20-matrix; sines of 0.1 to 0.4 rad and 0.1 to 0.8 Hz, inertia and supply vary."""
-    return JointTracking(_library_plant("joint-dmsp-20-matrix")), (
+    return JointTracking(_loaded("joint-dmsp-20-matrix", PlantEntry).plant), (
         ValueRange(("target_amplitude",), 0.1, 0.4),
         ValueRange(("target_frequency",), 0.1, 0.8),
         ValueRange(("target_phase",), 0.0, 2.0 * math.pi),
@@ -202,12 +202,8 @@ def joint_task() -> TaskWithRandomisation:
 @functools.cache
 def lift_task() -> TaskWithRandomisation:
     """Lifting of 15 to 25 kg by dmsp-20-300 with MATRIX 821 valves at 6 bar to heights of 10 to 40 mm."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", AirmuscleWarning)
-        entry, valve_entry = load("dmsp-20-300"), load("matrix-821")
-    assert isinstance(entry, Entry)
-    assert isinstance(valve_entry, ValveEntry)
-    muscle, valve = dataclasses.replace(entry.muscle, damper=LinearDamper(200.0)), valve_entry.valve
+    muscle, valve = _loaded("dmsp-20-300", Entry).muscle, _loaded("matrix-821", ValveEntry).valve
+    muscle = dataclasses.replace(muscle, damper=LinearDamper(200.0))
     plant = Plant(muscle, FillDischarge(Supply(6e5), valve, valve), HangingMass(20.0))
     return LoadLifting(plant), (
         ValueRange(("target_height",), 0.01, 0.04),
@@ -220,7 +216,7 @@ def lift_task() -> TaskWithRandomisation:
 def arm_task() -> TaskWithRandomisation:
     """Reaching by the arm of Lilly and Quesada: reference angles within 0.1 rad, masses vary."""
     masses = ("plant.mechanism.links[0].mass", "plant.mechanism.links[1].mass")
-    return ArmReaching(_library_plant("arm-lilly-quesada")), (
+    return ArmReaching(_loaded("arm-lilly-quesada", PlantEntry).plant), (
         ValueRange(("targets[0]",), -0.1, 0.1),
         ValueRange(("targets[1]",), -0.1, 0.1),
         FactorRange(masses, 0.8, 1.2),
@@ -242,12 +238,13 @@ def task_and_options(
     return default, {"randomisation": randomisation, **options}
 
 
-def _library_plant(name: str) -> Plant:
+def _loaded(name: str, kind: type[LibraryEntry]) -> LibraryEntry:
+    """An entry of the library without its warnings."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", AirmuscleWarning)
         entry = load(name)
-    assert isinstance(entry, PlantEntry)
-    return entry.plant
+    assert isinstance(entry, kind)
+    return entry
 
 
 _CM = 0.01

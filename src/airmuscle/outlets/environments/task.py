@@ -3,6 +3,8 @@
 import abc
 import dataclasses
 import functools
+import itertools
+import math
 from collections.abc import Mapping, Sequence
 from typing import ClassVar, NamedTuple
 
@@ -10,7 +12,6 @@ from ...core import Input, ParameterError, StateVariable, System, Value, check_f
 from ...physics.plant import Plant
 
 _FILL, _DISCHARGE = "fill", "discharge"
-INFINITY = float("inf")
 
 
 class Action(NamedTuple):
@@ -34,41 +35,16 @@ class Action(NamedTuple):
         return {only.name: middle + half * action}
 
 
-def actions_of(plant: Plant) -> tuple[Action, ...]:
-    """The actions of a plant, in the order of its inputs."""
-    known = {i.name: i for i in plant.input_variables}
-    actions = []
-    for name, variable in known.items():
-        prefix, _, own = name.rpartition(".")
-        before = f"{prefix}." if prefix else ""
-        if own == _DISCHARGE and f"{before}{_FILL}" in known:
-            continue
-        if own == _FILL and f"{before}{_DISCHARGE}" in known:
-            pair = (variable, known[f"{before}{_DISCHARGE}"])
-            actions.append(Action(prefix or "valve", "1 fills, -1 discharges, 0 closes both valves", pair))
-        else:
-            actions.append(Action(name, f"{variable.meaning}; -1 is its minimum, 1 its maximum", (variable,)))
-    return tuple(actions)
-
-
 def check_actions(actions: tuple[Action, ...]) -> None:
     """Raise ParameterError for a plant without inputs, or an input whose range is infinite."""
     if not actions:
         raise ParameterError("the plant of the task has no inputs; an environment needs one action or more.")
     for variable in (i for action in actions for i in action.inputs):
-        if not (abs(variable.minimum) < INFINITY and abs(variable.maximum) < INFINITY):
+        if not (math.isfinite(variable.minimum) and math.isfinite(variable.maximum)):
             raise ParameterError(
                 f"the input '{variable.name}' has the range {variable.minimum:g} to {variable.maximum:g}; an action "
                 "needs a finite range. Give a plant whose inputs are limited."
             )
-
-
-def all_commands(actions: tuple[Action, ...], inputs: Mapping[str, Value]) -> dict[str, Value]:
-    """All inputs of the plant from the actions by name."""
-    commands: dict[str, Value] = {}
-    for action in actions:
-        commands |= action.commands(inputs[f"action.{action.name}"])
-    return commands
 
 
 TIME = "time"
@@ -131,8 +107,17 @@ class EnvironmentTask(System):
 
     @functools.cached_property
     def actions(self) -> tuple[Action, ...]:
-        """The actions, in order; each is between -1 and 1."""
-        return actions_of(self.plant)
+        """The actions, in the order of the inputs of the plant; each is between -1 and 1."""
+        known, actions = {i.name: i for i in self.plant.input_variables}, []
+        for name, variable in known.items():
+            prefix, dot, own = name.rpartition(".")
+            fill, discharge = (known.get(f"{prefix}{dot}{valve}") for valve in (_FILL, _DISCHARGE))
+            if own not in (_FILL, _DISCHARGE) or fill is None or discharge is None:
+                actions.append(Action(name, f"{variable.meaning}; -1 is its minimum, 1 its maximum", (variable,)))
+            elif variable is fill:
+                meaning = "1 fills, -1 discharges, 0 closes both valves"
+                actions.append(Action(prefix or "valve", meaning, (fill, discharge)))
+        return tuple(actions)
 
     @property
     def states(self) -> tuple[StateVariable, ...]:
@@ -148,7 +133,7 @@ class EnvironmentTask(System):
     def input_variables(self) -> tuple[Input, ...]:
         """The actions, then the time."""
         actions = (Input(f"action.{a.name}", "1", -1.0, 1.0, a.meaning) for a in self.actions)
-        return (*actions, Input(TIME, "s", 0.0, float("inf"), "time of the episode"))
+        return (*actions, Input(TIME, "s", 0.0, math.inf, "time of the episode"))
 
     @property
     def inputs(self) -> tuple[str, ...]:
@@ -157,12 +142,17 @@ class EnvironmentTask(System):
 
     def rates(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> Mapping[str, Value]:
         """The rates of the plant under the actions."""
-        return self.plant.rates(state, all_commands(self.actions, inputs))
+        return self.plant.rates(state, self._commands(inputs))
+
+    def _commands(self, inputs: Mapping[str, Value]) -> dict[str, Value]:
+        """All inputs of the plant from the actions by name."""
+        commands = (action.commands(inputs[f"action.{action.name}"]) for action in self.actions)
+        return dict(itertools.chain.from_iterable(each.items() for each in commands))
 
     def outputs(self, state: Mapping[str, Value], inputs: Mapping[str, Value]) -> dict[str, Value]:
         """The observations by name, clipped, then the reward, then 1 where the episode ends, else 0."""
         time = inputs[TIME]
-        values = self.observe(state, self.plant.outputs(state, all_commands(self.actions, inputs)), time)
+        values = self.observe(state, self.plant.outputs(state, self._commands(inputs)), time)
         observed = {o.name: ops.clip(v, o.low, o.high) for o, v in zip(self.observations, values, strict=True)}
         efforts = [inputs[f"action.{a.name}"] ** 2 for a in self.actions]
         closeness = ops.exp(-sum(error**2 for error in self.errors(state, time)))
