@@ -1,11 +1,11 @@
 """`airmuscle benchmark`: control benchmark of an antagonistic joint."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from pathlib import Path
 
 from ...core import InputError, SimulationError, check_known
-from ...design.control_benchmark import Contender, LearningCurve, learn, scenario_contender, standard_contenders
-from ...design.control_benchmark.benchmark import BenchmarkResult, benchmark_controllers
+from ...design.control_benchmark import learn, scenario_contender, standard_contenders
+from ...design.control_benchmark.benchmark import benchmark_controllers
 from ...design.control_benchmark.chapter import benchmark_chapter
 from ...design.control_benchmark.commissioning import COMMISSIONING_RUNS
 from ...design.control_benchmark.joints import BenchmarkJoint, on_off_joint, proportional_joint
@@ -70,7 +70,12 @@ def benchmark(
       airmuscle benchmark --join /shared/benchmark    (on each machine)
     """
     joint, trials = request.valves(TRUTH_SEEDS[: request.truths]), request.trials
-    contenders, tasks = _contenders(joint, request.controller), find_tasks(request.task)
+    known, names = {each.name: each for each in standard_contenders(joint)}, dict.fromkeys(request.controller)
+    for name in names:
+        if name not in known and is_path(name):
+            known[name] = scenario_contender(joint, name)
+        check_known("there is no controller", name, known, error=InputError)
+    contenders, tasks = [known[name] for name in names or known], find_tasks(request.task)
     if trials and (trials < 2 or LEARNED not in [each.name for each in contenders]):
         raise InputError(f"--trials needs at least 2 trials and the controller '{LEARNED}'.")
     writes, seeds = execution.writes(out), range(request.seed, request.seed + request.searches)
@@ -79,25 +84,13 @@ def benchmark(
             joint, contenders, tasks, seeds=seeds, sets_per_gain=request.budget, commissioning_runs=request.runs,
             progress=show, workers=workers,
         )  # fmt: skip
-    curves = _learned(result, trials, request.seed) if trials else []
+    curves = []
+    if trials:
+        tuned = next(each for each in result.results if each.name == LEARNED)
+        curves = [learn(result.joint, tuned, find_tasks(("sine 2 Hz",))[0], trials=trials, seed=request.seed)]
     chapter = benchmark_chapter(result, curves)
     writes = writes or execution.takes_over(out)
     deliver("benchmark", [chapter], json=json, out=out, title="Control benchmark", writes=writes)
     found = [run for each in result.results for run in each.runs.values()]
     if not any(run.metrics for run in found):
         raise SimulationError(f"all runs failed; reason of the first: {found[0].reason}")
-
-
-def _contenders(joint: BenchmarkJoint, names: Sequence[str]) -> tuple[Contender, ...]:
-    known = {each.name: each for each in standard_contenders(joint)}
-    for name in names:
-        if name not in known and is_path(name):
-            known[name] = scenario_contender(joint, name)
-        check_known("there is no controller", name, known, error=InputError)
-    return tuple(known[name] for name in dict.fromkeys(names)) or tuple(known.values())
-
-
-def _learned(result: BenchmarkResult, trials: int, seed: int) -> list[LearningCurve]:
-    """The trials of iterative learning with the tuned controller."""
-    tuned = next(each for each in result.results if each.name == LEARNED)
-    return [learn(result.joint, tuned, find_tasks(("sine 2 Hz",))[0], trials=trials, seed=seed)]

@@ -30,9 +30,9 @@ from ...physics.muscle.geometry import Geometry
 from ...recording import Recording
 from ...report.data import as_json
 from ..requests import BraidSize, ReadingRequest, braid_of_length, check_one_length, option, read_braid, request
-from .bench_files import print_row_notes, reading_chapters
 from .delivery import deliver
 from .execution import Execution
+from .measurements import print_row_notes, reading_chapters
 from .options import Folder, Json, with_requests
 from .terminal import computation_progress, echo, in_options, reading_progress
 
@@ -41,10 +41,8 @@ OMITTED_ROOMS = ("outlets", "papers", "report", "design", "files", "control")
 MAX_AGE = 30 * 86400.0
 """Age from which the stages of a campaign that was never continued are removed [s] (chosen)."""
 _HASH = hashlib.sha256().digest_size
-STAGES_FILE = "stages.json"
-"""File of the finished stages, which is replaced at the end of each stage."""
-SCENARIOS = "scenarios"
-"""Folder of the scenarios."""
+STAGES_FILE, SCENARIOS = "stages.json", "scenarios"
+"""File of the finished stages, which is replaced at the end of each stage, and folder of the scenarios."""
 
 CampaignFolder = Annotated[
     list[Path],
@@ -59,7 +57,10 @@ class KeptStages:
         data = [[each.origin, dict(each.columns), dict(each.constants)] for each in recordings]
         self._key = fingerprint(data, geometry, program_fingerprint(OMITTED_ROOMS))[:32]
         self._folder = cache_folder()
-        _remove_old(self._folder)
+        for path in self._folder.glob("campaign-*") if self._folder is not None else ():
+            with contextlib.suppress(OSError):
+                if time.time() - path.stat().st_mtime > MAX_AGE:
+                    path.unlink()
 
     def load(self, names: Sequence[str]) -> dict[str, Any]:
         """The results of the stages that an interrupted run has finished, by name."""
@@ -90,13 +91,6 @@ class KeptStages:
     def _path(self, name: str) -> Path:
         assert self._folder is not None
         return self._folder / f"campaign-{self._key}-{name.replace(' ', '-')}.stage"
-
-
-def _remove_old(folder: Path | None) -> None:
-    for path in folder.glob("campaign-*") if folder is not None else ():
-        with contextlib.suppress(OSError):
-            if time.time() - path.stat().st_mtime > MAX_AGE:
-                path.unlink()
 
 
 @request
@@ -145,8 +139,7 @@ def campaign(
     writes = execution.writes(out)
     result = _identify(recordings, geometry, out if writes else None, execution)
     validation = [row for recording in aside for row in _validation(result, recording)]
-    scenarios = campaign_scenarios(result)
-    entry = _entry(result)
+    scenarios, entry = campaign_scenarios(result), _entry(result)
     named = [(s.record, f"{SCENARIOS}/{s.name}" if s.text else s.reason) for s in scenarios]
     chapters = campaign_chapters(result, entry, unread=unread, scenarios=named, validation=validation)
     chapters[0] = dataclasses.replace(chapters[0], notes=(*chapters[0].notes, *_not_written(result, entry, scenarios)))

@@ -43,14 +43,14 @@ COMMANDS = (
     CommandRow("evaluate", "library", "evaluate", "Evaluate a law for two of pressure, contraction and force."),
     CommandRow("inspect", "measurements", "inspect", "Inspect measurement files: columns, runs, sampling, outliers."),
     CommandRow("fit", "fit", "fit", "Fit a characteristic to measured points, or compare several."),
-    CommandRow("approximate", "approximate", "approximate", "Approximate one characteristic by another."),
+    CommandRow("approximate", "fit", "approximate", "Approximate one characteristic by another."),
     CommandRow("convert", "measurements", "convert", "Write measurement files as CSV, Parquet or HDF5."),
     CommandRow("hysteresis", "hysteresis", "hysteresis", "Fit friction models to hysteresis loops."),
     CommandRow("fit-dynamic", "fit_dynamic", "fit_dynamic", "Identify plant parameters from transient records."),
     CommandRow(
         "fit-regulator", "fit_dynamic", "fit_regulator_command", "Identify a pressure regulator from its response."
     ),
-    CommandRow("fit-joint", "fit_joint", "fit_joint_command", "Identify a joint or an arm from its episodes."),
+    CommandRow("fit-joint", "fit_dynamic", "fit_joint_command", "Identify a joint or an arm from its episodes."),
     CommandRow("campaign", "campaign", "campaign", "Identify a muscle from all files of a test rig."),
     CommandRow("predict", "predict", "predict", "Predict further records by an identified muscle or plant."),
     CommandRow("fit-volume", "fit", "fit_volume_command", "Fit the volume of a muscle over its contraction."),
@@ -122,19 +122,17 @@ def _permit(ctx: typer.Context, value: bool) -> None:
 
 
 CODE_WORDS = 'Run classes that a file names as model = "module:Class"; only for files that you trust.'
-
-
-def _bearer(
-    allow_code: Annotated[bool, typer.Option("--allow-code", help=CODE_WORDS, callback=_permit, is_eager=True)] = False,
-) -> None:
-    """Bears the flag that several commands take."""
+AllowCode = Annotated[bool, typer.Option("--allow-code", help=CODE_WORDS, callback=_permit, is_eager=True)]
 
 
 def _allow_code_option() -> Any:
-    """The flag with which a command reads `model = "module:Class"` in its files."""
-    command = typer.Typer(**SETTINGS)
-    command.command()(_bearer)
-    (flag,) = (each for each in typer.main.get_command(command).params if each.name == "allow_code")
+    """The flag with which a command reads `model = "module:Class"` in its files, taken from a command without name."""
+    bearer = typer.Typer(**SETTINGS)
+
+    @bearer.command()
+    def bear(allow_code: AllowCode = False) -> None: ...
+
+    (flag,) = (each for each in typer.main.get_command(bearer).params if each.name == "allow_code")
     flag.expose_value = False
     return flag
 

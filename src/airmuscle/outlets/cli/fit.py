@@ -1,19 +1,25 @@
-"""`airmuscle fit` and `airmuscle fit-volume`: a characteristic or a volume law identified from measurement files."""
+"""`airmuscle fit`, `fit-volume` and `approximate`: a characteristic or volume law from measurements or another law."""
 
+import contextlib
 import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Annotated, Any
 
+import typer
+
+from ...bench.identify import approximate as approximate_law
+from ...bench.identify.approximation import GRID_POINTS, sample_on_grid
 from ...bench.identify.volume_fit import VolumeFit, fit_volume, volume_chapter, volume_points, volume_summary
 from ...core import ParameterError, PhysicsError, check_writable
-from ...files.library import Entry, list_files, load_law, part_toml, resting_lengths, to_toml
-from ...physics.muscle.characteristic import EnergyDefect, ValidityRange, maxwell_defect, validity_range_of
+from ...files.library import Entry, find_initial_law, list_files, load_law, part_toml, resting_lengths, save, to_toml
+from ...physics.muscle.characteristic import ValidityRange, maxwell_defect, validity_range_of
 from ...recording import Recording
 from ..requests import FitRequest, ReadingRequest, RequestError, check_one_length, fit_requested, option, request
-from .bench_files import Files, read_recordings, reading_chapters
-from .delivery import deliver
+from .delivery import deliver, print_result
 from .execution import Execution
-from .options import Folder, Json, with_requests
+from .measurements import Files, read_recordings, reading_chapters
+from .options import Folder, Json, Name, complete_law, with_requests
 from .terminal import computation_progress
 
 
@@ -84,15 +90,19 @@ def fit_volume_command(
     check_writable(out)
     recordings = read_recordings(files, reading)
     fit = fit_volume(volume_points(recordings, request.temperature), _length(recordings, entry))
-    limits = None if entry is None else _limits(entry, fit)
-    defect = None if entry is None or limits is None else _defect(entry, fit, limits)
-    title, law = f"Volume fitted to {list_files([f.stem for f in files])}", None
-    contents = {"geometry.toml": part_toml("geometry", fit.geometry)}
-    if entry is not None:
-        fitted = _entry(entry, fit, files)
-        title, law = fitted.title, None if limits is None else entry.characteristic
+    if entry is None:
+        chapter = volume_chapter(fit, f"Volume fitted to {list_files([f.stem for f in files])}", None, None, None)
+        contents = {"geometry.toml": part_toml("geometry", fit.geometry)}
+    else:
+        law, limits, defect = entry.characteristic, _limits(entry, fit), None
+        with contextlib.suppress(PhysicsError):  # slack everywhere
+            defect = None if limits is None else maxwell_defect(law, fit.geometry, limits)
+        chapter = volume_chapter(fit, entry.title, None if limits is None else law, limits, defect)
+        note = f"Volume fitted to {list_files([f.name for f in files])}: {volume_summary(fit)}."
+        fitted = dataclasses.replace(entry, name="muscle", geometry=fit.geometry, provenance="fitted",
+                                     note=" ".join(filter(None, (entry.note, note))), checks=())  # fmt: skip
         contents = {"muscle.toml": to_toml(fitted)}
-    chapters = [volume_chapter(fit, title, law, limits, defect), *reading_chapters(recordings)]
+    chapters = [chapter, *reading_chapters(recordings)]
     deliver("fit-volume", chapters, json=json, out=out, title="Volume", files=contents)
 
 
@@ -122,14 +132,74 @@ def _limits(entry: Entry, fit: VolumeFit) -> ValidityRange | None:
     return ValidityRange(stated.min_pressure, stated.max_pressure, low, high) if low < high else None
 
 
-def _defect(entry: Entry, fit: VolumeFit, limits: ValidityRange) -> EnergyDefect | None:
-    try:
-        return maxwell_defect(entry.characteristic, fit.geometry, limits)
-    except PhysicsError:  # slack everywhere
-        return None
+LIMIT = "Limit of the validity range; default: that of the muscle."
+LIMITS = ("min_pressure", "max_pressure", "min_contraction", "max_contraction")
+Model = Annotated[
+    str,
+    typer.Argument(
+        metavar="MODEL",
+        help="The other model: ContractileSurface, Sarosi2012, or a library entry of it.",
+        autocompletion=complete_law,
+    ),
+]
+Out = Annotated[
+    Path | None, typer.Option("--out", metavar="FILE", help="Muscle file to write, with the other characteristic.")
+]
 
 
-def _entry(entry: Entry, fit: VolumeFit, files: list[Path]) -> Entry:
-    note = f"Volume fitted to {list_files([f.name for f in files])}: {volume_summary(fit)}."
-    return dataclasses.replace(entry, name="muscle", geometry=fit.geometry, provenance="fitted",
-                               note=" ".join(filter(None, (entry.note, note))), checks=())  # fmt: skip
+@request
+class ApproximateRequest:
+    """Range and degree of an approximation."""
+
+    min_pressure: float | None = option(LIMIT, unit="Pa", default=None)
+    max_pressure: float | None = option(LIMIT, unit="Pa", default=None)
+    min_contraction: float | None = option(LIMIT, unit="1", default=None)
+    max_contraction: float | None = option(LIMIT, unit="1", default=None)
+    degree: int = option("Total degree of a ContractileSurface.", default=5, bounds=(1, 9))
+
+    def validity_range(self, entry: Entry) -> ValidityRange:
+        """The validity range of the muscle with the given limits. Raises ParameterError."""
+        default = validity_range_of(entry.characteristic, entry.validity_range)
+        given = {name: getattr(self, name) for name in LIMITS}
+        limits: dict[str, Any] = {
+            name: getattr(default, name, None) if value is None else value for name, value in given.items()
+        }
+        missing = [f"--{name.replace('_', '-')}" for name, value in limits.items() if value is None]
+        if missing:
+            raise ParameterError(
+                f"{entry.name} has no validity range for the approximation; give {', '.join(missing)}."
+            )
+        return ValidityRange(**limits)
+
+
+@with_requests
+def approximate(name: Name, model: Model, request: ApproximateRequest, out: Out = None, json: Json = False) -> None:
+    """Approximate one characteristic by another.
+
+    \b
+    The error is the difference in force, where the original force is positive, over the validity range of the muscle
+    or the range given by the options. With --out, FILE is the muscle with the other characteristic; its other parts
+    are unchanged.
+
+    \b
+    Examples:
+      airmuscle approximate dmsp-20-300 ContractileSurface --degree 5 --out surface.toml
+      airmuscle approximate fit/muscle.toml Sarosi2012 --max-pressure "5 bar"
+    """
+    entry = load_law(name)
+    limits = request.validity_range(entry)
+    grid = sample_on_grid(entry.characteristic, limits, GRID_POINTS)
+    length = getattr(entry.geometry, "resting_length", None)
+    data = grid if length is None else grid.with_constants(resting_length=length)
+    initial = find_initial_law(model, [data], request.degree, "MODEL")
+    found = approximate_law(entry.characteristic, initial.entry.characteristic, limits)
+    chapter, original = found.chapter(), type(entry.characteristic).__name__
+    if out is not None:
+        note = f"Approximated from {entry.name}: {found.summary}. {entry.note}".strip()
+        other = dataclasses.replace(
+            entry, name="muscle", title=f"{type(found.model).__name__} in place of {original}: {entry.title}",
+            provenance="fitted", note=note, characteristic=found.model, validity_range=found.validity_range, checks=(),
+        )  # fmt: skip
+        save(other, out)
+    title = f"{entry.name}, {original}, by {chapter.title}"
+    print_result([dataclasses.replace(chapter, title=title)], {} if out is None else {"muscle": out}, json)

@@ -1,22 +1,22 @@
-"""`airmuscle fit-dynamic` and `airmuscle fit-regulator`: parameters of plants and regulators from transient records."""
+"""`airmuscle fit-dynamic`, `fit-regulator` and `fit-joint`: plants, regulators and joints from transient records."""
 
 import dataclasses
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
-from ...bench.identify.dynamic import DynamicFit, fit_regulator
+from ...bench.identify.dynamic import fit_regulator
 from ...bench.identify.dynamic.dynamic_chapter import dynamic_chapters, regulator_chapters
 from ...bench.segment import inspect
 from ...core import check_writable, counted
 from ...files.library import list_files, part_toml, scenario_toml
-from ...files.scenario.identification import DynamicFitSetup, load_dynamic_fit
+from ...files.scenario.identification import load_dynamic_fit
 from ...recording.recording import row_notes
 from ..requests import WEAK, ReadingRequest, option, request
-from .bench_files import Files, read_recordings, reading_chapters
+from ..requests.joint import JointFitRequest, fit_requested_arm, inspect_requested
 from .delivery import deliver
+from .measurements import Files, read_recordings, reading_chapters
 from .options import Folder, Json, with_requests
 from .terminal import echo
 
@@ -60,33 +60,23 @@ def fit_dynamic(study: Study, request: DynamicFitRequest, out: Folder = Path("dy
     if request.starts is not None:
         loaded = dataclasses.replace(loaded, search=dataclasses.replace(loaded.search, starts=request.starts))
     check_writable(out)
-    findings = _findings(loaded)
+    recordings = [experiment.recording for experiment in loaded.experiments]
+    notes = row_notes(recordings)
+    findings = [f"{each.origin}: {finding.text}" for each in recordings for finding in inspect(each).findings]
     if not json:
         counts = ((len(loaded.experiments), "record"), (loaded.search.starts, "start"))
         echo("  " + ", ".join(counted(*each) for each in counts), err=True)
     fit = loaded.fit()
     cross = loaded.cross_predictions(fit)
     fit = fit.with_scatter_of_records([each.common for each in cross])
-    profiles = [fit.profile(name, request.points) for name in _profiled_names(fit, request.profile)]
+    weak = [name for each in fit.identifiability.undetermined for name, _ in each.shares]
+    wanted = [*(weak if WEAK in request.profile else ()), *(name for name in request.profile if name != WEAK)]
+    profiles = [fit.profile(name, request.points) for name in dict.fromkeys(fit[name].name for name in wanted)]
     count = len(loaded.experiments)
     names = ["scenario.toml"] if count == 1 else [f"scenario-{i + 1}.toml" for i in range(count)]
     files = {name: loaded.scenario(fit, i, cross) for i, name in enumerate(names)}
-    chapters = dynamic_chapters(fit, loaded.title, profiles, findings, cross)
+    chapters = dynamic_chapters(fit, loaded.title, profiles, [*notes, *findings], cross)
     deliver("fit-dynamic", chapters, json=json, out=out, title="Dynamic fit", files=files)
-
-
-def _findings(study: DynamicFitSetup) -> list[str]:
-    """Rows of the records that were left out, and data-quality problems."""
-    recordings = [experiment.recording for experiment in study.experiments]
-    findings = [f"{each.origin}: {finding.text}" for each in recordings for finding in inspect(each).findings]
-    return [*row_notes(recordings), *findings]
-
-
-def _profiled_names(fit: DynamicFit, names: Sequence[str]) -> list[str]:
-    """The parameters to profile; also allowed are estimates on a bound and undetermined ones."""
-    weak = [name for each in fit.identifiability.undetermined for name, _ in each.shares]
-    requested = [*(weak if WEAK in names else []), *(name for name in names if name != WEAK)]
-    return [fit[name].name for name in dict.fromkeys(requested)]
 
 
 @request
@@ -131,3 +121,36 @@ def fit_regulator_command(
     }
     chapters = [*regulator_chapters(result, title), *reading_chapters(recordings)]
     deliver("fit-regulator", chapters, json=json, out=out, title="Pressure regulator", files=contents)
+
+
+@with_requests
+def fit_joint_command(
+    source: Annotated[
+        Path, typer.Argument(metavar="EPISODES", help="A folder of episodes or bags, or one file with all.")
+    ],
+    request: JointFitRequest,
+    out: Folder = Path("joint"),
+    json: Json = False,
+) -> None:
+    """Identify a joint or an arm from its episodes.
+
+    \b
+    Episodes are short records with angles of the joints and pressures of their muscles: CSV, NPZ, JSON, HDF5,
+    Parquet, ROS bags or RLDS-like steps, one file each or one for all. The mapping file says which column is what,
+    in which unit, and may state the muscles of each joint and the axes of the joints; without one it is proposed.
+    The free run is judged on the last episodes, beside persistence and a linear ARX model. Writes DIR/report.html,
+    DIR/scenario.toml, the arm with a pressure regulator for each muscle and the covariance of its parameters, and
+    DIR/controlled.toml, the same with a controller of each angle to be tuned.
+
+    \b
+    Examples:
+      airmuscle fit-joint episodes/ --mapping arm.toml --inspect
+      airmuscle fit-joint episodes.npz --mapping arm.toml --out arm
+      airmuscle fit-joint episodes --mapping arm.toml --known joint.toml --free mechanism.inertia --free zeros
+    """
+    if request.inspect:
+        echo(str(inspect_requested(source, request)))
+        return
+    check_writable(out)
+    chapter, files = fit_requested_arm(source, request, lambda text: None if json else echo(text))
+    deliver("fit-joint", [chapter], json=json, out=out, title="Identified arm", files=files)

@@ -15,8 +15,8 @@ from ...core import check_writable
 from ...files.library import Entry, load_law, part_toml, to_toml, without_parts
 from ...physics.muscle.characteristic.base import ForceLaw
 from ..requests import ReadingRequest, RequestError, Where, option, request
-from .bench_files import Files, read_recordings, reading_chapters
 from .delivery import deliver
+from .measurements import Files, read_recordings, reading_chapters
 from .options import Folder, Json, with_requests
 from .terminal import echo
 

@@ -10,26 +10,69 @@ from typing import Annotated, Any, NamedTuple
 
 import typer
 
-from ...core import Reference, reference
-from ...files.library import UNITS, load, model_class
+from ...core import Reference, check_known, leaves, quantity, reference, with_parameters
+from ...files.library import PARTS, UNITS, Entry, load, load_law, model_class, scale_entry
 from ...files.library import evaluate as evaluate_entry
-from ...files.library.files import (  # fmt: skip
-    DATA,
-    FOLDERS,
-    LAWS,
-    list_data,
-    list_laws,
-    list_plants,
-    list_products,
-    list_valves,
-)
+from ...files.library.files import DATA, FOLDERS, LAWS, list_data, list_laws, list_plants, list_products, list_valves
 from ...physics.muscle.characteristic import ForceLaw
 from ...physics.muscle.isobars import describe_point
 from ...report.write import rendered_figure, save_table
-from ..requests import EntryRequest, RequestError, Where, option, request
+from ..requests import RequestError, Where, option, read_pair, request
 from .delivery import print_result, write_result
 from .options import Json, Name, OptionalFolder, with_requests
 from .terminal import echo, print_json, print_table
+
+
+@request
+class EntryRequest:
+    """How an entry differs from its file."""
+
+    resting_length: str | None = option(
+        "Scale the muscle to this resting length: '200 mm'.", default=None, metavar="QUANTITY"
+    )
+    diameter: str | None = option(
+        "Scale a McKibben muscle to this braid diameter at rest.", default=None, metavar="QUANTITY"
+    )
+    set: tuple[Any, ...] = option(
+        "Another value of a parameter, by its path: characteristic.slope_factor=2, 'geometry.radius=10 mm'. "
+        "Repeatable.", default=(), metavar="PATH=VALUE", read=read_pair,
+    )  # fmt: skip
+
+    def load(self, name: str, find: Callable[[str], Any] = load_law) -> Any:
+        """The entry of a name or file, as changed. Raises ParameterError or UnitError."""
+        entry = find(name)
+        if self.resting_length is not None or self.diameter is not None:
+            entry = scale_entry(entry, resting_length=self.resting_length, diameter=self.diameter)
+        return with_values(entry, dict(self.set))
+
+
+def with_values(entry: Any, changes: Mapping[str, float | str]) -> Any:
+    """The entry with other values of declared parameters, by their paths: numbers [SI] or texts with a unit.
+
+    A muscle or law loses what belongs to its own parameters: standard errors, error band and checks. Raises
+    ParameterError for a path or a value that the entry cannot have, UnitError.
+    """
+    if not changes:
+        return entry
+    parts = {name: part for name in PARTS if (part := getattr(entry, name, None)) is not None}
+    known = {f"{name}.{leaf.path}": leaf for name, part in parts.items() for leaf in leaves(part)}
+    check_known(f"{entry.name} has no parameter", changes, known, "its parameters are")
+    values = {path: quantity(value, known[path].declared.unit, where=path) for path, value in changes.items()}
+    changed = {
+        name: with_parameters(part, [values.get(f"{name}.{leaf.path}", leaf.value) for leaf in leaves(part)])
+        for name, part in parts.items()
+        if any(path.startswith(f"{name}.") for path in values)
+    }
+    own = getattr(parts.get("characteristic"), "geometry", None)
+    if "characteristic" in changed and own is not None and own == entry.geometry:
+        changed["geometry"] = changed["characteristic"].geometry
+    if not isinstance(entry, Entry):
+        return dataclasses.replace(entry, **changed)
+    stated = ", ".join(f"{path} = {value:.6g}" for path, value in values.items())
+    return dataclasses.replace(
+        entry, **changed, title=f"{entry.title}, parameters changed", provenance="chosen", uncertainty=None, checks=(),
+        error_band=None, note=f"Changed (SI): {stated}. {entry.note}".strip(),
+    )  # fmt: skip
 
 
 @request
@@ -127,38 +170,32 @@ def list_entries(json: Json = False) -> None:
       airmuscle list
       airmuscle list --json
     """
-    rows = library_rows()
+    rows = _library_rows()
     if json:
         print_json([row._asdict() for row in rows])
         return
     print_table(dict(zip(ListRow._fields, zip(*rows, strict=True), strict=True)))
 
 
-def library_rows() -> list[ListRow]:
+def _library_rows() -> list[ListRow]:
     """All library entries, valves, plants and data sets, read from the files without building any model."""
-    data = {name: _data_row(DATA / f"{name}.csv") for name in list_data()}
-    laws = [_row(LAWS / f"{name}.toml", _law_kind) for name in list_laws()]
-    parts: tuple[tuple[str, Iterable[str], Callable[[Mapping[str, Any]], str]], ...] = (
-        ("valve", list_valves(), lambda tables: f"valve, {tables['valve']['model']}"),
-        ("plant", list_plants(), lambda tables: f"plant, {tables['plant']['mechanism']['model']}"),
-        ("product", list_products(), lambda _: "product, Ratings"),
+    parts: tuple[tuple[Path, Iterable[str], Callable[[Mapping[str, Any]], str]], ...] = (
+        (LAWS, list_laws(), _law_kind),
+        (FOLDERS["valve"], list_valves(), lambda tables: f"valve, {tables['valve']['model']}"),
+        (FOLDERS["plant"], list_plants(), lambda tables: f"plant, {tables['plant']['mechanism']['model']}"),
+        (FOLDERS["product"], list_products(), lambda _: "product, Ratings"),
     )
-    return [
-        *(_with_data_set(row, data.pop(row.name)) if row.name in data else row for row in laws),
-        *(_row(FOLDERS[part] / f"{name}.toml", kind_of) for part, names, kind_of in parts for name in names),
-        *data.values(),
-    ]
-
-
-def _with_data_set(law: ListRow, data: ListRow) -> ListRow:
-    """One row for a law and the data set of the same name."""
-    provenance = law.provenance if data.provenance in ("", law.provenance) else f"{law.provenance}; {data.provenance}"
-    return law._replace(kind=f"{law.kind}; {data.kind}", provenance=provenance)
-
-
-def _row(path: Path, kind_of: Callable[[Mapping[str, Any]], str]) -> ListRow:
-    tables = tomllib.loads(path.read_text(encoding="utf-8"))
-    return ListRow(path.stem, tables["title"], kind_of(tables), tables["provenance"])
+    data, rows = {name: _data_row(DATA / f"{name}.csv") for name in list_data()}, []
+    for folder, names, kind_of in parts:
+        for name in names:
+            tables = tomllib.loads((folder / f"{name}.toml").read_text(encoding="utf-8"))
+            kind, provenance = kind_of(tables), tables["provenance"]
+            if folder == LAWS and name in data:  # one row with the data set of the same name
+                measured = data.pop(name)
+                kind = f"{kind}; {measured.kind}"
+                provenance = "; ".join(filter(None, dict.fromkeys((provenance, measured.provenance))))
+            rows.append(ListRow(name, tables["title"], kind, provenance))
+    return [*rows, *data.values()]
 
 
 def _law_kind(tables: Mapping[str, Any]) -> str:
@@ -199,17 +236,17 @@ def cite(
     references = reference.cite(load(name))
     if json:
         print_json([dataclasses.asdict(source) for source in references])
-        return
-    for source in references:
-        echo(as_bibtex(source) if bibtex else str(source))
-    if not references:
+    elif references:
+        echo("\n".join(map(as_bibtex if bibtex else str, references)))
+    else:
         echo(f"{name}: no reference is given; its parameter values are assumed.")
 
 
 def as_bibtex(source: Reference) -> str:
-    """A BibTeX entry of type @misc, which every bibliography style supports."""
+    """A BibTeX entry of type @misc, which every bibliography style supports, with `and` between its authors."""
+    separated = re.sub(r"(?:(?<=\.),|;) ", " and ", source.authors)
     fields = {
-        "author": _authors(source.authors),
+        "author": _escape(re.sub(r",? et al\.?", " and others", separated)),
         "title": "{" + _escape(source.title) + "}",
         "howpublished": _escape(source.where),
         "year": str(source.year) if source.year else "",
@@ -219,12 +256,6 @@ def as_bibtex(source: Reference) -> str:
     lines = [f"  {key} = {{{value}}}," for key, value in fields.items() if value]
     key = re.sub(r"[^\w:.-]", "-", source.key)
     return "\n".join([f"@misc{{{key},", *lines, "}"])
-
-
-def _authors(authors: str) -> str:
-    """`Chou, C.-P., Hannaford, B. et al.` in the syntax of BibTeX: names separated by `and`."""
-    separated = re.sub(r"(?:(?<=\.),|;) ", " and ", authors)
-    return _escape(re.sub(r",? et al\.?", " and others", separated))
 
 
 def _escape(text: str) -> str:

@@ -1,6 +1,9 @@
-"""`airmuscle inspect` and `airmuscle convert`: measurement files before a fit, and in another file format."""
+"""Measurement files as arguments of a command, with the options that complete them; `airmuscle inspect` and `airmuscle
+convert`: such files before a fit, and in another file format."""
 
+import dataclasses
 import math
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Annotated
 
@@ -9,17 +12,69 @@ import typer
 from ...bench.readers import ColumnMapping, Decimation, RecordedTime, read, write
 from ...bench.readers.reader import find_files
 from ...bench.readers.writer import EXTENSIONS
-from ...bench.segment import inspect_all, inspection_chapters
-from ...core import FileError
+from ...bench.segment import check_contents, inspect_all, inspection_chapters
+from ...core import FileError, ParameterError
+from ...files.library import load_data
+from ...recording import Recording
+from ...recording.recording import row_notes
+from ...report.chapter import Chapter
 from ..requests import ReadingRequest, option, request
-from .bench_files import print_row_notes
 from .delivery import deliver
-from .options import Json, OptionalFolder, with_requests
+from .options import Json, OptionalFolder, complete_data, with_requests
 from .terminal import echo, print_json, reading_progress
+
+Files = Annotated[
+    list[Path],
+    typer.Argument(
+        metavar="FILES",
+        help="CSV, LVM, Excel, MAT, TDMS or MDF files with pressure, contraction or length, and force.",
+        autocompletion=complete_data,
+    ),
+]
+_OPTIONS = {"units": "unit", "columns": "column", "constants": "constant", "drop_outliers": "outliers"}
+"""Options by the names of their fields, where these differ."""
+
+
+def print_row_notes(recordings: Iterable[Recording]) -> None:
+    """Print the notes on rows that were left out or filled, on the error stream."""
+    for note in row_notes(recordings):
+        echo(f"note: {note}", err=True)
+
+
+def read_recordings(files: list[Path], reading: ReadingRequest) -> list[Recording]:
+    """The recordings of the files, read together so that their units can be compared, then library data sets.
+
+    A name without suffix and folder that is not in the working directory is a data set of the library. Raises
+    ParameterError for options that a data set does not take.
+    """
+    mapping = reading.column_mapping()
+    local = {entry.name for entry in Path().iterdir()}
+    names = [f for f in files if not f.suffix and len(f.parts) == 1 and f.name not in local]
+    paths = [f for f in files if f not in names]
+    default = ColumnMapping()
+    fields = [f.name for f in dataclasses.fields(mapping) if getattr(mapping, f.name) != getattr(default, f.name)]
+    named = dict.fromkeys([*fields, *mapping.constants])
+    set_options = [f"--{_OPTIONS.get(name, name).replace('_', '-')}" for name in named]
+    if names and set_options:
+        raise ParameterError(
+            f"{names[0]}: a data set of the library contains its units and constants; omit {', '.join(set_options)}."
+        )
+    with reading_progress() as progress:
+        recordings = read(paths, mapping, progress=progress) if paths else ()
+    check_contents(recordings)
+    print_row_notes(recordings)
+    return [*recordings, *(load_data(str(name)) for name in names)]
+
+
+def reading_chapters(recordings: Iterable[Recording]) -> list[Chapter]:
+    """One chapter with the notes on the rows that were left out or filled; none if all rows are as measured."""
+    notes = row_notes(recordings)
+    return [Chapter("reading", "Rows left out or filled", "\n\n".join(notes))] if notes else []
+
 
 UNORDERED = ColumnMapping(time=RecordedTime(ordered=False))
 """Stamps that repeat or decrease are shown, not refused."""
-Files = Annotated[
+AnyFiles = Annotated[
     list[str],
     typer.Argument(
         metavar="FILES",
@@ -29,7 +84,7 @@ Files = Annotated[
 
 
 @with_requests
-def inspect(files: Files, reading: ReadingRequest, json: Json = False, out: OptionalFolder = None) -> None:
+def inspect(files: AnyFiles, reading: ReadingRequest, json: Json = False, out: OptionalFolder = None) -> None:
     """Inspect measurement files: columns, runs, sampling, outliers.
 
     \b
@@ -92,8 +147,11 @@ def convert(
     rows = Decimation(request.max_rows or EVERY_ROW)
     recordings = read(source, reading.column_mapping(), downsampling=rows)
     print_row_notes(recordings)
-    paths = [_path(target, i, len(recordings)) for i in range(len(recordings))]
-    _check_no_source(paths, source)
+    numbered = [target.with_name(f"{target.stem}_{i:03d}{target.suffix}") for i in range(1, len(recordings) + 1)]
+    paths, sources = numbered if len(recordings) > 1 else [target], {path.resolve() for path in find_files(source)}
+    for path in paths:
+        if path.resolve() in sources:
+            raise FileError(f"{path}: is a file to be converted and would be lost. Choose another target.")
     for recording, path in zip(recordings, paths, strict=True):
         write(recording, path, comments=not request.plain)
     if json:
@@ -101,15 +159,3 @@ def convert(
         return
     for recording, path in zip(recordings, paths, strict=True):
         echo(f"file: {path}: {len(recording)} rows of {', '.join(recording)}")
-
-
-def _check_no_source(targets: list[Path], source: str) -> None:
-    """Raise FileError if a file to be written is one of those that were read."""
-    sources = {path.resolve() for path in find_files(source)}
-    for target in targets:
-        if target.resolve() in sources:
-            raise FileError(f"{target}: is a file to be converted and would be lost. Choose another target.")
-
-
-def _path(target: Path, number: int, count: int) -> Path:
-    return target if count == 1 else target.with_name(f"{target.stem}_{number + 1:03d}{target.suffix}")

@@ -12,8 +12,8 @@ from ...core import FileError, check_writable
 from ...files.library import PlantEntry, is_path, kind_of, list_plants, load_law, read_toml
 from ...files.scenario.prediction import load_plant_model, predict_with_entry
 from ..requests import ReadingRequest, RequestError, Where, option, request
-from .bench_files import read_recordings, reading_chapters
 from .delivery import deliver
+from .measurements import read_recordings, reading_chapters
 from .options import Folder, Json, complete_model, with_requests
 
 Model = Annotated[
@@ -56,11 +56,6 @@ class PredictRequest:
         """The options that are given."""
         return [f"--{name.replace('_', '-')}" for name in ("start_time", "start_margin", "own") if getattr(self, name)]
 
-    @property
-    def unknowns(self) -> list[Any]:
-        """What is estimated from each record."""
-        return [*self.own, *([] if self.start_margin is None else [StartTime(self.start_margin)])]
-
 
 @with_requests
 def predict(
@@ -83,7 +78,8 @@ def predict(
       airmuscle predict dmsp-20-300 bench.csv --json
     """
     check_writable(out)
-    if _is_plant(model):
+    is_file = is_path(model) or Path(model).exists()
+    if kind_of(read_toml(Path(model))) is PlantEntry if is_file else model in list_plants():
         thing, predictions = _transient(model, files, reading, request)
     elif request.given:
         raise RequestError(f"{', '.join(request.given)} is for a scenario; MODEL is a muscle or a law")
@@ -92,13 +88,6 @@ def predict(
     chapters = prediction_chapters(Path(model).name, thing, predictions)
     chapters += reading_chapters(each.recording for each in predictions)
     deliver("predict", chapters, json=json, out=out, title="Prediction")
-
-
-def _is_plant(model: str) -> bool:
-    """Whether the model is a plant: a scenario file, or a plant of the library."""
-    if is_path(model) or Path(model).exists():
-        return kind_of(read_toml(Path(model))) is PlantEntry
-    return model in list_plants()
 
 
 def _static(model: str, files: list[Path], reading: ReadingRequest) -> tuple[Any, list[RecordPrediction]]:
@@ -116,9 +105,7 @@ def _transient(
     loaded = load_plant_model(model)
     measured = [path for path in files if path.suffix != ".toml"]
     recordings = read_recordings(measured, reading) if measured else []
-    begun, unknowns = request.start_time or 0.0, request.unknowns
-    predictions = [loaded.predict_recording(recording, begun, unknowns) for recording in recordings]
-    for path in files:
-        if path not in measured:
-            predictions += loaded.predict_file(path)
+    unknowns: list[Any] = [*request.own, *([] if request.start_margin is None else [StartTime(request.start_margin)])]
+    predictions = [loaded.predict_recording(each, request.start_time or 0.0, unknowns) for each in recordings]
+    predictions += (each for path in files if path not in measured for each in loaded.predict_file(path))
     return loaded.scenario.plant, predictions

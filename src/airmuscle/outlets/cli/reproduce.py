@@ -11,7 +11,7 @@ from ...engine.processes import available_cores
 from ...papers.run import reproduce as reproduce_papers
 from ...papers.run import select_papers
 from ...report.chapter import Chapter
-from ...report.claims import Claim, Kind, Statement, statements
+from ...report.claims import Kind, Statement, statements
 from ...report.formatting import MARKS, count_verdicts, format_published, format_reproduced
 from ...report.formula import to_plain
 from ...report.text import GAP
@@ -59,7 +59,13 @@ def reproduce(
         raise
     for name in select_papers(papers):
         _print_chapter(chapters[name])
-    _print_counts([claim for chapter in chapters.values() for claim in chapter.claims])
+    echo()
+    claims = [claim for chapter in chapters.values() for claim in chapter.claims]
+    for kind in Kind:  # the readings of a statement count once
+        counts = {verdict: count for verdict, count in count_verdicts(claims, kind).items() if count}
+        if counts:
+            listed = ", ".join(f"{count} {verdict}" for verdict, count in counts.items())
+            echo(f"{counted(sum(counts.values()), kind.value)}: {listed}")
     echo(f"report: {page}")
 
 
@@ -79,17 +85,6 @@ def _print_chapter(chapter: Chapter) -> None:
     texts = (f"{PREFIXES[kind]}{to_plain(each.claim)}" for kind, each in found)
     rows = [(textwrap.shorten(text, room, placeholder=" …"), *row) for text, row in zip(texts, values, strict=True)]
     print_table(dict(zip(HEADERS, zip(*rows, strict=True), strict=True)))
-
-
-def _print_counts(claims: list[Claim]) -> None:
-    """Print the number of statements by verdict, in which the readings of a statement count once."""
-    echo()
-    for kind in Kind:
-        counts = {verdict: count for verdict, count in count_verdicts(claims, kind).items() if count}
-        total = sum(counts.values())
-        listed = ", ".join(f"{count} {verdict}" for verdict, count in counts.items())
-        if total:
-            echo(f"{counted(total, kind.value)}: {listed}")
 
 
 def _reproduced(statement: Statement) -> str:

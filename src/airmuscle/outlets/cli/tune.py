@@ -80,16 +80,6 @@ class TuneRequest:
     budget: int = option("Maximum number of simulated loops.", default=4000, bounds=(8, 10_000_000))
     seed: int = option("Seed of the optimiser and of the draws.", default=0, bounds=(0, float("inf")))
 
-    @property
-    def objective(self) -> RobustObjective:
-        """The objective of the search."""
-        return RobustObjective(self.quantile, self.quantile_weight, self.air_weight, self.travel_weight)
-
-    @property
-    def perturbations(self) -> Perturbations:
-        """The perturbations of the plant."""
-        return Perturbations(self.loads, self.supplies, self.leak, self.delay, self.draws)
-
 
 @with_requests
 def tune(
@@ -116,15 +106,16 @@ def tune(
     if writes:
         check_writable(target.parent)
     loaded.check_target(target)
-    objective, perturbations = request.objective, request.perturbations
     ranges = loaded.bounds(request.bounds)
     with execution.executor(alone=True) as workers:
-        tuning, notes, rules = _search(loaded, ranges, request, objective, perturbations, workers)
+        tuning, notes, rules = _search(loaded, ranges, request, workers)
     writes = writes or execution.takes_over(out)
     if writes:
         loaded.save(tuning.gains, target)
-    problem = loaded.scenario.problem
-    chapter = tuning_chapter(tuning, loaded.scenario.title, _units(loaded), notes, rules, problem.integrator)
+    scenario_, controller = loaded.scenario, loaded.loop.controller
+    units = signal_units(scenario_.plant, scenario_.initial_state)
+    units = {**units, **{leaf.path: loaded.unit(leaf) for leaf in leaves(controller)}}
+    chapter = tuning_chapter(tuning, scenario_.title, units, notes, rules, scenario_.problem.integrator)
     files = {HISTORY_FILE: lambda path: save_table(history_table(tuning), path)}
     if tuning.interrupted:
         echo("interrupted: the best gains so far are written", err=True)
@@ -136,11 +127,12 @@ def tune(
 
 
 def _search(
-    loaded: ScenarioLoop, ranges: Mapping[str, tuple[float, float]], request: TuneRequest, objective: RobustObjective,
-    perturbations: Perturbations, workers: Workers,
-) -> tuple[Tuning, tuple[str, ...], tuple[RuleSettings, ...]]:  # fmt: skip
+    loaded: ScenarioLoop, ranges: Mapping[str, tuple[float, float]], request: TuneRequest, workers: Workers
+) -> tuple[Tuning, tuple[str, ...], tuple[RuleSettings, ...]]:
     """The tuning, notes on the family of plants, and the settings of the rules."""
     problem = loaded.scenario.problem
+    objective = RobustObjective(request.quantile, request.quantile_weight, request.air_weight, request.travel_weight)
+    perturbations = Perturbations(request.loads, request.supplies, request.leak, request.delay, request.draws)
     family = loaded.family(perturbations, request.seed)
     rules: tuple[RuleSettings, ...] = ()
     if request.rules:
@@ -153,10 +145,3 @@ def _search(
             integrator=problem.integrator, progress=lambda done, total: show(done / total), workers=workers,
         )  # fmt: skip
     return tuning, family.notes, rules
-
-
-def _units(loaded: ScenarioLoop) -> dict[str, Any]:
-    """Units of the columns of the plant by name, and of the parameters of the controller by path."""
-    scenario, loop = loaded.scenario, loaded.loop
-    of_gains = {leaf.path: loaded.unit(leaf) for leaf in leaves(loop.controller)}
-    return {**signal_units(scenario.plant, scenario.initial_state), **of_gains}

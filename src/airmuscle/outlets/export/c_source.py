@@ -47,9 +47,8 @@ class CSource:
         }  # fmt: skip
         places = {
             "provenance": block_comment(self.provenance), "file": self.name, "enumerations": self._enumerations(),
-            **{key: str(number) for key, number in numbers.items()},
-            **{key.lower(): c_number(constants[key]) for key in ("FIRST_STEP", "CLOSE")},
-            "constants": self._constants(), "functions": functions,
+            **{key: str(number) for key, number in numbers.items()}, "constants": self._constants(),
+            **{key.lower(): c_number(constants[key]) for key in ("FIRST_STEP", "CLOSE")}, "functions": functions,
             "solver": self._solver_constants(sizes, constants) + filled("solver.c", solver.places, self.name),
         }  # fmt: skip
         return {f"{self.name}.{end}": filled(f"model.{end}", places, self.name) for end in "hc"}
@@ -59,26 +58,25 @@ class CSource:
         """Beginning of the macros."""
         return self.name.upper()
 
+    @property
+    def _kinds(self) -> dict[str, Sequence[str]]:
+        """The names of the elements of the arrays."""
+        known = self.system.known
+        names = known.state_names, known.input_names, known.output_names, self.system.paths
+        return dict(zip(("state", "input", "output", "parameter"), names, strict=True))
+
     def _enumerations(self) -> str:
-        known, text = self.system.known, ""
-        kinds: Mapping[str, Sequence[str]] = {
-            "STATE": known.state_names, "INPUT": known.input_names, "OUTPUT": known.output_names,
-            "PARAMETER": [leaf.path for leaf in self.system.tunable],
-        }  # fmt: skip
-        for kind, names in kinds.items():
-            words = [f"{self.upper}_{kind}_{word.upper()}" for word in make_identifiers(names)]
-            rows = "".join(f"  {word} = {i},\n" for i, word in enumerate(words)).removesuffix(",\n")
+        text = ""
+        for kind, names in self._kinds.items():
+            words = [f"{self.name}_{kind}_{word}".upper() for word in make_identifiers(names)]
+            rows = ",\n".join(f"  {word} = {i}" for i, word in enumerate(words))
             text += f"enum {{\n{rows}\n}};\n" if words else ""
         return text
 
     def _constants(self) -> str:
         known, system, text, m, upper = self.system.known, self.system, "", self.name, self.upper
         units = system.units | {leaf.path: leaf.declared.unit for leaf in system.tunable}
-        kinds: Mapping[str, Sequence[str]] = {
-            "state": known.state_names, "input": known.input_names, "output": known.output_names,
-            "parameter": [leaf.path for leaf in system.tunable],
-        }  # fmt: skip
-        for kind, names in kinds.items():
+        for kind, names in self._kinds.items():
             size = f"{upper}_{kind.upper()}S + 1"
             text += c_strings(f"const char *const {m}_{kind}_names[{size}]", names)
             text += c_strings(f"const char *const {m}_{kind}_units[{size}]", [units[name] for name in names])
@@ -131,17 +129,14 @@ APPLY_DRIVERS = """  apply_drivers(driver_kinds, driver_settings, driver_states,
 def main_program(program: ExportedRun) -> str:
     """A main program that runs a scenario, with its control loop if it has one, and writes columns as CSV."""
     name, loop = program.name, program.loop
-    numbers: dict[str, float] = {
-        "rows": program.times.size,
-        "segments": program.segments.ends.size,
-        "columns": len(program.columns),
-    }
+    columns, segments = program.columns, program.segments.ends
+    numbers: dict[str, float] = {"rows": program.times.size, "segments": segments.size, "columns": len(columns)}
     places = {"provenance": block_comment(program.provenance), "file": name, "valid": filled("valid.c", {}, name)}
     if loop is None:
         every, start = program.system.known.column_names, program.problem.start_time
-        columns_at = ", ".join(str(every.index(each)) for each in program.columns)
+        columns_at = ", ".join(str(every.index(each)) for each in columns)
         places["constants"] = "".join((
-            f"static const char header[] = {c_string(csv_header(program.columns))};\n",
+            f"static const char header[] = {c_string(csv_header(columns))};\n",
             f"static const int columns[COLUMNS] = {{{columns_at}}};\n",
             f"static const double start = {c_number(start)};\n",
             *_run_arrays(program),
@@ -202,9 +197,7 @@ def _loop_constants(program: ExportedRun, loop: ExportedLoop) -> str:
     text += c_integers("static const int commanded[COMMANDS]", loop.prepared.commanded)
     text += "".join(_run_arrays(program))
     if len(loop.drivers.kinds):
-        text += c_integers(
-            "static int driver_kinds[DRIVERS][2]", [(int(i), int(kind)) for i, kind in loop.drivers.kinds]
-        )
+        text += c_integers("static int driver_kinds[DRIVERS][2]", list(map(tuple, loop.drivers.kinds.tolist())))
         text += c_array("static double driver_settings[DRIVERS][4]", loop.drivers.settings)
         text += c_array("static double driver_states[DRIVERS][4]", loop.drivers.kept)
         text += "static double scratch[2][3][CAPACITY];\n"

@@ -19,16 +19,6 @@ from ...engine.run.sampled_loop import CLOSE, SampledLoop, prepare_loop, snapped
 from .printed_controller import PrintedController, check_control_law, print_controller
 from .printed_system import ExportedSystem
 
-
-def tableau_arrays(integrator: ExplicitRungeKutta) -> tuple[Array, Array, Array]:
-    """Rows (s, s), weights (s,) and nodes (s,) of an explicit method."""
-    rows, weights = integrator.tableau()
-    table = np.zeros((len(weights), len(weights)))
-    for i, row in enumerate(rows, 1):
-        table[i, : len(row)] = row
-    return table, np.array(weights), np.array([0.0, *map(sum, rows)])
-
-
 SHAPES: dict[str, tuple[str, ...]] = {
     **dict.fromkeys(("y", "yn", "x", "g", "f0", "ft", "k1", "k2", "k3", "k4", "k5", "k6", "d2", "d3"), ("STATES",)),
     **dict.fromkeys(("absolute", "nominal", "between"), ("STATES",)),
@@ -37,7 +27,7 @@ SHAPES: dict[str, tuple[str, ...]] = {
 }  # fmt: skip
 """Sizes of the arrays of the kernels of integrators."""
 TABLEAU = ("table", "weights", "nodes")
-"""Arguments that are the tableau of an explicit method."""
+"""Arguments that are the tableau of an explicit method: (s, s), (s,) and (s,)."""
 STEP = {
     "y": "x", "base": "u", "w": "w", "moving": "moving", "t": "t", "start": "start", "end": "end", "h": "h",
     "relative": "rtol", "done": "done", "d2": "d2", "d3": "d3", "c": "c", "nominal": "nominal",
@@ -81,8 +71,12 @@ class SolverText:
         own = self.integrator
         if not isinstance(own, ExplicitRungeKutta):
             return {"FIRST_STEP": 0.0, "CLOSE": 0.0, "RTOL": own.rtol if isinstance(own, Rodas4) else 0.0}
-        read = self._kernels["single_step"].arguments
-        tableau = {key.upper(): value for key, value in zip(TABLEAU, tableau_arrays(own), strict=True) if key in read}
+        read, (rows, weights) = self._kernels["single_step"].arguments, own.tableau()
+        table = np.zeros((len(weights), len(weights)))
+        for i, row in enumerate(rows, 1):
+            table[i, : len(row)] = row
+        arrays = table, np.array(weights), np.array([0.0, *map(sum, rows)])
+        tableau = {key.upper(): value for key, value in zip(TABLEAU, arrays, strict=True) if key in read}
         return {"FIRST_STEP": own.step, "CLOSE": 1e-9 * own.step, "RTOL": 0.0, **tableau}
 
     @property
@@ -150,15 +144,12 @@ class ExportedLoop:
 
     def data(self, known: Description) -> dict[str, Any]:
         """What a program states of its loop: names in tuples, numbers in arrays; states of the drivers at rest."""
-        law, tunable = self.controller.law, self.controller.tunable
-        signal, table = self.prepared.setpoint_signal, self.drivers
+        printed, signal, table = self.controller, self.prepared.setpoint_signal, self.drivers
         return {
-            **self.numbers, "columns": sum(self.added_columns, ()), "setpoints": tuple(law.setpoints),
+            **self.numbers, "columns": sum(self.added_columns, ()), "setpoints": tuple(printed.law.setpoints),
             "measured_at": np.array(self.measured_at(known), dtype=int).reshape(-1, 2),
-            "commanded": self.prepared.commanded,
-            "initial_memory": np.array([float(value) for value in law.initial_memory.values()]),
-            "parameters": tuple(leaf.path for leaf in tunable),
-            "parameter_defaults": np.array([float(leaf.value) for leaf in tunable]),
+            "commanded": self.prepared.commanded, "initial_memory": printed.initial_memory,
+            "parameters": printed.paths, "parameter_defaults": printed.defaults,
             "setpoint": {"ends": signal.ends, "values": signal.values, "slopes": signal.slopes},
             "drivers": {"kinds": table.kinds, "settings": table.settings, "states": table.kept},
         }  # fmt: skip
@@ -236,8 +227,7 @@ class ExportedRun:
     @property
     def first_inputs(self) -> list[float]:
         """The inputs at the beginning of the run."""
-        values: list[float] = self.segments.values[0].tolist()
-        return values
+        return list(map(float, self.segments.values[0]))
 
     @property
     def times(self) -> Array:
@@ -249,7 +239,7 @@ class ExportedRun:
         system, known, problem, segments = self.system, self.system.known, self.problem, self.segments
         return {
             "states": known.state_names, "inputs": known.input_names, "outputs": known.output_names,
-            "units": system.units, "parameters": tuple(leaf.path for leaf in system.tunable),
+            "units": system.units, "parameters": tuple(system.paths),
             "defaults": system.defaults, "nominal": system.compiled.nominal,
             "input_minimum": known.input_minimum, "input_maximum": known.input_maximum,
             "run": {

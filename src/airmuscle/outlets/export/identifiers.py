@@ -86,7 +86,6 @@ def _shortened(word: str, name: str) -> str:
     return f"{word[: LONGEST - _DIGEST - 1].rstrip('_')}_{digest}"
 
 
-WIDTH = 116
 _PROGRAM = "add_executable({0}_run main.c)\ntarget_link_libraries({0}_run PRIVATE {0})"
 _PLAIN = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789 _.,:;[](){}<>+-*/=^%!'|~#$@&")
 _BODIES = {number: CBody(number=number) for number in ("double", "float")}
@@ -111,14 +110,11 @@ def c_strings(declaration: str, texts: Iterable[str]) -> str:
 def c_array(declaration: str, values: Any, padding: int = 0, number: str = "double") -> str:
     """An array (N,) or a table (N, m) of a type of numbers, each row with so many zeros at its end."""
     table = np.asarray(values, dtype=float)
-    if table.ndim == 1:
-        return f"{declaration} = {{{_wrapped(_numbers(table.tolist(), padding, number))}}};\n"
-    texts = [f"{{{', '.join(_numbers(row, padding, number))}}}" for row in table.tolist()]
+    rows = [
+        [c_number(value, number) for value in (*row, *[0.0] * padding)] for row in np.atleast_2d(table).tolist()
+    ]  # fmt: skip
+    texts = rows[0] if table.ndim == 1 else [f"{{{', '.join(row)}}}" for row in rows]
     return f"{declaration} = {{{_wrapped(texts)}}};\n"
-
-
-def _numbers(values: Sequence[float], padding: int, number: str) -> list[str]:
-    return [c_number(value, number) for value in (*values, *[0.0] * padding)]
 
 
 def c_integers(declaration: str, values: Sequence[Any]) -> str:
@@ -168,26 +164,17 @@ def provenance(title: str, model: Any, further: Iterable[Any] = (), notes: Seque
     lines = [title, f"Exported by airmuscle {version}.", f"SHA-256 of the model: {fingerprint(model)}", *LICENCE]
     for note in notes:
         lines += ["", *textwrap.wrap(note, WIDTH)]
-    lines += ["", "Parameters (SI):", *(f"  {row}" for row in _parameters(model))]
+    units = ((leaf, "" if leaf.declared.unit == "1" else f" {leaf.declared.unit}") for leaf in leaves(model))
+    rows = [f"  {leaf.path} = {float(leaf.value)!r}{unit}  ({leaf.declared.meaning})" for leaf, unit in units]
+    lines += ["", "Parameters (SI):", *(rows or ["  none"])]
     references = {r.key: r for thing in (model, *further) for r in cite(thing)}
     lines += ["", "References:" if references else "References: none."]
     for key in sorted(references):
         lines += textwrap.wrap(str(references[key]), WIDTH, initial_indent="  ", subsequent_indent="    ")
-    return [_harmless(line) for line in lines]
-
-
-def _parameters(model: Any) -> list[str]:
-    rows = []
-    for leaf in leaves(model):
-        unit = "" if leaf.declared.unit == "1" else f" {leaf.declared.unit}"
-        rows.append(f"{leaf.path} = {float(leaf.value)!r}{unit}  ({leaf.declared.meaning})")
-    return rows or ["none"]
-
-
-def _harmless(line: str) -> str:
-    """A line that cannot end the comment in which it stands, or continue into the next line."""
-    text = " ".join(printable(line).split("\n")).replace("*/", "* /").replace("/*", "/ *").replace("??/", "? ?/")
-    return text.rstrip("\\ \t")
+    lines = [" ".join(printable(line).split("\n")) for line in lines]
+    for ending, harmless in (("*/", "* /"), ("/*", "/ *"), ("??/", "? ?/")):  # no line ends its comment
+        lines = [line.replace(ending, harmless) for line in lines]
+    return [line.rstrip("\\ \t") for line in lines]  # nor continues into the next one
 
 
 def block_comment(lines: Iterable[str]) -> str:

@@ -56,6 +56,21 @@ class PrintedController:
         return instructions(list(self.inputs.values()), list(self.outputs.values()))
 
     @property
+    def initial_memory(self) -> Array:
+        """The memory at the first sample."""
+        return np.array([float(value) for value in self.law.initial_memory.values()])
+
+    @property
+    def paths(self) -> tuple[str, ...]:
+        """The paths of the tunable parameters."""
+        return tuple(leaf.path for leaf in self.tunable)
+
+    @property
+    def defaults(self) -> Array:
+        """The values of the tunable parameters."""
+        return np.array([leaf.value for leaf in self.tunable], dtype=float)
+
+    @property
     def places(self) -> dict[str, str]:
         """The places of a header: numbers of memories, measurements and so on, enumerations, provenance."""
         keys = ("memory", "measurements", "setpoints", "commands", "parameters")
@@ -153,13 +168,10 @@ class PrintedController:
 
     def _constants(self) -> str:
         upper, number = self.name.upper(), self.number
-        memory = np.array([float(v) for v in self.law.initial_memory.values()])
-        defaults = np.array([leaf.value for leaf in self.tunable], dtype=float)
-        names = [leaf.path for leaf in self.tunable]
         return "".join((
-            c_array(f"const {number} {self.name}_initial_memory[{upper}_MEMORY + 1]", memory, 1, number),
-            c_array(f"{number} {self.name}_parameters[{upper}_PARAMETERS + 1]", defaults, 1, number),
-            c_strings(f"const char *const {self.name}_parameter_names[{upper}_PARAMETERS + 1]", names),
+            c_array(f"const {number} {self.name}_initial_memory[{upper}_MEMORY + 1]", self.initial_memory, 1, number),
+            c_array(f"{number} {self.name}_parameters[{upper}_PARAMETERS + 1]", self.defaults, 1, number),
+            c_strings(f"const char *const {self.name}_parameter_names[{upper}_PARAMETERS + 1]", self.paths),
         ))  # fmt: skip
 
     @property
@@ -167,8 +179,7 @@ class PrintedController:
         """The names of the elements of the arrays, by the word of their enumeration."""
         return {
             "MEMORY": tuple(self.law.initial_memory), "MEASUREMENT": self.law.measured_columns,
-            "SETPOINT": self.law.setpoints, "COMMAND": self.law.inputs,
-            "PARAMETER": tuple(leaf.path for leaf in self.tunable),
+            "SETPOINT": self.law.setpoints, "COMMAND": self.law.inputs, "PARAMETER": self.paths,
         }  # fmt: skip
 
     def _enumerations(self) -> str:
@@ -183,8 +194,7 @@ class PrintedController:
 
         single  every number is rounded to single precision
         """
-        memory: list[float] = [float(value) for value in self.law.initial_memory.values()]
-        parameters = [float(leaf.value) for leaf in self.tunable]
+        memory, parameters = self.initial_memory.tolist(), self.defaults.tolist()
         rows, names, code = [], list(self.inputs), self.code
         for measurement, setpoint in zip(measured.tolist(), setpoints.tolist(), strict=True):
             given = {"measurement": measurement, "setpoint": setpoint, "memory": memory, "parameters": parameters}
@@ -235,13 +245,9 @@ def check_control_law(problem: Problem, also: type = ControlLaw) -> ControlLoop:
 
 
 def print_controller(
-    prepared: SampledLoop,
-    name: str,
-    title: str = "",
-    tunable: Sequence[str] | None = (),
-    number: str = "double",
+    prepared: SampledLoop, name: str, title: str = "", tunable: Sequence[str] | None = (), number: str = "double",
     notes: Sequence[str] = (),
-) -> PrintedController:
+) -> PrintedController:  # fmt: skip
     """The control law of a prepared loop, with its sample time, ranges and fixed parameters as constants.
 
     tunable  paths of the parameters that remain variables; None: all
@@ -249,20 +255,23 @@ def print_controller(
     """
     import casadi
 
-    loop = prepared.loop
-    law = loop.controller
+    loop, law = prepared.loop, prepared.loop.controller
     assert isinstance(law, ControlLaw)
     sample, known = trace_sample(law), list(leaves(law))
-    paths = [leaf.path for leaf in known] if tunable is None else list(dict.fromkeys(tunable))
+    paths = [leaf.path for leaf in known] if tunable is None else dict.fromkeys(tunable)
     chosen = [find_leaf(law, known, path) for path in paths]
     p = casadi.SX.sym("parameters", len(chosen))
     parameters = [p[chosen.index(i)] if i in chosen else casadi.SX(leaf.value) for i, leaf in enumerate(known)]
-    low, high = ([prepared.ranges[n][k] for n in law.inputs] for k in (0, 1))
+    ranges = [prepared.ranges[n] for n in law.inputs]
+    low, high = ([each[k] for each in ranges] for k in (0, 1))
     old = [sample.sample_time, sample.minimum, sample.maximum, sample.parameters]
     values: list[list[Any]] = [[loop.sample_time], low, high, parameters]
     new = [casadi.vertcat(casadi.SX(0, 1), *each) for each in values]
     commands, later = casadi.substitute([sample.commands, sample.later], old, new)
-    limited = [_limited(commands[i], *prepared.ranges[n]) for i, n in enumerate(law.inputs)]
+    limited = []
+    for i, (least, most) in enumerate(ranges):
+        raised = casadi.if_else(commands[i] < least, least, commands[i]) if np.isfinite(least) else commands[i]
+        limited.append(casadi.if_else(raised > most, most, raised) if np.isfinite(most) else raised)
     inputs = {"measurement": sample.measured, "setpoint": sample.setpoints, "memory": sample.memory, "parameters": p}
     outputs = {"command": casadi.densify(casadi.vertcat(*limited)), "later": casadi.densify(later)}
     about = [f"Sample time {c_number(loop.sample_time)} s; set points {', '.join(law.setpoints) or 'none'}; measured "
@@ -272,14 +281,5 @@ def print_controller(
         kinds = ", ".join(f"{key}: {value}" for key, value in loop.drivers.items())
         about.append(f"Not part of this program: the drivers between commands and openings ({kinds}).")
     lines = provenance(title or type(law).__name__, law, notes=[*about, *notes])
-    ranges = [prepared.ranges[n] for n in law.inputs]
     tolerance, variables = SINGLE_TOLERANCE if number == "float" else 0.0, tuple(known[i] for i in chosen)
     return PrintedController(name, law, inputs, outputs, ranges, variables, lines, number, tolerance)
-
-
-def _limited(command: Any, low: float, high: float) -> Any:
-    """A command within its range."""
-    import casadi
-
-    raised = casadi.if_else(command < low, low, command) if np.isfinite(low) else command
-    return casadi.if_else(raised > high, high, raised) if np.isfinite(high) else raised

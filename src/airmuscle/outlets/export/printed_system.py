@@ -1,6 +1,7 @@
 """Printed system: the functions of a system in a language of text, with the names, units and defaults of its arrays."""
 
 import dataclasses
+import itertools
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -33,6 +34,11 @@ class ExportedSystem:
     def units(self) -> dict[str, str]:
         """The units of all columns; empty where none is known."""
         return column_units(self.compiled.system, self.known.output_names)
+
+    @property
+    def paths(self) -> list[str]:
+        """The paths of the tunable parameters."""
+        return [leaf.path for leaf in self.tunable]
 
     @property
     def defaults(self) -> Array:
@@ -117,7 +123,7 @@ def acting_parameters(compiled: CompiledSystem) -> list[str]:
     traced = compiled.program.traced
     paths = [leaf.path for leaf in leaves(compiled.system)]
     acts = casadi.which_depends(casadi.vertcat(traced.f, traced.o), traced.p, 1, False) if paths else []
-    return [path for path, used in zip(paths, acts, strict=True) if used]
+    return list(itertools.compress(paths, acts))
 
 
 def find_leaf(model: Any, known: Sequence[Leaf], path: str) -> int:
@@ -125,18 +131,6 @@ def find_leaf(model: Any, known: Sequence[Leaf], path: str) -> int:
     paths = [leaf.path for leaf in known]
     if path in paths:
         return paths.index(path)
-    if _is_structure(model, path):
-        raise ParameterError(
-            f"'{path}' is fixed when a program is printed, because it determines the equations and is not a number in "
-            f"them{alternatives('', paths, 'tunable parameters are')} Change it in the model, and export again."
-        )
-    raise ParameterError(
-        f"{type(model).__name__} has no parameter '{path}'{alternatives(path, paths, 'tunable parameters are')}"
-    )
-
-
-def _is_structure(model: Any, path: str) -> bool:
-    """Whether a path leads to a field of a model, or of a model inside it, that is not a parameter."""
     part = model
     for word in path.replace("[", ".").replace("]", "").split("."):
         if isinstance(part, tuple) and word.isdecimal() and int(word) < len(part):
@@ -144,5 +138,10 @@ def _is_structure(model: Any, path: str) -> bool:
         elif dataclasses.is_dataclass(part) and word in {f.name for f in dataclasses.fields(part)}:
             part = getattr(part, word)
         else:
-            return False
-    return True
+            raise ParameterError(
+                f"{type(model).__name__} has no parameter '{path}'{alternatives(path, paths, 'tunable parameters are')}"
+            )
+    raise ParameterError(
+        f"'{path}' is fixed when a program is printed, because it determines the equations and is not a number in "
+        f"them{alternatives('', paths, 'tunable parameters are')} Change it in the model, and export again."
+    )

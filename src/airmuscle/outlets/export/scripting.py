@@ -76,14 +76,12 @@ def javascript_files(program: ExportedRun) -> dict[str, str]:
 def _types(program: ExportedRun) -> dict[str, str]:
     """The places of the TypeScript declarations."""
     known, loop = program.system.known, program.loop
-    names = {
-        "states": known.state_names, "inputs": known.input_names, "outputs": known.output_names,
-        "parameters": [leaf.path for leaf in program.system.tunable],
-    }  # fmt: skip
+    names = {"states": known.state_names, "inputs": known.input_names, "outputs": known.output_names,
+             "parameters": program.system.paths}  # fmt: skip
     types = {kind: _union(of) for kind, of in names.items()}
     if loop is None:
         return {**types, "columns": "", "changes": "", "results": ""}
-    changes = f"  controllerParameters?: Values<{_union(leaf.path for leaf in loop.controller.tunable)}>;\n"
+    changes = f"  controllerParameters?: Values<{_union(loop.controller.paths)}>;\n"
     changes += f"  /** Set points {', '.join(loop.controller.law.setpoints) or 'none'}. */\n  setpoint?: Segments;\n"
     columns = f" | {_union(sum(loop.added_columns, ()))}"
     return {**types, "columns": columns, "changes": changes, "results": "  samples: number;\n"}
@@ -184,10 +182,10 @@ def m_array(values: Any) -> str:
     if not table.size:
         return f"zeros({', '.join(map(str, table.shape if table.ndim == 2 else (0, 1)))})"
     if table.ndim == 2:
-        rows = [", ".join(map(m_number, row)) for row in table.tolist()]
-        return f"[{f'; ...{chr(10)}    '.join(rows)}]"
-    numbers = [m_number(value) for value in table.tolist()]
-    lines = ["; ".join(numbers[i : i + _IN_LINE]) for i in range(0, len(numbers), _IN_LINE)]
+        lines = [", ".join(map(m_number, row)) for row in table.tolist()]
+    else:
+        numbers = [m_number(value) for value in table.tolist()]
+        lines = ["; ".join(numbers[i : i + _IN_LINE]) for i in range(0, len(numbers), _IN_LINE)]
     return f"[{f'; ...{chr(10)}    '.join(lines)}]"
 
 

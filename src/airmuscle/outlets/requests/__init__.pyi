@@ -5,7 +5,6 @@ from .declaration import form_fields as form_fields
 from .declaration import option as option
 from .declaration import options_of as options_of
 from .declaration import request as request
-from .entry import EntryRequest as EntryRequest
 from .fit import BraidRequest as BraidRequest
 from .fit import FitRequest as FitRequest
 from .fitting import fit_requested as fit_requested

@@ -89,13 +89,16 @@ class Option:
         if self.unit and isinstance(value, str):
             value = quantity(value, self.unit, where=where)
         elif self.kind is int and isinstance(value, str):
-            value = _whole_number(value, where)
+            if not re.fullmatch(r"\s*(-[0-9]{1,8}|[0-9]{1,9})\s*", value):
+                raise RequestError(f"{where} is '{value}'; give a whole number.")
+            value = int(value)
         elif self.kind is bool and isinstance(value, str):
             if value != YES:
                 raise RequestError(f"{where} is '{value}'; give {YES}, or nothing.", self.name)
             value = True
-        if isinstance(value, int | float) and not isinstance(value, bool):
-            self._check_bounds(value, where)
+        low, high = self.bounds
+        if isinstance(value, int | float) and not isinstance(value, bool) and not low <= value <= high:
+            raise RequestError(f"{where} is {value:g}; allowed range: {low:g} to {high:g}.", self.name)
         return value
 
     def _choice(self, text: Any, where: str) -> Any:
@@ -105,18 +108,6 @@ class Option:
                 f"{where} is '{text}'; allowed range: {allowed}.{suggestion(str(text), self.choices)}", self.name
             )
         return self.choices[text]
-
-    def _check_bounds(self, value: float, where: str) -> None:
-        low, high = self.bounds
-        if not low <= value <= high:
-            raise RequestError(f"{where} is {value:g}; allowed range: {low:g} to {high:g}.", self.name)
-
-
-def _whole_number(text: str, where: str) -> int:
-    digits = text.strip()
-    if not (digits.isascii() and digits.removeprefix("-").isdecimal() and len(digits) < 10):
-        raise RequestError(f"{where} is '{text}'; give a whole number.")
-    return int(digits)
 
 
 def option(meaning: str, *, default: Any = dataclasses.MISSING, choices: Any = None, **declared: Any) -> Any:
@@ -145,9 +136,9 @@ def _option(field: dataclasses.Field[Any], hint: Any) -> Option:
     declared = dict(field.metadata[_KEY])
     default = declared.pop("default")
     parts = typing.get_args(hint) if isinstance(hint, types.UnionType) else (hint,)
-    kinds = [each for each in parts if each is not type(None)]
-    repeated = typing.get_origin(kinds[0]) is tuple
-    kind = typing.get_args(kinds[0])[0] if repeated else kinds[0]
+    kind = next(each for each in parts if each is not type(None))
+    repeated = typing.get_origin(kind) is tuple
+    kind = typing.get_args(kind)[0] if repeated else kind
     needed = default is dataclasses.MISSING
     return Option(
         field.name, kind if kind in (bool, int, float, str, Path) else str, repeated, needed=needed,
@@ -185,7 +176,6 @@ def build(cls: type[T], given: Mapping[str, Any], where: Where) -> T:
         else:
             values[each.name] = each.convert(value, label)
     made = cls(**values)
-    check = getattr(made, "check", None)
-    if check is not None:
-        check(where)
+    if hasattr(made, "check"):
+        made.check(where)
     return made

@@ -59,17 +59,12 @@ class BraidRequest:
 
 def read_braid(text: str, where: str) -> BraidSize:
     """The braid that a text describes. Raises RequestError, UnitError or ParameterError."""
-    parts = [part.partition("=") for part in text.split(",")]
-    names = [name.strip() for name, _, _ in parts]
-    if sorted(names) != sorted(_UNITS):
+    parts = [(name.strip(), value.strip()) for name, _, value in (part.partition("=") for part in text.split(","))]
+    if sorted(name for name, _ in parts) != sorted(_UNITS):
         raise RequestError(
             f"{where} must give radius and angle once each, such as 'radius=10 mm, angle=24.4 deg', not '{text}'"
         )
-    values = {
-        name: quantity(value.strip(), _UNITS[name], where=f"{where}, {name}")
-        for name, (_, _, value) in zip(names, parts, strict=True)
-    }
-    size = BraidSize(**values)
+    size = BraidSize(**{name: quantity(value, _UNITS[name], where=f"{where}, {name}") for name, value in parts})
     braid_of_length(size, 1.0)  # the bounds are checked before any file is read
     return size
 
@@ -88,9 +83,8 @@ def with_braid(entry: Entry, size: BraidSize | None, recordings: Sequence[Record
             "give the geometry in [characteristic.geometry] of a muscle file, with --characteristic."
         )
     inside = {float(leaf.value) for leaf in tree.leaves(law) if leaf.declared.name == "resting_length"}
-    lengths = resting_lengths(recordings) or tuple(inside)
-    check_one_length(lengths)
-    return dataclasses.replace(entry, geometry=braid_of_length(size, lengths[0]))
+    length = check_one_length(resting_lengths(recordings) or tuple(inside))
+    return dataclasses.replace(entry, geometry=braid_of_length(size, length))
 
 
 def check_one_length(lengths: Sequence[float]) -> float:
@@ -119,12 +113,9 @@ def braid_of_length(size: BraidSize, resting_length: float) -> Braid:
 PURPOSES: Mapping[str, GroupSplit | None] = {"repeat": RunSplit(), "length": SpecimenSplit(), "both": None}
 """Purposes with the split that serves each: further runs of the measured muscles, other muscles, or both."""
 SPLITS: Mapping[str, GroupSplit] = {
-    "run": RunSplit(),
-    "specimen": SpecimenSplit(),
-    "contraction": LevelSplit("contraction"),
-    "pressure": LevelSplit("pressure"),
-    "block": BlockSplit(),
-}
+    "run": RunSplit(), "specimen": SpecimenSplit(), "contraction": LevelSplit("contraction"),
+    "pressure": LevelSplit("pressure"), "block": BlockSplit(),
+}  # fmt: skip
 """Groups of rows that are left out in turn."""
 SPLIT_NAMES = (
     ("", "automatic"), ("run", "one run at a time"), ("specimen", "one specimen at a time"),

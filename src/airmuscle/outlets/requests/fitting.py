@@ -17,15 +17,9 @@ from ...bench.identify.surface.shape import fit_shape_constrained, shape_violati
 from ...bench.identify.uncertainty_chapter import Uncertainty, length_error_chapter, shape_chapter, uncertainty_chapter
 from ...core import ParameterError
 from ...engine.processes import Workers
+from ...files.library import find_initial_law, missing_geometry, resting_lengths
 from ...files.library.entry import Entry
-from ...files.library.fitted_entry import (
-    InitialLaw,
-    find_initial_law,
-    fitted_entry,
-    left_out_ratio,
-    missing_geometry,
-    resting_lengths,
-)
+from ...files.library.fitted_entry import fitted_entry, left_out_ratio
 from ...physics.muscle.characteristic import ContractileSurface
 from ...physics.muscle.geometry import Geometry
 from ...recording import Recording
@@ -68,13 +62,9 @@ def fit_requested(
     start = with_braid(initial.entry, request.braid, recordings)
     law, fixed = start.characteristic, (*request.fix, *initial.fixed)
     found = fit(
-        law,
-        recordings,
-        loss=request.loss(fitted_quantity_of(law).unit),
-        censoring=UNCENSORED if request.uncensored else None,
-        sigma=1.0 if request.equal_weights else None,
-        fixed=fixed,
-    )
+        law, recordings, loss=request.loss(fitted_quantity_of(law).unit), fixed=fixed,
+        censoring=UNCENSORED if request.uncensored else None, sigma=1.0 if request.equal_weights else None,
+    )  # fmt: skip
     errors = specimen_errors(found, recordings, fixed)
     entry = fitted_entry(found, start, names, recordings=recordings, errors=errors)
     entry, chapters, notes = _more(request, found, entry, recordings, progress, workers)
@@ -88,18 +78,19 @@ def _compare(
 ) -> FittedMuscle:
     if request.braid is not None:
         check_one_length(resting_lengths(recordings))
-    named = None
+    named, candidates = None, None  # without a named law those that the data determine
     if request.characteristic is not None:
         named = find_initial_law(request.characteristic, recordings, request.degree)
-    candidates = _candidates(request, recordings, named)
+        law, fixed = named.entry.characteristic, (*request.fix, *named.fixed)
+        own = Candidate(f"{request.characteristic} (named)", law, fixed)
+        candidates = [*standard_candidates(recordings), own]
     both = None if request.purpose is None else request.purpose == "both"
     selection = select_law(
         recordings, candidates, leave_out=request.split, both=both, loss=request.loss("N"), workers=workers,
         progress=progress,
     )  # fmt: skip
     best = selection.recommended
-    is_named = named is not None and candidates is not None and best.candidate is candidates[-1]
-    geometry = named.entry.geometry if named is not None and is_named else None
+    geometry = named.entry.geometry if named and candidates and best.candidate is candidates[-1] else None
     initial = Entry(best.candidate.name, best.candidate.name, "chosen", best.candidate.law, geometry)
     unused = []
     if not isinstance(getattr(best.candidate.law, "geometry", None), Geometry):
@@ -115,14 +106,6 @@ def _compare(
     comparisons[0] = dataclasses.replace(comparisons[0], notes=(*comparisons[0].notes, *notes))
     fitted = dataclasses.replace(fit_chapter(best.fit, entry, (), _notes_of(recordings)), brief=False)
     return FittedMuscle(best.fit, entry, [*comparisons, fitted, *more], [*odd, *unused], selection)
-
-
-def _candidates(request: FitRequest, recordings: list[Recording], named: InitialLaw | None) -> list[Candidate] | None:
-    """All candidates with the named law as the last; None without a named one: those that the data determine."""
-    if named is None:
-        return None
-    own = Candidate(f"{request.characteristic} (named)", named.entry.characteristic, (*request.fix, *named.fixed))
-    return [*standard_candidates(recordings), own]
 
 
 def _more(
@@ -180,10 +163,9 @@ def _in_one_screen(chapters: Sequence[Chapter]) -> list[Chapter]:
     has fewer laws of the ranking, and those that are not ranked once."""
     stated, brief = set[str](), list[Chapter]()
     for each in chapters:
-        notes = tuple(note for note in each.notes if note not in stated)
-        tables = (
-            each.tables if len(chapters) == 1 else tuple(_shortened(each, table, not brief) for table in each.tables)
-        )
+        notes, tables = tuple(note for note in each.notes if note not in stated), each.tables
+        if len(chapters) > 1:
+            tables = tuple(_shortened(each, table, not brief) for table in tables)
         brief.append(dataclasses.replace(each, notes=notes, tables=tables))
         stated |= set(each.notes)
     return brief

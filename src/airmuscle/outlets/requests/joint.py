@@ -3,6 +3,7 @@
 import dataclasses
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -94,38 +95,31 @@ def fit_requested_arm(
     """
     rules, title = _mapping(source, request), f"Arm identified from {source.name}"
     episodes = read_episodes(source, rules)
+    common: dict[str, Any] = {
+        "pairs": rules.pairs, "left_out": request.left_out, "rows": request.horizon, "progress": progress
+    }  # fmt: skip
     if request.known is None:
-        fit = fit_joint(
-            episodes, pairs=rules.pairs, axes=rules.axes, left_out=request.left_out, rows=request.horizon,
-            residual=request.residual, seed=request.seed, progress=progress,
-        )  # fmt: skip
-        files = _scenarios(fit, [muscle.name for muscle in fit.arm.muscle], title, CHOSEN)
-        return dataclasses.replace(fit.chapter(), title=title), files | _muscles(fit, title, SCALED)
-    plant = load_scenario(request.known).plant
-    arm = PressureDriven(plant.muscles, plant.mechanism, (FIRST_LAG,) * len(plant.muscles))
-    fit = fit_known_joint(
-        episodes, arm, request.free, pairs=rules.pairs, left_out=request.left_out, rows=request.horizon,
-        progress=progress,
-    )  # fmt: skip
-    names = [fit.arm.muscle[number - 1].name for pair in fit.pairs for number in pair]
-    files = _scenarios(fit, names, title, IN_PLACE)
-    return dataclasses.replace(fit.chapter(), title=title), files | _muscles(fit, title, "")
-
-
-CHOSEN = "supply, orifices and volumes are chosen"
-IN_PLACE = "supply and orifices are chosen; pressure regulators stand in place of the circuits of the known joint"
-SCALED = "the scale of its forces is chosen: the record contains pressures and angles alone"
-
-
-def _muscles(fit: ArmFit, title: str, warning: str) -> dict[str, str]:
-    """The file of each muscle that has identified parameters."""
-    return {
+        fit = fit_joint(episodes, axes=rules.axes, residual=request.residual, seed=request.seed, **common)
+        names = [muscle.name for muscle in fit.arm.muscle]
+        note, warning = "supply, orifices and volumes are chosen", SCALED
+    else:
+        plant = load_scenario(request.known).plant
+        arm = PressureDriven(plant.muscles, plant.mechanism, (FIRST_LAG,) * len(plant.muscles))
+        fit = fit_known_joint(episodes, arm, request.free, **common)
+        names = [fit.arm.muscle[number - 1].name for pair in fit.pairs for number in pair]
+        note, warning = IN_PLACE, ""
+    muscles = {
         f"muscles/{muscle.name}.toml": to_toml(
             dataclasses.replace(entry_of(muscle), title=f"{muscle.name}: {title}", provenance="fitted", warning=warning)
         )
         for number, muscle in enumerate(fit.arm.muscle)
-        if any(each.path.startswith(f"muscle[{number}].") for each in fit.estimates)
+        if any(each.path.startswith(f"muscle[{number}].") for each in fit.estimates)  # identified parameters
     }
+    return dataclasses.replace(fit.chapter(), title=title), _scenarios(fit, names, title, note) | muscles
+
+
+IN_PLACE = "supply and orifices are chosen; pressure regulators stand in place of the circuits of the known joint"
+SCALED = "the scale of its forces is chosen: the record contains pressures and angles alone"
 
 
 def _scenarios(fit: ArmFit, names: Sequence[str], title: str, note: str) -> dict[str, str]:

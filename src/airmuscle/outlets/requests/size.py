@@ -1,5 +1,6 @@
 """Request of a sizing: a lift or a joint, and the conditions of operation."""
 
+import contextlib
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -22,13 +23,12 @@ SORTS = (
 
 def read_load(text: str, where: str) -> dict[str, float]:
     """Mass [kg] or force [N] of a load. Raises UnitError."""
-    for name, unit in (("mass", "kg"), ("force", "N")):
-        try:
-            return {name: quantity(text, unit, where=where)}
-        except UnitError as error:
-            if unit == "N":
-                raise UnitError(f"{error} A load is a mass or a force: '20 kg' or '200 N'.") from None
-    raise AssertionError
+    with contextlib.suppress(UnitError):
+        return {"mass": quantity(text, "kg", where=where)}
+    try:
+        return {"force": quantity(text, "N", where=where)}
+    except UnitError as error:
+        raise UnitError(f"{error} A load is a mass or a force: '20 kg' or '200 N'.") from None
 
 
 @request
