@@ -272,7 +272,7 @@ def test_modules_are_imported_by_name_in_few_files_only():
 def test_options_of_commands_are_declared_in_requests():
     """Elsewhere only the options of all commands, and those for the output of a few, are declared for the parser."""
     files = {path.stem for path in FILES if "typer.Option(" in path.read_text(encoding="utf-8")}
-    assert files <= {"options", "commands", "library", "simulate", "approximate", "tune"}
+    assert files <= {"options", "commands", "library", "simulate", "fit", "tune"}
 
 
 # Code for users

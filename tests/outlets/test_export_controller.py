@@ -98,10 +98,10 @@ def test_the_replayed_commands_are_those_of_the_recorded_run(name):
     recording = solve(problem).recording
     rows = np.searchsorted(recording["time"], prepared.instants[:-1] - 1e-9)
     columns = [recording[f"measured.{n}"][rows] for n in law.measured_columns]
-    samples = print_controller(prepared, "law").replay(np.column_stack(columns), prepared.setpoint_values)
+    commands = print_controller(prepared, "law").replay(np.column_stack(columns), prepared.setpoint_values)
     recorded = np.column_stack([recording[f"command.{n}"][rows] for n in law.inputs])
     assert np.ptp(recorded) > 0
-    np.testing.assert_allclose(samples.commands, recorded, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(commands, recorded, rtol=0, atol=1e-9)
 
 
 @pytest.mark.parametrize("name", NAMES)
@@ -401,7 +401,7 @@ def test_the_arduino_library_commands_what_the_law_commands(tmp_path):
     rows = np.array([line.split() for line in done.stdout.splitlines()], dtype=float)
     problem = problem_of(PRESSURE)
     printed_law = print_controller(prepare_loop(problem, problem.input.init(0.0)), "law")
-    expected = printed_law.replay(measured[:, None], np.full((10, 1), 1e5)).commands
+    expected = printed_law.replay(measured[:, None], np.full((10, 1), 1e5))
     assert np.ptp(expected) > 0
     np.testing.assert_array_equal(rows[:, 1:], expected)
     np.testing.assert_allclose(np.diff(rows[:, 0]), 5000, atol=200)

@@ -25,7 +25,7 @@ from ...core.errors import AirmuscleError, ColumnError, FileError, Identificatio
 from ...core.tree import fingerprint
 from ...engine.compile.cache.store import cache_folder, read_private
 from ...files.library import Entry, campaign_entry, resting_lengths, to_toml
-from ...files.scenario.write import RecordScenario, campaign_scenarios
+from ...files.scenario.write import campaign_scenarios
 from ...physics.muscle.geometry import Geometry
 from ...recording import Recording
 from ...report.data import as_json
@@ -141,24 +141,17 @@ def campaign(
     validation = [row for recording in aside for row in _validation(result, recording)]
     scenarios, entry = campaign_scenarios(result), _entry(result)
     named = [(s.record, f"{SCENARIOS}/{s.name}" if s.text else s.reason) for s in scenarios]
-    chapters = campaign_chapters(result, entry, unread=unread, scenarios=named, validation=validation)
-    chapters[0] = dataclasses.replace(chapters[0], notes=(*chapters[0].notes, *_not_written(result, entry, scenarios)))
-    contents = {**_muscles(result, entry), **{f"{SCENARIOS}/{s.name}": s.text for s in scenarios if s.text}}
-    chapters += reading_chapters(complete)
-    writes = writes or execution.takes_over(out)
-    deliver("campaign", chapters, json=json, out=out, title="Bench campaign", files=contents, writes=writes)
-
-
-def _not_written(result: Campaign, entry: Entry | None, scenarios: Sequence[RecordScenario]) -> list[str]:
-    """Sentences on files that are not written, and the reasons."""
-    notes = []
+    chapters, notes = campaign_chapters(result, entry, unread=unread, scenarios=named, validation=validation), []
     if entry is None and isinstance(result.static, LeftOutStage):
         reason = f"{result.static.reason}; {result.static.remedy}"
         notes.append(f"muscle: not written, because it needs a static law: {reason}")
     if scenarios and not any(scenario.text for scenario in scenarios):
-        reasons = dict.fromkeys(scenario.reason for scenario in scenarios)
-        notes.append(f"scenarios: not written: {'; '.join(reasons)}")
-    return notes
+        notes.append(f"scenarios: not written: {'; '.join(dict.fromkeys(each.reason for each in scenarios))}")
+    chapters[0] = dataclasses.replace(chapters[0], notes=(*chapters[0].notes, *notes))
+    contents = {**_muscles(result, entry), **{f"{SCENARIOS}/{s.name}": s.text for s in scenarios if s.text}}
+    chapters += reading_chapters(complete)
+    writes = writes or execution.takes_over(out)
+    deliver("campaign", chapters, json=json, out=out, title="Bench campaign", files=contents, writes=writes)
 
 
 def _read_each(files: Sequence[Path], mapping: ColumnMapping) -> tuple[list[Recording], list[UnreadFile]]:
@@ -215,9 +208,8 @@ def _validation(result: Campaign, recording: Recording) -> list[ValidationRow]:
     if not rows.any():
         raise ColumnError(f"{recording.origin}: no row has a positive force, so that no prediction can be compared.")
     inside = (force >= prediction.low) & (force <= prediction.high)
-    error = (prediction.force - force)[rows]
     half = 0.5 * float(np.median(prediction.high - prediction.low))
-    rms = float(np.sqrt(np.mean(error**2)))
+    rms = float(np.sqrt(np.mean((prediction.force - force)[rows] ** 2)))
     return [ValidationRow(recording.origin, rms, half, float(inside[rows].mean()), int(rows.sum()))]
 
 
@@ -234,9 +226,6 @@ def _muscles(result: Campaign, entry: Entry | None) -> dict[str, str]:
     if entry is None:
         return {}
     lengths = {r.resting_length for r in result.records if r.kind.is_static and r.resting_length is not None}
-    files = {"muscle.toml": to_toml(entry)}
-    for length in sorted(lengths - {result.resting_length}):
-        other = _entry(result, length)
-        if other is not None:
-            files[f"muscle-{1e3 * length:.0f}mm.toml"] = to_toml(other)
-    return files
+    others = {length: _entry(result, length) for length in sorted(lengths - {result.resting_length})}
+    named = {f"muscle-{1e3 * length:.0f}mm.toml": to_toml(other) for length, other in others.items() if other}
+    return {"muscle.toml": to_toml(entry), **named}

@@ -60,7 +60,7 @@ COMMANDS = (
     CommandRow("simulate", "simulate", "simulate", "Simulate the plant of a scenario file."),
     CommandRow("study", "study", "study", "Run a parameter study of a scenario."),
     CommandRow("tune", "tune", "tune", "Tune the controller of a scenario for a family of plants."),
-    CommandRow("benchmark", "benchmark", "benchmark", "Benchmark controllers of a joint on common tasks."),
+    CommandRow("benchmark", "tune", "benchmark", "Benchmark controllers of a joint on common tasks."),
     CommandRow("export", "export", "export", "Export to C, MATLAB, FMU, MuJoCo, PyTorch and other targets."),
     CommandRow("studio", "studio", "studio", "Show muscles and plants in the browser."),
     CommandRow("schema", "simulate", "schema", "Print the JSON schema of scenario or muscle files."),

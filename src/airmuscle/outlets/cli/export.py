@@ -1,7 +1,6 @@
 """`airmuscle export`: a scenario or a law as a program in another language."""
 
 import dataclasses
-import functools
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
@@ -14,16 +13,8 @@ from ...files import list_plants
 from ...files.library import load_law, read_toml
 from ...files.scenario.scenario import load_scenario
 from .. import export as outlet
-from ..export import PRECISIONS, MuscleActuator, OnnxStack, Stack, TorchStack, WarpStack
-from ..export.compiler import (
-    PLATFORMS,
-    PROCESSORS,
-    BuiltProgram,
-    Processor,
-    build_and_run,
-    find_platform,
-    run_in_emulator,
-)
+from ..export import PRECISIONS, OnnxStack, Stack, TorchStack, WarpStack
+from ..export.compiler import PLATFORMS, PROCESSORS, Processor, build_and_run, find_platform, run_in_emulator
 from ..export.identifiers import make_identifier
 from ..export.robot_description import WRITERS
 from ..export.targets import C99, JavaScript, Octave, Target
@@ -134,9 +125,8 @@ def export(source: Source, request: ExportRequest, out: Folder = DEFAULT_FOLDER,
     files, lines, more = WRITERS_BY_TARGET.get(request.to, _export_program)(source, out, request)
     if json:
         print_json({"files": [str(file) for file in files], **more})
-        return
-    for line in (*(f"file: {file}" for file in files), *lines):
-        echo(line)
+    else:
+        echo("\n".join([*(f"file: {file}" for file in files), *lines]))
 
 
 class Exported(NamedTuple):
@@ -149,8 +139,8 @@ class Exported(NamedTuple):
 
 def _export_fmu(source: str, out: Path, request: ExportRequest) -> Exported:
     """The FMU of a plant or of its controller, or both as an SSP package, in a folder or as a file."""
-    platforms, fmi = [find_platform(each) for each in dict.fromkeys(request.platforms)], request.fmi
-    fmi = 3 if fmi is None else fmi
+    platforms = [find_platform(each) for each in dict.fromkeys(request.platforms)]
+    fmi = 3 if request.fmi is None else request.fmi
     part = "ssp" if request.to == "ssp" else "controller" if request.controller else "plant"
     suffix = ".ssp" if part == "ssp" else ".fmu"
     path = out if out.suffix == suffix else out / f"{request.name}{suffix}"
@@ -184,17 +174,13 @@ def _export_mujoco(source: str, out: Path, request: ExportRequest) -> Exported:
         f"plugin: {made.plugin_name}" + (f", source only: {made.remark}" if made.remark else ""),
         f'MJCF: <plugin plugin="{made.plugin_name}" tendon="NAME" {size}/>',
     )
-    return Exported(_files_of(made), lines, {"plugin": made.plugin_name, "remark": made.remark})
-
-
-def _files_of(plugin: MuscleActuator) -> list[Path]:
-    return [path for path in (plugin.source, plugin.library) if path is not None]
+    return Exported(made.files, lines, {"plugin": made.plugin_name, "remark": made.remark})
 
 
 def _export_robot(source: str, out: Path, request: ExportRequest) -> Exported:
     """The robot description of a joint or an arm, with the plugins of its muscles."""
     written = WRITERS[request.to](load_scenario(source).plant, out, name=request.name)
-    plugins = [path for each in written.plugins for path in _files_of(each)]
+    plugins = [path for each in written.plugins for path in each.files]
     remarks, left = list(dict.fromkeys(each.remark for each in written.plugins if each.remark)), list(written.left_out)
     lines = [f"plugins, source only: {remark}" for remark in remarks]
     lines += [f"left out: {', '.join(left)}"] if left else []
@@ -229,12 +215,17 @@ WRITERS_BY_TARGET: Mapping[str, Callable[[str, Path, ExportRequest], Exported]] 
 def _export_program(source: str, out: Path, request: ExportRequest) -> Exported:
     """A law, a controller, or a plant with its run, which is built and run if that is asked for."""
     paths = _write(source, out, request)
-    run = functools.partial(run_in_emulator, processor=request.processor) if request.processor else build_and_run
-    lines, built = [f"run: {_instruction(request.to, paths, request.law, request.controller)}"], dict[str, Any]()
-    if request.build:
-        line, built = _build_results(run(paths), request.controller)
-        lines.insert(0, line)
-    return Exported(paths, lines, built)
+    instruction = f"run: {_instruction(request.to, paths, request.law, request.controller)}"
+    if not request.build:
+        return Exported(paths, [instruction])
+    built = run_in_emulator(paths, request.processor) if request.processor else build_and_run(paths)
+    text, size = built.output.strip(), "unknown" if built.code_size is None else f"{built.code_size} bytes"
+    if not request.controller:  # the output of a run is CSV
+        text = f"{len(built.output.splitlines()) - 1} rows; {built.messages.strip()}"
+    known = {} if built.stack_size is None else {"stack_bytes": built.stack_size}
+    stack = f", stack {built.stack_size} bytes, both without the C library" if known else ""
+    stated = {"output": built.output, "code_bytes": built.code_size, **known}
+    return Exported(paths, [f"program: {text}; code {size}{stack}", instruction], stated)
 
 
 def _write(source: str, out: Path, request: ExportRequest) -> tuple[Path, ...]:
@@ -251,18 +242,6 @@ def _write(source: str, out: Path, request: ExportRequest) -> tuple[Path, ...]:
         )  # fmt: skip
     target, tunable = TARGETS[request.to], request.tunable or None
     return outlet.write_program(scenario.problem, out, target, tunable=tunable, columns=scenario.columns, **common)
-
-
-def _build_results(built: BuiltProgram, controller: bool) -> tuple[str, dict[str, str | int | None]]:
-    """What the program printed, of a run, whose output is CSV, the number of its rows; in a line, and for JSON."""
-    text = (
-        built.output.strip() if controller else f"{len(built.output.splitlines()) - 1} rows; {built.messages.strip()}"
-    )
-    size = "unknown" if built.code_size is None else f"{built.code_size} bytes"
-    known = {} if built.stack_size is None else {"stack_bytes": built.stack_size}
-    stack = f", stack {built.stack_size} bytes, both without the C library" if known else ""
-    line = f"program: {text}; code {size}{stack}"
-    return line, {"output": built.output, "code_bytes": built.code_size, **known}
 
 
 def _instruction(to: str, paths: tuple[Path, ...], law: bool, controller: bool) -> str:

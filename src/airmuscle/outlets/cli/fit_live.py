@@ -53,11 +53,6 @@ class LiveRequest:
         "End when no row has come for so long.", default=10.0, bounds=(0.0, math.inf), metavar="SECONDS"
     )
 
-    def reader(self) -> RowReader:
-        """The reader of the rows."""
-        reading = ReadingRequest(**{name: getattr(self, name) for name in READING})
-        return RowReader("standard input" if self.follow == "-" else Path(self.follow).name, reading.column_mapping())
-
 
 @with_requests
 def fit_live(request: LiveRequest, out: OptionalFolder = None, json: Json = False) -> None:
@@ -74,14 +69,14 @@ def fit_live(request: LiveRequest, out: OptionalFolder = None, json: Json = Fals
       cat /dev/ttyUSB0 | airmuscle fit-live --follow - --column "1=pressure [kPa]" --column "2=contraction [%]"
       --column "3=force [N]" --max-pressure "6 bar" --max-force "1 kN"
     """
-    pressures, contractions = (
-        (request.min_pressure, request.max_pressure),
-        (request.min_contraction, request.max_contraction),
-    )
-    limits = BenchLimits(ValidityRange(*pressures, *contractions), request.max_force)
+    pressures = request.min_pressure, request.max_pressure
+    limits = ValidityRange(*pressures, request.min_contraction, request.max_contraction)
     if out is not None:
         check_writable(out)
-    reader, fit = request.reader(), RecursiveFit(limits, request.degree, forgetting=request.forgetting)
+    reading = ReadingRequest(**{name: getattr(request, name) for name in READING})
+    origin = "standard input" if request.follow == "-" else Path(request.follow).name
+    reader = RowReader(origin, reading.column_mapping())
+    fit = RecursiveFit(BenchLimits(limits, request.max_force), request.degree, forgetting=request.forgetting)
     _finish(_follow(fit, reader, request, json), reader, out, json)
 
 

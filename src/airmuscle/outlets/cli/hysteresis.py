@@ -1,15 +1,16 @@
 """`airmuscle hysteresis`: identification of friction models from hysteresis loops."""
 
 import dataclasses
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from ...bench.identify.branch_residuals import delay_notes, find_delay
-from ...bench.identify.campaign import HeldCreep, fit_held_creep, free_of_creep
+from ...bench.identify.campaign import fit_held_creep, free_of_creep
 from ...bench.identify.campaign.campaign_chapters import creep_chapter
 from ...bench.identify.hysteresis import find_loops, fit_jointly, fit_loop
 from ...bench.identify.hysteresis.hysteresis_chapter import hysteresis_chapters
-from ...bench.identify.hysteresis.joint import SelectedFriction, select_friction
+from ...bench.identify.hysteresis.joint import select_friction
 from ...bench.identify.hysteresis.loops import CURVE_DEGREE
 from ...core import check_writable
 from ...files.library import Entry, load_law, part_toml, to_toml, without_parts
@@ -79,48 +80,35 @@ def hysteresis(
     chapters = hysteresis_chapters(fits, joint)
     if held is not None:
         chapters.append(creep_chapter(held.verdict, held.sentences, held.elements, held.standard_errors))
-    files_of_parts = _files(selected, held, entry)
-    notes = [*delay_notes(find_delay(recordings)), *_missing(selected, held, of_all_runs=bool(joint))]
+    notes, parts = delay_notes(find_delay(recordings)), list[tuple[str, Any, str, str]]()
+    if selected is None:
+        of_all = " for all runs together" if joint else ""
+        notes = [*notes, f"no friction file: no model that a plant can use is justified{of_all}"]
+    else:
+        parts.append(("friction", selected.friction, selected.verdict, f"Friction from {selected.origin}"))
+    if held is not None and held.elements.stiffnesses:
+        parts.append(("creep", held.elements, held.verdict, "Creep"))
+    elif held is not None:
+        notes = [*notes, "no creep elements are written"]
     chapters[0] = dataclasses.replace(chapters[0], notes=(*chapters[0].notes, *notes))
     chapters += reading_chapters(recordings)
-    deliver("hysteresis", chapters, json=json, out=out, title="Friction", files=files_of_parts)
+    deliver("hysteresis", chapters, json=json, out=out, title="Friction", files=_files(entry, parts))
 
 
-def _missing(selected: SelectedFriction | None, held: HeldCreep | None, *, of_all_runs: bool) -> list[str]:
-    """Sentences on what is not written."""
-    notes = []
-    if selected is None:
-        of_all = " for all runs together" if of_all_runs else ""
-        notes.append(f"no friction file: no model that a plant can use is justified{of_all}")
-    if held is not None and not held.elements.stiffnesses:
-        notes.append("no creep elements are written")
-    return notes
+def _files(entry: Entry | None, parts: Sequence[tuple[str, Any, str, str]]) -> dict[str, str]:
+    """The file of the muscle with friction and creep elements, whose checks apply to the characteristic alone and are
+    kept, or the files of these parts.
 
-
-def _files(selected: SelectedFriction | None, held: HeldCreep | None, entry: Entry | None) -> dict[str, str]:
-    """The file of the muscle, or those of the friction and of the creep elements."""
-    parts = [
-        *([("friction", selected.friction, selected.verdict)] if selected is not None else []),
-        *([("creep", held.elements, held.verdict)] if held is not None and held.elements.stiffnesses else []),
-    ]
-    if parts and entry is not None:
-        return {"muscle.toml": to_toml(_completed(entry, selected, held))}
-    if entry is not None:
+    parts  name, object, verdict, and what the note of the muscle says before the verdict
+    """
+    if entry is None:
+        return {f"{name}.toml": f"# {verdict}\n{part_toml(name, part)}" for name, part, verdict, _ in parts}
+    if not parts:
         return {}
-    return {f"{name}.toml": f"# {verdict}\n{part_toml(name, part)}" for name, part, verdict in parts}
-
-
-def _completed(entry: Entry, selected: SelectedFriction | None, held: HeldCreep | None) -> Entry:
-    """The muscle with friction and creep elements; its checks apply to the characteristic alone and are kept."""
-    note, changes = entry.note, dict[str, Any]()
-    if selected is not None:
-        changes["friction"] = selected.friction
-        note = f"{note} Friction from {selected.origin}: {selected.verdict}"
-    if held is not None and held.elements.stiffnesses:
-        changes["creep"] = held.elements
-        note = f"{note} Creep: {held.verdict}"
+    changes = {name: part for name, part, *_ in parts}
+    note = " ".join((entry.note, *(f"{origin}: {verdict}" for *_, verdict, origin in parts))).strip()
     uncertainty = entry.uncertainty and without_parts(entry.uncertainty, changes)
-    band = None if changes else entry.error_band  # it was stated without them
-    return dataclasses.replace(
-        entry, name="muscle", note=note.strip(), uncertainty=uncertainty, error_band=band, **changes
-    )
+    completed = dataclasses.replace(
+        entry, name="muscle", note=note, uncertainty=uncertainty, error_band=None, **changes
+    )  # the band was stated without them
+    return {"muscle.toml": to_toml(completed)}

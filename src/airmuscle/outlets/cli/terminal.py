@@ -155,15 +155,22 @@ def terminal_width() -> int:
     return WIDE
 
 
+def _display(*columns: Any) -> Any:
+    """The bars of a terminal with these columns, which disappear at the end."""
+    from rich.console import Console
+    from rich.progress import Progress
+
+    console = Console(stderr=True)
+    return Progress(*columns, console=console, transient=True, disable=not console.is_terminal)
+
+
 @contextlib.contextmanager
 def reading_progress(label: str = "reading") -> Iterator[Callable[[str, float], None]]:
     """Yield a callback (name, fraction done), such as `read(progress=...)` takes, which draws one bar per name."""
-    from rich.console import Console
     from rich.markup import escape
-    from rich.progress import Progress, TaskID
+    from rich.progress import TaskID
 
-    console = Console(stderr=True)
-    with Progress(console=console, transient=True, disable=not console.is_terminal) as display:
+    with _display() as display:
         tasks: dict[str, TaskID] = {}
 
         def show(name: str, fraction: float) -> None:
@@ -186,12 +193,10 @@ def computation_progress(label: str) -> Iterator[Callable[[float], None]]:
 def counted_progress(label: str) -> Iterator[Callable[[str, int, int], None]]:
     """Yield a callback (step, done, in total) that draws one bar with the number of its runs and the time left; it
     raises KeyboardInterrupt after Ctrl-C."""
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+    from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeRemainingColumn
 
-    columns = (TextColumn("{task.description}", markup=False), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    console = Console(stderr=True)
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as display:
+    description = TextColumn("{task.description}", markup=False)
+    with _display(description, BarColumn(), MofNCompleteColumn(), TimeRemainingColumn()) as display:
         bar = display.add_task(label, total=None)
 
         def show(step: str, done: int, total: int) -> None:

@@ -61,24 +61,15 @@ class ActuatorModel:
         """The inputs of the plant at command, length and speed."""
         import casadi
 
-        rest = self._rest_length(p)
+        model, vector = autodiff.symbolic(self.part)
+        rest = casadi.substitute(casadi.SX(model.resting_lengths[0]), vector, p)
         low, high = self.command_range
         command = casadi.fmin(casadi.fmax(z[0], low), high)
         values = {SHORTENING: rest - z[1], SHORTENING_SPEED: -z[2]}
-        if len(self.controls) == 1:
-            values[self.controls[0].name] = command
-        elif self.controls:
-            values |= {
-                self.controls[0].name: casadi.fmax(command, 0.0),
-                self.controls[1].name: casadi.fmax(-command, 0.0),
-            }
+        pair = [casadi.fmax(command, 0.0), casadi.fmax(-command, 0.0)]
+        openings = pair if len(self.controls) == 2 else [command]
+        values |= {control.name: opening for control, opening in zip(self.controls, openings, strict=False)}
         return casadi.vertcat(casadi.SX(0, 1), *(values[name] for name in self.part.inputs))
-
-    def _rest_length(self, p: Any) -> Any:
-        import casadi
-
-        model, vector = autodiff.symbolic(self.part)
-        return casadi.substitute(casadi.SX(model.resting_lengths[0]), vector, p)
 
     @functools.cached_property
     def step_of_time(self) -> tuple[dict[str, Any], Any]:
@@ -106,12 +97,10 @@ class ActuatorModel:
         known = {**{n: t.x[i] for i, n in enumerate(s.name for s in self.part.states)},
                  **{n: o[i] for i, n in enumerate(t.output_names)}}  # fmt: skip
         valid = casadi.SX(1.0)
-        for limit in self.part.column_limits:
-            low, high = limit.bounds
-            if limit.column in known and np.isfinite(low):
-                valid = casadi.logic_and(valid, known[limit.column] >= low)
-            if limit.column in known and np.isfinite(high):
-                valid = casadi.logic_and(valid, known[limit.column] <= high)
+        for limit in (each for each in self.part.column_limits if each.column in known):
+            value, (low, high) = known[limit.column], limit.bounds
+            valid = casadi.logic_and(valid, value >= low) if np.isfinite(low) else valid
+            valid = casadi.logic_and(valid, value <= high) if np.isfinite(high) else valid
         return {"x": t.x, "z": z, "p": t.p}, casadi.vertcat(known["force"], known["pressure"], valid)
 
     @functools.cached_property
@@ -139,9 +128,8 @@ class ActuatorModel:
         import casadi
 
         printer = Printer(dataclasses.replace(language, labels=self._labels))  # type: ignore[type-var]
-        for name, (inputs, result), output in (
-            ("start", self.start, "x"), ("step", self.step_of_time, "y"), ("observe", self.observe, "o"),
-        ):  # fmt: skip
+        functions = (("start", self.start, "x"), ("step", self.step_of_time, "y"), ("observe", self.observe, "o"))
+        for name, (inputs, result), output in functions:
             printer.add(name, inputs, {output: casadi.cse(casadi.densify(result))}, ["h"] if "h" in inputs else ())
         return printer.module(), printer.held
 
@@ -175,9 +163,7 @@ def actuator_model(plant: Plant, *, muscle: str = "", step: float | None = None)
     Raises ParameterError for a plant that has not one command, and a step that is not positive.
     """
     part = open_plant(single_muscle(plant, muscle))
-    controls = controls_of(part)
-    if step is None:
-        step = _stable_step(part)
+    controls, step = controls_of(part), _stable_step(part) if step is None else step
     if not 0.0 < step < 1.0:
         raise ParameterError(f"actuator: step is {step!r} s; allowed range: above 0 to 1 s.")
     return ActuatorModel(part, controls, step)
@@ -229,8 +215,12 @@ def _stable_step(part: Plant) -> float:
                 state = open_plant(part, (shortening,)).state_at(pressure=pressure)
             except ParameterError:
                 continue
+            motion = {SHORTENING: shortening, SHORTENING_SPEED: 0.0}
             for opening in (0.0, 0.5, 1.0):
-                inputs = [_level(i, opening, shortening) for i in part.input_variables]
+                inputs = [
+                    motion.get(i.name, i.minimum + opening * (min(i.maximum, 1e6) - i.minimum))
+                    for i in part.input_variables
+                ]
                 slopes = derivatives(compiled, list(state.values()), inputs).rates_by_state
                 sizes = compiled.nominal
                 if np.isfinite(slopes).all():
@@ -240,10 +230,3 @@ def _stable_step(part: Plant) -> float:
     while step * fastest > SAFETY:
         step /= 2.0
     return step
-
-
-def _level(variable: Input, opening: float, shortening: float) -> float:
-    """The value of an input at which the fastest rate is looked for."""
-    if variable.name in (SHORTENING, SHORTENING_SPEED):
-        return shortening if variable.name == SHORTENING else 0.0
-    return variable.minimum + opening * (min(variable.maximum, 1e6) - variable.minimum)

@@ -117,15 +117,6 @@ def csv_text(headings: Sequence[str], rows: Iterable[Sequence[float]]) -> str:
     return file.getvalue()
 
 
-NOT_COMMANDED = '         : status == NOT_COMMANDED      ? "a measurement or a command is not finite\\n"\n'
-"""A further reason for which a control loop ends early."""
-
-APPLY_DRIVERS = """  apply_drivers(driver_kinds, driver_settings, driver_states, driver_states, signals, counts,
-                scratch, begin, nextafter(fabs(end), HUGE_VAL) - fabs(end));
-"""
-"""The lines that pass commands through their drivers."""
-
-
 def main_program(program: ExportedRun) -> str:
     """A main program that runs a scenario, with its control loop if it has one, and writes columns as CSV."""
     name, loop = program.name, program.loop
@@ -133,13 +124,12 @@ def main_program(program: ExportedRun) -> str:
     numbers: dict[str, float] = {"rows": program.times.size, "segments": segments.size, "columns": len(columns)}
     places = {"provenance": block_comment(program.provenance), "file": name, "valid": filled("valid.c", {}, name)}
     if loop is None:
-        every, start = program.system.known.column_names, program.problem.start_time
+        every = program.system.known.column_names
         columns_at = ", ".join(str(every.index(each)) for each in columns)
         places["constants"] = "".join((
             f"static const char header[] = {c_string(csv_header(columns))};\n",
             f"static const int columns[COLUMNS] = {{{columns_at}}};\n",
-            f"static const double start = {c_number(start)};\n",
-            *_run_arrays(program),
+            f"static const double start = {c_number(program.problem.start_time)};\n", *_run_arrays(program),
         ))  # fmt: skip
     else:
         drivers = len(loop.drivers.kinds)
@@ -148,11 +138,12 @@ def main_program(program: ExportedRun) -> str:
             "capacity": loop.capacity,
         }  # fmt: skip
         places |= {
-            "apply_drivers": APPLY_DRIVERS if drivers else "", "constants": _loop_constants(program, loop),
+            "apply_drivers": filled("apply_drivers.c", {}, name) if drivers else "",
+            "constants": _loop_constants(program, loop),
             "kernels": CKernels(_shapes(f"{name.upper()}_INPUTS")).text("driven_inputs", loop.kernels),
         }  # fmt: skip
     places |= {key: str(number) for key, number in numbers.items()}
-    places["program"] = filled("program.c", {"failures": NOT_COMMANDED if loop else ""}, name)
+    places["program"] = filled("program.c", {"failures": filled("not_commanded.c", {}, name) if loop else ""}, name)
     return filled("loop.c" if loop else "main.c", places, name)
 
 

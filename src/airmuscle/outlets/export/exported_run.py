@@ -138,9 +138,8 @@ class ExportedLoop:
         """Sample time and end of the run [s], number of samples, and the distance [s] within which a row is replaced by
         one at an instant of a driver."""
         step, instants = float(self.prepared.loop.sample_time), self.prepared.instants
-        return {
-            "sample_time": step, "samples": len(instants) - 1, "finish": float(instants[-1]), "near": CLOSE * step,
-        }  # fmt: skip
+        samples, finish = len(instants) - 1, float(instants[-1])
+        return {"sample_time": step, "samples": samples, "finish": finish, "near": CLOSE * step}
 
     def data(self, known: Description) -> dict[str, Any]:
         """What a program states of its loop: names in tuples, numbers in arrays; states of the drivers at rest."""
@@ -189,8 +188,8 @@ def export_loop(problem: Problem, name: str, title: str, tunable: Sequence[str] 
             f"the drivers make up to {capacity} segments of an input between two samples; {MAX_CAPACITY} are allowed. "
             "Lower the frequency of the carrier, or shorten the sample time."
         )
-    edges = prepared.instants
-    others = snapped(loop.other_inputs, prepared.input_names, edges, CLOSE * loop.sample_time).as_floats()
+    near = CLOSE * loop.sample_time
+    others = snapped(loop.other_inputs, prepared.input_names, prepared.instants, near).as_floats()
     others.values[:, prepared.commanded] = others.slopes[:, prepared.commanded] = 0.0
     printed = print_controller(prepared, name, title, tunable)
     drivers = DriverTable(prepared, loop.init(problem.start_time), capacity)

@@ -15,8 +15,7 @@ from ...physics.plant.plant import Plant
 from .c_source import CSource, csv_text
 from .compiler import Platform
 from .exported_run import ExportedRun
-from .fmi_description import FmuDescription, FmuExperiment
-from .fmi_package import FmuPackage, WrittenFmu, check_target, token_of
+from .fmi_package import FmuDescription, FmuExperiment, FmuPackage, WrittenFmu, check_target, token_of, write_archive
 from .fmi_variables import has_unit, make_variables, references_of
 from .identifiers import c_array, c_number, c_string, c_strings, filled
 from .printed_system import acting_parameters
@@ -53,7 +52,8 @@ def write_fmu(
     """
     target = check_target(path, fmi)
     package = fmu_package(problem, fmi, name, title, tunable)
-    return replace(package, related=_reference(problem)).write(target, fmi, binary, platforms)
+    package = replace(package, related=_reference(problem))
+    return write_archive(target, *package.content(fmi, binary, platforms))
 
 
 def _reference(problem: Problem) -> dict[str, str]:
@@ -140,9 +140,9 @@ def _instance(
     system, known, problem, name = program.system, program.system.known, program.problem, program.name
     initial, inputs = problem.initial_vector, program.first_inputs
     limits = _limits(system.compiled.system, known.column_names)
-    lowest = [*known.lower_bounds.tolist(), *(-float("inf") for _ in known.input_names)]
-    positive = set(known.positive_outputs.tolist())
-    lowest += [5e-324 if i in positive else -float("inf") for i in range(len(known.output_names))]
+    least = np.full(len(known.output_names), -np.inf)
+    least[known.positive_outputs] = 5e-324
+    lowest = [*known.lower_bounds, *(-np.inf for _ in known.input_names), *least]
     ranges = "".join(
         f"  {{{column}, {c_number(low)}, {c_number(high)}, {c_string(text)}}},\n" for column, low, high, text in limits
     )
@@ -151,14 +151,18 @@ def _instance(
     indices = {"rows": [row for row, _ in derivatives.places], "columns": [column for _, column in derivatives.places],
                "pressure_rows": [each.row for each in starts], "air_masses": [each.air_mass for each in starts],
     }  # fmt: skip
+    padded = {
+        "start_inputs": ("INPUTS", inputs), "lowest": ("PARAMETERS", [low for low, _ in bounds]),
+        "highest": ("PARAMETERS", [high for _, high in bounds]), "scales": ("INDICATORS", scales),
+    }  # fmt: skip
     constants = [
         c_strings(f"static const char *const {name}_names[]", known.column_names),
         c_array(f"static const double {name}_minimum[]", lowest),
         c_array(f"static const double {name}_start_states[{upper}_STATES]", initial),
-        c_array(f"static const double {name}_start_inputs[{upper}_INPUTS + 1]", inputs, 1),
-        c_array(f"static const double {name}_lowest[{upper}_PARAMETERS + 1]", [low for low, _ in bounds], 1),
-        c_array(f"static const double {name}_highest[{upper}_PARAMETERS + 1]", [high for _, high in bounds], 1),
-        c_array(f"static const double {name}_scales[{upper}_INDICATORS + 1]", scales, 1),
+        *(
+            c_array(f"static const double {name}_{table}[{upper}_{size} + 1]", values, 1)
+            for table, (size, values) in padded.items()
+        ),
         *(f"static const int {name}_{key}[] = {{{', '.join(map(str, [*at, 0]))}}};\n" for key, at in indices.items()),
         c_array(f"static const double {name}_start_pressures[]", [each.pressure for each in starts], 1),
         "/* Ranges that are reported once when a column leaves them. */\n"

@@ -5,23 +5,19 @@ from collections.abc import Sequence
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement
 
-import numpy as np
-
 from ...core import ParameterError
 from ...engine.compile.text.programs import CLanguage
 from ...engine.loop import MEASURED, SETPOINT, ControlLoop, Schedule, named_signal_units
 from ...engine.run import Problem, solve
 from ...engine.run.sampled_loop import SampledLoop, prepare_loop
 from ...recording.columns import column_units
+from . import fmi_package
 from .compiler import Platform
-from .fmi_description import FmuDescription, FmuExperiment, xml_text
-from .fmi_package import FmuPackage, WrittenFmu, archive, check_target, token_of, write_archive
+from .fmi_package import FmuDescription, FmuExperiment, FmuPackage, WrittenFmu, archive, check_target, token_of
 from .fmi_variables import Variable, Variables, base_powers, has_unit
 from .fmu import fmu_package
-from .identifiers import block_comment, c_array, c_number, c_strings, filled
+from .identifiers import block_comment, c_array, c_number, c_strings, filled, program_name
 from .printed_controller import PrintedController, check_control_law, print_controller
-from .targets import program_name
-from .write import checked_name
 
 STRUCTURE, COMMON = (f"http://ssp-standard.org/SSP1/SystemStructure{kind}" for kind in ("Description", "Common"))
 """Namespaces of SSP 1.0."""
@@ -42,14 +38,15 @@ def write_controller_fmu(
     arguments and errors are those of `write_fmu`.
     """
     target = check_target(path, fmi)
-    return controller_package(problem, fmi, name, title).write(target, fmi, binary, platforms)
+    package = controller_package(problem, fmi, name, title)
+    return fmi_package.write_archive(target, *package.content(fmi, binary, platforms))
 
 
 def controller_package(problem: Problem, fmi: int, name: str = "", title: str = "") -> FmuPackage:
     """The FMU of the control law of a problem, without its binary."""
     loop = check_control_law(problem)
     prepared = prepare_loop(problem, loop.init(problem.start_time))
-    chosen = checked_name(name) or program_name(title or type(loop.controller).__name__)
+    chosen = program_name(name, title or type(loop.controller).__name__)
     printed = print_controller(prepared, chosen, title, None)
     variables = _variables(problem, loop, printed, prepared)
     start = [float(v.start or 0.0) for v in variables if v.causality == "input"]
@@ -68,12 +65,9 @@ def _variables(
     problem: Problem, loop: ControlLoop, printed: PrintedController, prepared: SampledLoop
 ) -> list[Variable]:
     """Time, measurements, set points, commands and parameters, in the order of the template `controller_instance.h`."""
-    law, known = printed.law, problem.compiled.description
-    units = {
-        **named_signal_units(law), **{n: u for n, u in column_units(problem.system, known.output_names).items() if u},
-    }  # fmt: skip
-    first = _first_row(problem)
-    variables = Variables()
+    law, first, variables = printed.law, _first_row(problem), Variables()
+    of_columns = column_units(problem.system, problem.compiled.description.output_names)
+    units = {**named_signal_units(law), **{name: unit for name, unit in of_columns.items() if unit}}
     for column in law.measured_columns:
         start, unit = first[f"{MEASURED}{column}"], units.get(column, "")
         variables.add(column, "input", f"{column}, measured", start=start, unit=unit)
@@ -96,24 +90,17 @@ def _first_row(problem: Problem) -> dict[str, float]:
     return {name: float(recording[name][0]) for name in recording}
 
 
-def _instance(
-    printed: PrintedController, token: str, start: float, sample_time: float, inputs: Sequence[float]
-) -> str:  # fmt: skip
+def _instance(printed: PrintedController, token: str, start: float, sample_time: float, inputs: Sequence[float]) -> str:
     """The C source of an instance."""
-    name, law = printed.name, printed.law
-    bounds = [leaf.declared.bounds for leaf in printed.tunable]
+    name, bounds = printed.name, [leaf.declared.bounds for leaf in printed.tunable]
     parameters = f"[{name.upper()}_PARAMETERS + 1]"
-    memory = np.array([float(v) for v in law.initial_memory.values()])
-    constants = (
-        c_array(f"static const double {name}_initial_memory[{name.upper()}_MEMORY + 1]", memory, 1),
-        c_array(f"static const double {name}_start_inputs[]", inputs, 1),
-        c_array(f"static const double {name}_defaults{parameters}", [float(leaf.value) for leaf in printed.tunable], 1),
-        c_array(f"static const double {name}_lowest{parameters}", [low for low, _ in bounds], 1),
-        c_array(f"static const double {name}_highest{parameters}", [high for _, high in bounds], 1),
-        c_strings(
-            f"static const char *const {name}_parameter_names{parameters}", [leaf.path for leaf in printed.tunable]
-        ),
-    )
+    tables = {
+        f"initial_memory[{name.upper()}_MEMORY + 1]": printed.initial_memory, "start_inputs[]": inputs,
+        f"defaults{parameters}": printed.defaults, f"lowest{parameters}": [low for low, _ in bounds],
+        f"highest{parameters}": [high for _, high in bounds],
+    }  # fmt: skip
+    constants = [c_array(f"static const double {name}_{table}", values, 1) for table, values in tables.items()]
+    constants.append(c_strings(f"static const char *const {name}_parameter_names{parameters}", printed.paths))
     places = printed.places | {
         "provenance": block_comment(printed.provenance), "token": token, "period": c_number(sample_time),
         "start": c_number(start), "constants": "".join(constants),
@@ -139,7 +126,7 @@ def write_ssp(
             f"an SSP package joins plant and controller directly; there are drivers of {', '.join(loop.drivers)}. "
             "Leave drivers out, or export the loop to C, JavaScript or Octave, which have them."
         )
-    base = checked_name(name) or program_name(title or type(problem.system).__name__)
+    base = program_name(name, title or type(problem.system).__name__)
     first = _first_row(problem)
     inputs = {n: ((problem.start_time, first[n]),) for n in problem.compiled.description.input_names}
     open_loop = dataclasses.replace(problem, input=Schedule(inputs), control_state=None)
@@ -151,14 +138,13 @@ def write_ssp(
     for part, package in packages.items():
         files[f"resources/{part}.fmu"], folders, remark = package.content(fmi, binary, platforms)
     files["SystemStructure.ssd"] = _structure(base, {part: p.about for part, p in packages.items()}).encode()
-    return write_archive(target, archive(files, "SystemStructure.ssd"), folders, remark)
+    return fmi_package.write_archive(target, archive(files, "SystemStructure.ssd"), folders, remark)
 
 
 def _structure(name: str, parts: dict[str, FmuDescription]) -> str:
     """The file SystemStructure.ssd of a plant and a controller."""
-    root = Element("ssd:SystemStructureDescription", {
-        "xmlns:ssd": STRUCTURE, "xmlns:ssc": COMMON, "version": "1.0", "name": name,
-    })  # fmt: skip
+    described = {"xmlns:ssd": STRUCTURE, "xmlns:ssc": COMMON, "version": "1.0", "name": name}
+    root = Element("ssd:SystemStructureDescription", described)
     system = SubElement(root, "ssd:System", name=name)
     inside = {
         part: {v.name: v for v in about.variables if v.causality in ("input", "output")}
@@ -191,7 +177,7 @@ def _structure(name: str, parts: dict[str, FmuDescription]) -> str:
         SubElement(SubElement(units, "ssc:Unit", name=unit), "ssc:BaseUnit", powers)
     experiment = parts["controller"].experiment
     SubElement(root, "ssd:DefaultExperiment", startTime=repr(experiment.start), stopTime=repr(experiment.stop))
-    return xml_text(root)
+    return fmi_package.xml_text(root)
 
 
 def _connectors(parent: Element, variables: Sequence[Variable]) -> None:

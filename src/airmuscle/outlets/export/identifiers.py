@@ -18,21 +18,14 @@ from ...engine.compile.text.programs import CBody
 LONGEST = 48
 """Characters of an identifier: with a prefix it stays within the 63 that C99 and MATLAB distinguish."""
 _DIGEST = 8
-_WORDS = """
-    alignas alignof and and_eq asm auto bitand bitor bool break case catch char class compl concept const consteval
-    constexpr constinit const_cast continue co_await co_return co_yield decltype default delete do double dynamic_cast
-    else enum explicit export extern false final float for friend goto if import inline int long module mutable
-    namespace new noexcept not not_eq nullptr operator or or_eq override private protected public register
-    reinterpret_cast requires restrict return short signed sizeof static static_assert static_cast struct switch
-    template this thread_local throw true try typedef typeid typename typeof union unsigned using virtual void volatile
-    wchar_t while xor xor_eq main errno
-    arguments async await debugger eval extends finally function implements in instanceof interface let null of package
-    super undefined var with yield infinity nan
-    elseif end endif endfunction endwhile endfor global otherwise parfor persistent spmd until classdef methods events
-    properties enumeration ans pi eps i j inf zeros real imag abs sqrt exp log plot print disp
-    con prn aux nul com1 com2 com3 com4 com5 com6 com7 com8 com9 lpt1 lpt2 lpt3 lpt4 lpt5 lpt6 lpt7 lpt8 lpt9
-"""
-RESERVED = frozenset(_WORDS.split())
+
+
+def template(name: str) -> str:
+    """The text of a template, or of a header that is shipped with the program."""
+    return resources.files(__package__).joinpath("templates", *name.split("/")).read_text(encoding="utf-8")
+
+
+RESERVED = frozenset(template("reserved.txt").split())
 """Words that cannot be identifiers or file names, in lower case: keywords of C, C++, JavaScript, MATLAB and Octave,
 functions that printed files call, and device names of Windows."""
 
@@ -68,6 +61,19 @@ def make_identifiers(names: Sequence[str]) -> tuple[str, ...]:
 def make_identifier(name: str) -> str:
     """The identifier of one name."""
     return make_identifiers([name])[0]
+
+
+def program_name(given: str, title: str) -> str:
+    """The name of a program that the user has given, or else one from a title, in lower case.
+
+    Raises ParameterError, with a name that is possible, if the given one is not an identifier.
+    """
+    if given and make_identifier(given) != given:
+        raise ParameterError(
+            f"'{given[:80]}' cannot be the name of an exported program: it must consist of ASCII letters, digits and "
+            f"single underscores, begin with a letter, and be no keyword. Use '{make_identifier(given)}'."
+        )
+    return given or make_identifier(make_identifier(title).lower())
 
 
 def _word(name: str) -> str:
@@ -197,8 +203,3 @@ def filled(name: str, values: Mapping[str, str], prefix: str) -> str:
     text = re.sub(r"^( +)@(\w+)@\n", lambda mark: textwrap.indent(f"{values[mark[2]]}\n".lstrip("\n"), mark[1]), text,
                   flags=re.MULTILINE)  # fmt: skip
     return re.sub(r"@(\w+)@", lambda mark: values[mark.group(1)], text)
-
-
-def template(name: str) -> str:
-    """The text of a template, or of a header that is shipped with the program."""
-    return resources.files(__package__).joinpath("templates", *name.split("/")).read_text(encoding="utf-8")

@@ -22,31 +22,21 @@ from ...physics.mechanism import ExternalLoad
 from ...physics.muscle import Muscle
 from ...physics.plant import Plant
 from .actuator import ActuatorModel, actuator_model
-from .identifiers import filled, line_comment, provenance
-from .targets import program_name
-from .write import checked_name, write_files
+from .identifiers import filled, line_comment, program_name, provenance
+from .write import write_files
 
 OPSET, IR_VERSION = 17, 8
 """Versions of the operators and of the format: ONNX Runtime reads them from 1.12 on."""
 
 
-def onnx_models(
-    name: str,
-    title: str,
-    model: ActuatorModel,
-    provenance: Sequence[str],
-    single: bool,
-    *,
-    tunable: bool,
-    substeps: int,
-) -> dict[str, bytes]:
+def onnx_models(actuator: "ExportedActuator", single: bool, *, tunable: bool, substeps: int) -> dict[str, bytes]:
     """The graphs NAME_start.onnx and NAME.onnx; a step of dt is divided into so many steps of the integrator.
 
     tunable  whether the parameters (P, 1) or (P, count) are an input; otherwise they are constants
 
-
     Raises AirmuscleError without the package onnx.
     """
+    name, model = actuator.name, actuator.model
     try:
         import onnx
     except ImportError:
@@ -70,19 +60,15 @@ def onnx_models(
         f"{name}_start.onnx": _model(onnx, start, model, single, tunable, begun, {"state": "x"}, {}),
         f"{name}.onnx": _model(onnx, step, model, single, tunable, given, {"next_state": "x"}, rows_out),
     }
-    for each in models.values():
-        onnx.helper.set_model_props(each, _facts(title, model, provenance))
-    return {file: each.SerializeToString() for file, each in models.items()}
-
-
-def _facts(title: str, model: ActuatorModel, provenance: Sequence[str]) -> dict[str, str]:
-    """The metadata of both graphs."""
     low, high = model.command_range
-    return {
-        "title": title, "provenance": "\n".join(provenance), "step": repr(model.step),
+    facts = {
+        "title": actuator.title, "provenance": "\n".join(actuator.provenance), "step": repr(model.step),
         "command": f"{low!r} to {high!r}", "states": ", ".join(s.name for s in model.part.states),
         "parameters": ", ".join(leaf.path for leaf in model.parameters),
     }  # fmt: skip
+    for each in models.values():
+        onnx.helper.set_model_props(each, facts)
+    return {file: each.SerializeToString() for file, each in models.items()}
 
 
 class _Graph(GraphBody):
@@ -113,9 +99,8 @@ def _model(
     outputs = []
     for name, value in rows.items():
         nodes.append(helper.make_node("Expand", [value, "count"], [name]))
-        outputs.append(
-            helper.make_tensor_value_info(name, onnx.TensorProto.BOOL if name == "valid" else kind, ("count",))
-        )
+        of_row = onnx.TensorProto.BOOL if name == "valid" else kind
+        outputs.append(helper.make_tensor_value_info(name, of_row, ("count",)))
     for name, array in arrays.items():
         elements = [graph.results[array][i] for i in sorted(graph.results[array])]
         for i, value in enumerate(elements):
@@ -139,8 +124,6 @@ def _model(
     return made
 
 
-OF_FILE = {"characteristic": "contractile"}
-"""Parts of a muscle that have another name in a muscle file, by that name."""
 NOTE = (
     "The functions are those of the model. The command is held and the length moves at its speed within a step; the "
     "flag says where the validity range of the muscle is left."
@@ -231,9 +214,8 @@ class OnnxStack(Stack):
     """Steps of the integrator in a step of the graph."""
 
     def files(self, actuator: ExportedActuator) -> dict[str, str | bytes]:
-        single, model = self.precision == Single(), actuator.model
-        return dict(onnx_models(actuator.name, actuator.title, model, actuator.provenance, single,
-                                tunable=self.tunable, substeps=self.substeps))  # fmt: skip
+        single = self.precision == Single()
+        return dict(onnx_models(actuator, single, tunable=self.tunable, substeps=self.substeps))
 
 
 def write_actuator(
@@ -254,7 +236,7 @@ def write_actuator(
     title = title or model.part.muscles[0].name
     identified, root = _spread(model, uncertainty)
     lines = provenance(title, model.part, (), [NOTE])
-    actuator = ExportedActuator(checked_name(name) or program_name(title), title, model, lines, identified, root)
+    actuator = ExportedActuator(program_name(name, title), title, model, lines, identified, root)
     return write_files(stack.files(actuator), folder)
 
 
@@ -270,11 +252,9 @@ def _spread(model: ActuatorModel, given: ParameterUncertainty | None) -> tuple[t
     """The paths of the identified parameters in the plant, and the root of their covariance."""
     if given is None:
         return (), np.zeros((0, 0))
-    known = {leaf.path for leaf in model.parameters}
-    paths = []
+    known, paths = {leaf.path for leaf in model.parameters}, []
     for path in given.parameters:
-        part, dot, rest = path.partition(".")
-        paths.append(f"muscle.{OF_FILE.get(part, part)}{dot}{rest}")
+        paths.append("muscle." + re.sub(r"^characteristic\b", "contractile", path))  # its name in a plant
         if paths[-1] not in known:
             raise ParameterError(f"write_actuator: the plant has no parameter '{paths[-1]}' of the uncertainty.")
     return tuple(paths), given.deviations(np.eye(len(paths))).T

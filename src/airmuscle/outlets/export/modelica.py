@@ -10,17 +10,10 @@ from ...engine.compile.ir.instructions import instructions
 from ...engine.compile.text.body import TextBody
 from ...engine.run import Problem
 from .exported_run import ExportedRun
-from .identifiers import block_comment, filled, make_identifiers
+from .identifiers import block_comment, filled, make_identifiers, template
 from .write import make_run, write_files
 
-_WORDS = """
-    algorithm and annotation block break class connect connector constant constrainedby der discrete each else
-    elseif elsewhen encapsulated end enumeration equation expandable extends external false final flow for
-    function if import impure in initial inner input loop model not operator or outer output package parameter
-    partial protected public pure record redeclare replaceable return stream then true type when while within
-    time plant log1p expm1 asinh
-"""
-KEYWORDS = frozenset(_WORDS.split())
+KEYWORDS = frozenset(template("modelica_keywords.txt").split())
 """Words of Modelica, and names in the package, that are no names of variables."""
 _WHOLE = re.compile(r"(\d+)\.0")
 _FACTORS = r"[A-Za-z]+-?\d*(\.[A-Za-z]+-?\d*)*"
@@ -48,9 +41,8 @@ class ModelicaBody(TextBody):
         self._taken = {name.casefold() for names in variables.values() for name in names}
 
     def new_name(self) -> str:
-        name = super().new_name()
-        while name in self._taken:
-            name = super().new_name()
+        while (name := super().new_name()) in self._taken:
+            pass
         self.values.append(name)
         return name
 
@@ -73,8 +65,7 @@ class ModelicaBody(TextBody):
 
     def call(self, function: str, x: Sequence[str]) -> str:
         if function == "pow":
-            whole = _WHOLE.fullmatch(x[1])
-            if whole:
+            if whole := _WHOLE.fullmatch(x[1]):
                 return self.put(f"{x[0]} ^ {whole[1]}")
             return self.put(f"noEvent(if {x[0]} > 0.0 then {x[0]} ^ {x[1]} else 0.0)")
         value = f"{function}({x[0]})"
@@ -96,11 +87,6 @@ def write_modelica(
     `write_program`.
     """
     program = make_run(problem, name=name, title=title, tunable=tunable)
-    return write_files({"package.mo": modelica_text(program)}, Path(folder) / program.name)
-
-
-def modelica_text(program: ExportedRun) -> str:
-    """The package: the variables of the block, and its equations, in which each value has one name."""
     traced, declared = program.system.traced, _variables(program)
     code = instructions([traced.x, traced.u, traced.p], [traced.f, traced.o])
     names = {array: list(group) for array, group in declared.items()}
@@ -115,7 +101,7 @@ def modelica_text(program: ExportedRun) -> str:
         "declarations": "\n".join(text for array in "puxo" for text in declared[array].values()),
         "equations": "\n".join(body.lines),
     }  # fmt: skip
-    return filled("modelica.mo", places, program.name)
+    return write_files({"package.mo": filled("modelica.mo", places, program.name)}, Path(folder) / program.name)
 
 
 def _variables(program: ExportedRun) -> dict[str, dict[str, str]]:

@@ -17,10 +17,9 @@ from ...physics.plant import Plant, open_plant
 from .actuator import control_range, controls_of, single_muscle
 from .c_source import CSource
 from .compiler import compile_library
-from .identifiers import block_comment, c_integers, c_number, c_strings, filled, provenance
+from .identifiers import block_comment, c_integers, c_number, c_strings, filled, program_name, provenance
 from .printed_system import export_system
-from .targets import program_name
-from .write import checked_name, write_files
+from .write import write_files
 
 OLDEST, BROKEN = (3, 17), ("4.0.0",)
 """First version of MuJoCo whose plugin actuators have several states, and versions in which they do not work."""
@@ -54,6 +53,11 @@ class MuscleActuator(ShortRepr):
     library: Path | None
     remark: str
     controls: tuple[Input, ...]
+
+    @property
+    def files(self) -> list[Path]:
+        """The source, and the library if it was built."""
+        return [path for path in (self.source, self.library) if path is not None]
 
     @property
     def plugin_name(self) -> str:
@@ -107,8 +111,10 @@ class MuscleActuator(ShortRepr):
         Parameters are those of the plant. Call it after the position was set. Raises ParameterError.
         """
         check_mujoco().mj_fwdPosition(model, data)
-        which = model.actuator(name).id
-        given = _configuration(model, int(model.actuator_plugin[which]), [*self.parameters, REST_LENGTH])
+        which, attributes = model.actuator(name).id, (*self.parameters, REST_LENGTH)
+        raw: bytes = model.plugin_attr[int(model.plugin_attradr[int(model.actuator_plugin[which])]) :].tobytes()
+        texts = raw.split(b"\0")[: len(attributes)]
+        given = {path: text.decode() for path, text in zip(attributes, texts, strict=True) if text}
         values = [float(given.get(path, value)) for path, value in self.parameters.items()]
         plant = with_parameters(self.plant, values)
         rest = float(given.get(REST_LENGTH, plant.muscles[0].geometry.resting_length))
@@ -136,13 +142,15 @@ def write_mujoco_plugin(plant: Plant, folder: str | Path, *, name: str = "", mus
     FileError.
     """
     part = open_plant(single_muscle(plant, muscle))
-    program = checked_name(name) or program_name(part.muscles[0].name)
-    controls = controls_of(part)
+    program, controls = program_name(name, part.muscles[0].name), controls_of(part)
     lines = provenance(f"Muscle {part.muscles[0].name} for MuJoCo", part, (), [NOTE])
     files = _sources(part, program, controls, lines)
     library, remark = f"lib{program}_plugin.so", ""
     try:
-        files[library] = _build(program, files)
+        folder = Path(check_mujoco().__file__).parent
+        linked = [str(path) for path in sorted(folder.glob("libmujoco.*"))[:1]]
+        units = [file for file in files if file.endswith(".c")]
+        files[library] = compile_library(files, units, library, [f"-I{folder / 'include'}", *linked])
     except ParameterError as reason:
         remark = str(reason)
     written = dict(zip(files, write_files(files, folder), strict=True))
@@ -186,14 +194,6 @@ def _sources(part: Plant, name: str, controls: Sequence[Input], lines: Sequence[
     return {file: text.encode() for file, text in texts.items()}
 
 
-def _build(name: str, files: Mapping[str, bytes]) -> bytes:
-    """The shared library. Raises ParameterError without MuJoCo or a compiler."""
-    folder = Path(check_mujoco().__file__).parent
-    linked = [str(path) for path in sorted(folder.glob("libmujoco.*"))[:1]]
-    units = [file for file in files if file.endswith(".c")]
-    return compile_library(files, units, f"lib{name}_plugin.so", [f"-I{folder / 'include'}", *linked])
-
-
 def _text(name: str, value: float) -> str:
     """A number as an attribute. Raises ParameterError if it is not finite."""
     if not math.isfinite(value):
@@ -218,10 +218,3 @@ def _load(plugin: str, library: Path) -> None:
         f"the plugin {plugin} of this process is another one than {library}, and MuJoCo cannot replace it; write this "
         "plugin with another name, or start a new process."
     )
-
-
-def _configuration(model: Any, instance: int, attributes: Sequence[str]) -> dict[str, str]:
-    """The attributes of an instance of a plugin in a compiled model that are given there."""
-    raw: bytes = model.plugin_attr[int(model.plugin_attradr[instance]) :].tobytes()
-    values = raw.split(b"\0")[: len(attributes)]
-    return {name: value.decode() for name, value in zip(attributes, values, strict=True) if value}

@@ -24,15 +24,6 @@ from .printed_system import find_leaf, make_labels
 SINGLE_TOLERANCE = 1e-4
 """Part of its range by which a command in single precision may differ from that in double precision (chosen)."""
 
-ABOUT = (
-    "/* Replay of a recorded run. The expected commands are those of the printed operations in IEEE 754 "
-    "double precision;\n   they are met bit by bit if products and sums are not fused (gcc, clang: -ffp-contract=off, "
-    "which -std=c99 implies for\n   gcc). */",
-    "/* Replay of a recorded run. The expected commands are those of double precision, which are met within a "
-    "tolerance. */",
-)
-"""Comment of the program that replays a run: one that is exact, and one with a tolerance."""
-
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class PrintedController:
@@ -106,20 +97,21 @@ class PrintedController:
         of_law = [(leaf.path, leaf.declared.unit, leaf.declared.meaning) for leaf in self.tunable]
         return make_labels({**rows, "parameters": of_law})
 
-    def files(self, samples: "ReplayedSamples") -> dict[str, str]:
-        """Header, source and the program that replays samples, by file name."""
-        upper, number = self.name.upper(), self.number
+    def files(self, measured: Array, setpoints: Array, commands: Array) -> dict[str, str]:
+        """Header, source and the program that replays measurements (K, m), set points (K, s) and commands (K, c) of a
+        run, by file name."""
+        upper, number, precision = self.name.upper(), self.number, "single" if self.tolerance else "double"
         tables = (
-            c_array(f"static const {number} measured[SAMPLES][{upper}_MEASUREMENTS + 1]", samples.measured, 1, number),
-            c_array(f"static const {number} setpoints[SAMPLES][{upper}_SETPOINTS + 1]", samples.setpoints, 1, number),
-            c_array(f"static const double commands[SAMPLES][{upper}_COMMANDS + 1]", samples.commands, 1),
+            c_array(f"static const {number} measured[SAMPLES][{upper}_MEASUREMENTS + 1]", measured, 1, number),
+            c_array(f"static const {number} setpoints[SAMPLES][{upper}_SETPOINTS + 1]", setpoints, 1, number),
+            c_array(f"static const double commands[SAMPLES][{upper}_COMMANDS + 1]", commands, 1),
         )
         places = {
-            "provenance": block_comment(self.provenance), "file": self.name, "samples": str(len(samples.measured)),
-            "tables": "".join(tables), "number": number, "about": ABOUT[self.tolerance > 0],
-            "comparison": filled(f"replay_{'single' if self.tolerance else 'double'}.c", {
+            "provenance": block_comment(self.provenance), "file": self.name, "samples": str(len(measured)),
+            "tables": "".join(tables), "number": number, "about": filled(f"about_{precision}.c", {}, self.name),
+            "comparison": filled(f"replay_{precision}.c", {
                 "tolerance": c_number(self.tolerance),
-                "ranges": c_array(f"static const double ranges[{upper}_COMMANDS + 1]", self.ranges_of(samples), 1),
+                "ranges": c_array(f"static const double ranges[{upper}_COMMANDS + 1]", self.ranges_of(commands), 1),
             }, self.name),
         }  # fmt: skip
         return with_cmake(self.name, {**self.source_files(), "main.c": filled("replay.c", places, self.name)})
@@ -130,39 +122,30 @@ class PrintedController:
         sample_time  [s]
         setpoints    (s,) at the beginning of the run
         """
-        name, law = self.name, self.law
-        words = {
-            kind: [f"[{name.upper()}_{kind}_{word.upper()}]" for word in make_identifiers(names)]
-            for kind, names in self._kinds.items()
-        }
-        levels = [c_number(value, self.number) for value in setpoints]
-        pins = [f"A{i}" for i in range(len(law.measured_columns))]
+        name = self.name
+        measured, points, commands = (
+            [f"[{name}_{kind}_{word}]".upper() for word in make_identifiers(self._kinds[kind])]
+            for kind in ("MEASUREMENT", "SETPOINT", "COMMAND")
+        )
         places = {
             "provenance": block_comment(self.provenance), "file": name, "number": self.number,
-            "period": str(round(1e6 * sample_time)),
-            "reads": "\n".join(f"  measurement{word} = 0; /* scale and offset of analogRead({pin}) */"
-                               for word, pin in zip(words["MEASUREMENT"], pins, strict=True)),
+            "period": str(round(1e6 * sample_time)), "law": type(self.law).__name__, "sample_time": f"{sample_time:g}",
+            "reads": "\n".join(f"  measurement{word} = 0; /* scale and offset of analogRead(A{i}) */"
+                               for i, word in enumerate(measured)),
             "writes": "\n".join(f"  (void)command{word}; /* {low!r} to {high!r}: analogWrite, say */"
-                                for word, (low, high) in zip(words["COMMAND"], self.ranges, strict=True)),
-            "setpoints": "\n".join(f"  setpoint{word} = {level};"
-                                   for word, level in zip(words["SETPOINT"], levels, strict=True)),
+                                for word, (low, high) in zip(commands, self.ranges, strict=True)),
+            "setpoints": "\n".join(f"  setpoint{word} = {c_number(level, self.number)};"
+                                   for word, level in zip(points, setpoints, strict=True)),
         }  # fmt: skip
-        sentence = f"Control law {type(law).__name__} with a sample time of {sample_time:g} s"
-        properties = {
-            "name": name, "version": "1.0.0", "author": "exported by airmuscle", "maintainer": "exported by airmuscle",
-            "sentence": sentence, "paragraph": "A sample of the law as a C function without memory allocation.",
-            "category": "Device Control", "url": "https://example.org", "architectures": "*", "includes": f"{name}.h",
-        }  # fmt: skip
-        sketch = filled("sketch.ino", places, name)
         return {
-            "library.properties": "".join(f"{key}={value}\n" for key, value in properties.items()),
+            "library.properties": filled("library.properties", places, name),
             **{f"src/{file}": text for file, text in self.source_files().items()},
-            f"examples/{name}_loop/{name}_loop.ino": sketch,
+            f"examples/{name}_loop/{name}_loop.ino": filled("sketch.ino", places, name),
         }
 
-    def ranges_of(self, samples: "ReplayedSamples") -> Array:
-        """The width of the range of each command (c,); of one without limits its largest size in the run."""
-        largest = np.abs(samples.commands).max(axis=0, initial=0.0)
+    def ranges_of(self, commands: Array) -> Array:
+        """The width of the range of each command (c,); of one without limits its largest size in a run (K, c)."""
+        largest = np.abs(commands).max(axis=0, initial=0.0)
         width = np.array([high - low for low, high in self.ranges], dtype=float)
         return np.where(np.isfinite(width), width, np.where(largest > 0.0, largest, 1.0))
 
@@ -183,14 +166,13 @@ class PrintedController:
         }  # fmt: skip
 
     def _enumerations(self) -> str:
-        text = ""
-        for kind, names in self._kinds.items():
-            words = [f"{self.name.upper()}_{kind}_{word.upper()}" for word in make_identifiers(names)]
-            text += f"enum {{ {', '.join(f'{word} = {i}' for i, word in enumerate(words))} }};\n" if words else ""
-        return text
+        """The numbers of the elements of the arrays."""
+        rows = {kind: enumerate(make_identifiers(names)) for kind, names in self._kinds.items() if names}
+        words = [[f"{self.name}_{kind}_{word}".upper() + f" = {i}" for i, word in row] for kind, row in rows.items()]
+        return "".join(f"enum {{ {', '.join(each)} }};\n" for each in words)
 
-    def replay(self, measured: Array, setpoints: Array, *, single: bool = False) -> "ReplayedSamples":
-        """The commands to measurements (K, m) and set points (K, s), from the printed instructions themselves.
+    def replay(self, measured: Array, setpoints: Array, *, single: bool = False) -> Array:
+        """The commands (K, c) to measurements (K, m) and set points (K, s), from the printed instructions themselves.
 
         single  every number is rounded to single precision
         """
@@ -204,30 +186,19 @@ class PrintedController:
                 body.store(list(self.outputs)[output], index, value)
             rows.append([body.stored["command", i] for i in range(len(self.law.inputs))])
             memory = [body.stored["later", i] for i in range(len(memory))]
-        return ReplayedSamples(measured, setpoints, np.array(rows))
+        return np.array(rows)
 
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class ReplayedSamples:
-    """Measurements (K, m), set points (K, s) and commands (K, c) of a run."""
-
-    measured: Array
-    setpoints: Array
-    commands: Array
-
-
-def check_single_precision(printed: PrintedController, samples: ReplayedSamples, sample_time: float) -> None:
-    """Raise ParameterError where single precision changes a command of a run by more than SINGLE_TOLERANCE."""
-    single = printed.replay(samples.measured, samples.setpoints, single=True)
-    deviations = np.abs(single.commands - samples.commands) / printed.ranges_of(samples)
-    wrong = np.argwhere(~(deviations <= SINGLE_TOLERANCE))
-    if wrong.size:
-        k, i = map(int, wrong[0])
-        raise ParameterError(
-            f"{type(printed.law).__name__} in single precision: the command '{printed.law.inputs[i]}' differs by "
-            f"{deviations[k, i]:.2g} of its range from that in double precision, {k * sample_time:.4g} s after the "
-            f"start of the run; {SINGLE_TOLERANCE:g} is allowed. Export it in double precision."
-        )
+    def check_single_precision(self, measured: Array, setpoints: Array, commands: Array, sample_time: float) -> None:
+        """Raise ParameterError where single precision changes a command of a run by more than SINGLE_TOLERANCE."""
+        deviations = np.abs(self.replay(measured, setpoints, single=True) - commands) / self.ranges_of(commands)
+        wrong = np.argwhere(~(deviations <= SINGLE_TOLERANCE))
+        if wrong.size:
+            k, i = map(int, wrong[0])
+            raise ParameterError(
+                f"{type(self.law).__name__} in single precision: the command '{self.law.inputs[i]}' differs by "
+                f"{deviations[k, i]:.2g} of its range from that in double precision, {k * sample_time:.4g} s after the "
+                f"start of the run; {SINGLE_TOLERANCE:g} is allowed. Export it in double precision."
+            )
 
 
 def check_control_law(problem: Problem, also: type = ControlLaw) -> ControlLoop:

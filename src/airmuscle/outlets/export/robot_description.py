@@ -12,10 +12,9 @@ from ...core import STANDARD_GRAVITY, ParameterError
 from ...physics import AntagonisticJoint, Mechanism, MuscleRoute, PlanarArm, SerialArm, SpatialLink, WithStickSlip
 from ...physics.mechanism.antagonistic_joint import ConstantRadius
 from ...physics.plant import Plant, open_plant
-from .identifiers import provenance
+from .identifiers import program_name, provenance
 from .mujoco_plugin import REST_LENGTH, MuscleActuator, write_mujoco_plugin
-from .targets import program_name
-from .write import checked_name, write_files
+from .write import write_files
 
 LEAST = 1e-9
 """Mass [kg] and moment of inertia [kg m2] that stand for zero, which simulators refuse (chosen)."""
@@ -132,14 +131,14 @@ def write_mjcf(plant: Plant, folder: str | Path, *, name: str = "robot") -> Writ
     out, in the file too. Raises ParameterError for a plant whose mechanism is no joint or arm, whose pulleys are not
     circular, or whose muscles share a circuit, and FileError.
     """
-    program = checked_name(name) or program_name(name)
+    program = program_name(name, name)
     robot = robot_model(plant.mechanism)
     made = [
-        write_mujoco_plugin(plant, folder, name=f"{program}_{program_name(muscle.name)}", muscle=muscle.name)
+        write_mujoco_plugin(plant, folder, name=f"{program}_{program_name('', muscle.name)}", muscle=muscle.name)
         for muscle in plant.muscles
     ]
     root = ET.Element("mujoco", model=program)
-    root.append(ET.Comment(_comment(f"Robot {program} for MuJoCo", plant, _named(robot))))
+    root.append(_comment(f"Robot {program} for MuJoCo", plant, robot))
     ET.SubElement(root, "compiler", angle="radian", autolimits="true")
     ET.SubElement(root, "option", gravity=f"0 0 {-robot.gravity!r}")
     extension = ET.SubElement(root, "extension")
@@ -193,7 +192,7 @@ def write_urdf(plant: Plant, folder: str | Path, *, name: str = "robot") -> Writ
     the angles in the plant are no end stops. Rotor inertias beyond the first joint, which URDF cannot state, and what
     `write_mjcf` leaves out are named. Raises ParameterError as `write_mjcf`.
     """
-    program = checked_name(name) or program_name(name)
+    program = program_name(name, name)
     robot = robot_model(plant.mechanism)
     rotors = [
         f"the rotor inertia of {name}, {link.rotor_inertia:.3g} kg m2"
@@ -201,25 +200,18 @@ def write_urdf(plant: Plant, folder: str | Path, *, name: str = "robot") -> Writ
     ]  # fmt: skip
     robot = dataclasses.replace(robot, left_out=(*robot.left_out, *rotors))
     root = ET.Element("robot", name=program)
-    lines = [
-        f"muscle {muscle.name}: resting length {muscle.geometry.resting_length!r} m, contraction {route.offset!r} at "
-        "angles 0, moment arms "
-        + ", ".join(
-            f"{radius!r} m about {robot.joints[j - 1]}" for j, radius in zip(route.joints, route.radii, strict=True)
-        )
-        for muscle, route in zip(plant.muscles, robot.routes, strict=True)
-    ]
-    root.append(ET.Comment(_comment(f"Robot {program}", plant, lines + _named(robot))))
+    lines = []
+    for muscle, route in zip(plant.muscles, robot.routes, strict=True):
+        arms = (f"{r!r} m about {robot.joints[j - 1]}" for j, r in zip(route.joints, route.radii, strict=True))
+        rest = f"resting length {muscle.geometry.resting_length!r} m, contraction {route.offset!r} at angles 0"
+        lines.append(f"muscle {muscle.name}: {rest}, moment arms {', '.join(arms)}")
+    root.append(_comment(f"Robot {program}", plant, robot, lines))
     ET.SubElement(root, "link", name="base")
     parent = "base"
     for number, joint in enumerate(zip(robot.joints, robot.links, robot.frictions, strict=True), start=1):
         _urdf_link(root, parent, f"link{number}", *joint)
         parent = f"link{number}"
     return WrittenRobot(_written(root, folder, f"{program}.urdf"), (), robot.left_out)
-
-
-def _named(robot: RobotModel) -> list[str]:
-    return [f"left out: {text}" for text in robot.left_out]
 
 
 def _urdf_link(root: ET.Element, parent: str, name: str, axis: str, link: SpatialLink, friction: float) -> None:
@@ -243,9 +235,10 @@ def _numbers(values: Sequence[float]) -> str:
     return " ".join(repr(float(value) + 0.0) for value in values)
 
 
-def _comment(title: str, plant: Plant, notes: Sequence[str] = ()) -> str:
-    """The provenance as a comment of XML, which contains no double hyphen."""
-    return "\n" + "\n".join(provenance(title, plant, (), notes)).replace("--", "- -") + "\n"
+def _comment(title: str, plant: Plant, robot: RobotModel, notes: Sequence[str] = ()) -> Any:
+    """The provenance as a comment of XML, which contains no double hyphen, with what is left out."""
+    lines = provenance(title, plant, (), [*notes, *(f"left out: {text}" for text in robot.left_out)])
+    return ET.Comment("\n" + "\n".join(lines).replace("--", "- -") + "\n")
 
 
 def _written(root: Any, folder: str | Path, file: str) -> Path:

@@ -13,27 +13,7 @@ from ...engine.compile.kernel_text.printer import KernelPrinter
 from ...engine.compile.text.programs import DEFINITION, JavaScriptLanguage, MatlabBody, MatlabLanguage
 from .c_source import csv_header
 from .exported_run import BETWEEN, SHAPES, STEP, TABLEAU, ExportedRun, SolverText
-from .identifiers import block_comment, filled, line_comment
-
-ULP = """/** The distance from a number to the next. */
-function ulp(value) {
-  const bits = new DataView(new ArrayBuffer(8));
-  bits.setFloat64(0, Math.abs(value));
-  bits.setBigInt64(0, bits.getBigInt64(0) + 1n);
-  return bits.getFloat64(0) - Math.abs(value);
-}
-
-"""
-JS_DRIVER_ARRAYS = """  const {kinds, settings} = loop.drivers;
-  const driverStates = loop.drivers.states.map((state) => [...state]);
-  const scratch = [[[], [], []], [[], [], []]];
-"""
-JS_DRIVEN = (
-    ULP,
-    JS_DRIVER_ARRAYS,
-    "      apply_drivers(kinds, settings, driverStates, driverStates, signals, counts, scratch, begin, ulp(end));\n",
-)
-"""A function, the arrays of drivers, and the line that passes commands through their drivers."""
+from .identifiers import block_comment, filled, line_comment, template
 
 
 def javascript_files(program: ExportedRun) -> dict[str, str]:
@@ -57,19 +37,15 @@ def javascript_files(program: ExportedRun) -> dict[str, str]:
     places = {
         "provenance": block_comment(program.provenance), "file": name, "constants": text, "functions": functions,
         "solver": filled("solver.mjs", solver.places, name), "arguments": filled("arguments.mjs", {}, name),
-        "simulate": _simulation(program, "mjs", JavaScriptKernels(), JS_DRIVEN, {}),
+        "simulate": _simulation(program, "mjs", JavaScriptKernels(), {}),
         "columns": to_json(["time", *program.columns]), "header": to_json(csv_header(program.columns)),
-    }  # fmt: skip
-    module = {"types": f"./{name}.d.mts", "default": f"./{name}.mjs"}
-    package = {
-        "name": name.replace("_", "-"), "version": "1.0.0", "private": True, "description": program.provenance[0],
-        "type": "module", "types": module["types"], "exports": {".": module},
+        "package": name.replace("_", "-"), "description": json.dumps(program.provenance[0]),
     }  # fmt: skip
     return {
         f"{name}.mjs": filled("program.mjs", places, name),
         f"{name}.d.mts": filled("program.d.mts", {**places, **_types(program)}, name),
         f"{name}.run.mjs": filled("run.mjs", places, name),
-        "package.json": json.dumps(package, indent=2) + "\n",
+        "package.json": filled("package.json", places, name),
     }
 
 
@@ -111,19 +87,6 @@ def to_json(value: Any) -> str:
 _BODY = MatlabBody()
 _IN_LINE = 6
 """Numbers in a line."""
-LOOP_HELP = """% In addition: controller_parameters, those of the control law; setpoint, with the fields ends, values
-% and slopes.
-"""
-M_DRIVEN = (
-    "",
-    """  states = loop.drivers.states;
-  scratch = {zeros(3, 0), zeros(3, 0)};
-""",
-    """    [states, signals, counts, scratch] = apply_drivers( ...
-      loop.drivers.kinds, loop.drivers.settings, states, states, signals, counts, scratch, start, eps(finish));
-""",
-)
-"""The arrays of drivers, and the lines that pass commands through their drivers."""
 
 
 def octave_files(program: ExportedRun) -> dict[str, str]:
@@ -145,22 +108,23 @@ def octave_files(program: ExportedRun) -> dict[str, str]:
         "provenance": line_comment(program.provenance), "file": name, "functions": f"{DEFINITION}\n{functions}",
         "constants": _fields("model", data), "solver": filled("solver.m", {**solver.places, **steps}, name), **steps,
         "solver_constants": "".join(_fields(f"s.{key.lower()}", value) for key, value in method.items()),
-        "simulate": _simulation(program, "m", MatlabKernels(), M_DRIVEN, steps), "loop_help": LOOP_HELP if loop else "",
+        "simulate": _simulation(program, "m", MatlabKernels(), steps),
+        "loop_help": template("loop_help.m") if loop else "",
         "columns": m_strings(["time", *program.columns]), "header": m_string(csv_header(program.columns).strip("\n")),
     }  # fmt: skip
     return {f"{name}.m": filled("program.m", places, name), f"run_{name}.m": filled("run.m", places, name)}
 
 
-def _simulation(
-    program: ExportedRun, suffix: str, kernels: KernelPrinter, driven: tuple[str, str, str], places: Mapping[str, str]
-) -> str:
-    """The function `simulate`; `driven` are the texts of a loop with drivers: a function, their arrays, their call."""
+def _simulation(program: ExportedRun, suffix: str, kernels: KernelPrinter, places: Mapping[str, str]) -> str:
+    """The function `simulate`; in a loop with drivers also their arrays, and the lines that pass commands to them."""
     loop, name = program.loop, program.name
     if loop is None:
         return filled(f"simulate.{suffix}", places, name)
-    first, arrays, call = driven if len(loop.drivers.kinds) else ("", "", "")
-    text = f"{first}{kernels.text('driven_inputs', loop.kernels)}"
-    return filled(f"loop.{suffix}", {**places, "kernels": text, "driver_arrays": arrays, "apply_drivers": call}, name)
+    driven = len(loop.drivers.kinds) > 0
+    first = template("ulp.mjs") if driven and suffix == "mjs" else ""
+    own = {each: template(f"{each}.{suffix}") if driven else "" for each in ("driver_arrays", "apply_drivers")}
+    own["kernels"] = f"{first}{kernels.text('driven_inputs', loop.kernels)}"
+    return filled(f"loop.{suffix}", {**places, **own}, name)
 
 
 def _fields(name: str, value: Any) -> str:

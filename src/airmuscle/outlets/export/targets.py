@@ -12,16 +12,7 @@ from ...engine.compile.text.programs import DEFINITION, CLanguage, JavaScriptLan
 from ...physics.muscle.characteristic import Characteristic, ContractionLaw, ForceLaw, PressureLaw
 from .c_source import CSource, main_program
 from .exported_run import ExportedRun
-from .identifiers import (
-    block_comment,
-    c_array,
-    c_strings,
-    filled,
-    line_comment,
-    make_identifier,
-    provenance,
-    with_cmake,
-)
+from .identifiers import block_comment, c_array, c_strings, filled, line_comment, provenance, with_cmake
 from .scripting import javascript_files, m_array, m_strings, octave_files, to_json
 
 FORMS: tuple[tuple[type[Characteristic], str, tuple[str, str], tuple[str, str, str]], ...] = (
@@ -76,7 +67,12 @@ def print_law(law: Characteristic, name: str, title: str) -> PrintedLaw:
 
     if not isinstance(law, Characteristic):
         raise ParameterError(f"{one_line(law)} is not a characteristic; pass load('dmsp-20-300').characteristic, say.")
-    check_closed_form(law)
+    for _, part in parts_of(law):
+        if not autodiff.is_traceable(type(part)):
+            raise ParameterError(
+                f"{type(part).__name__} has no closed form and cannot be exported. Approximate it first, with its "
+                "error: as_force_law(law, validity_range) for a characteristic, as_polynomial for a geometry."
+            )
     _, method, arguments, results = next(form for form in FORMS if isinstance(law, form[0]))
     model, parameters = autodiff.symbolic(law)
     x = casadi.SX.sym("x"), casadi.SX.sym("y")
@@ -90,16 +86,6 @@ def print_law(law: Characteristic, name: str, title: str) -> PrintedLaw:
     values = casadi.if_else(known, casadi.densify(casadi.vertcat(value, *slopes)), x[0] + x[1])
     lines = provenance(title, law)
     return PrintedLaw(name, method, arguments, results, x, parameters, casadi.cse(values), tuple(leaves(law)), lines)
-
-
-def check_closed_form(model: Any) -> None:
-    """Raise ParameterError, with its class, for a model of which a part has no closed form."""
-    for _, part in parts_of(model):
-        if not autodiff.is_traceable(type(part)):
-            raise ParameterError(
-                f"{type(part).__name__} has no closed form and cannot be exported. Approximate it first, with its "
-                "error: as_force_law(law, validity_range) for a characteristic, as_polynomial for a geometry."
-            )
 
 
 class Target(abc.ABC):
@@ -165,8 +151,3 @@ class Octave(Target):
             "names": m_strings(p.path for p in law.known), "functions": f"{DEFINITION}\n{text}",
         }  # fmt: skip
         return {f"{law.name}.m": filled("law.m", places, law.name)}
-
-
-def program_name(title: str) -> str:
-    """The name of a program from a title of the user, in lower case."""
-    return make_identifier(make_identifier(title).lower())

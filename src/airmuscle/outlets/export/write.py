@@ -9,24 +9,17 @@ import numpy as np
 from ...control import LinearModelPredictive, PredictiveControl
 from ...core import Array, ParameterError, atomic_folder, check_known
 from ...engine.compile.kernel_text import CKernels, plain_kernels
-from ...engine.loop import MEASURED, Controller, ControlLoop, EnclosingLaw, WithSensors, without_simulated
+from ...engine.loop import MEASURED, ControlLoop, EnclosingLaw, WithSensors, without_simulated
 from ...engine.loop.controller import Measurement
 from ...engine.run import Problem, solve
 from ...engine.run.batch.lanes import Double, Precision, Single
 from ...engine.run.sampled_loop import SampledLoop, prepare_loop
 from ...physics.muscle.characteristic import Characteristic
 from .exported_run import CONTROLLER, ExportedRun, export_loop
-from .identifiers import c_array, c_integers, c_number, filled, make_identifier, provenance
-from .printed_controller import (
-    SINGLE_TOLERANCE,
-    PrintedController,
-    ReplayedSamples,
-    check_control_law,
-    check_single_precision,
-    print_controller,
-)
+from .identifiers import c_array, c_integers, c_number, filled, program_name, provenance
+from .printed_controller import SINGLE_TOLERANCE, PrintedController, check_control_law, print_controller
 from .printed_system import export_system
-from .targets import C99, Target, print_law, program_name
+from .targets import C99, Target, print_law
 
 TOLERANCE = 1e-9
 """Part of its range by which a command in C may differ from that in Python (chosen): sums are in another order."""
@@ -77,13 +70,13 @@ class PrintedPredictive(PrintedController):
         ends = {"low": (low - model.inputs) / model.input_sizes, "high": (high - model.inputs) / model.input_sizes}
         return ends | ({"tolerances": np.array(SINGLE_TOLERANCES)} if self.number == "float" else {})
 
-    def replay(self, measured: Array, setpoints: Array, *, single: bool = False) -> ReplayedSamples:
-        """The commands to measurements (K, p) and set points (K, q), in Python.
+    def replay(self, measured: Array, setpoints: Array, *, single: bool = False) -> Array:
+        """The commands (K, c) to measurements (K, p) and set points (K, q), in Python.
 
         single  the operations of the program itself, each rounded to single precision
         """
         if single:
-            return ReplayedSamples(measured, setpoints, self._in_single_precision(measured, setpoints))
+            return self._in_single_precision(measured, setpoints)
         law, memory, rows = self.law, self.law.init(), []
         ranges = dict(zip(law.inputs, self.ranges, strict=True))
         for values, points in zip(measured.tolist(), setpoints.tolist(), strict=True):
@@ -92,7 +85,7 @@ class PrintedPredictive(PrintedController):
             )
             commands, memory = law.step(memory, seen, 0.0)
             rows.append([commands[name] for name in law.inputs])
-        return ReplayedSamples(measured, setpoints, np.array(rows))
+        return np.array(rows)
 
     def _in_single_precision(self, measured: Array, setpoints: Array) -> Array:
         law, sample, rows = self.law, plain_kernels("predictive")["predictive_sample"], []
@@ -159,15 +152,18 @@ def make_run(
 ) -> ExportedRun:  # fmt: skip
     """A problem ready for any target, with its control loop if the target has one; else as for `write_program`."""
     title = title or type(problem.system).__name__
-    name = checked_name(name) or program_name(title)
-    loop, plant_parameters = None, tunable
+    name = program_name(name, title)
+    loop, of_plant = None, tunable
     if isinstance(problem.input, ControlLoop):
         if not with_loop:
             raise ParameterError(
                 f"the controller {type(problem.input.controller).__name__} cannot be exported to this target; export "
                 "the plant with input signals, or the loop to C, JavaScript, Octave, or as FMUs of an SSP package."
             )
-        plant_parameters, of_controller = _divided(tunable)
+        of_controller = None
+        if tunable is not None:
+            of_plant = [path for path in tunable if not path.startswith(CONTROLLER)]
+            of_controller = [path.removeprefix(CONTROLLER) for path in tunable if path.startswith(CONTROLLER)]
         loop = export_loop(problem, f"{name}_controller", title, of_controller)
     integrator = problem.integrator
     if integrator is None or not integrator.printed_step:
@@ -175,20 +171,12 @@ def make_run(
             f"the integrator {type(integrator).__name__} has no printed form; choose Rodas4, RungeKutta4 or "
             "DormandPrince8."
         )
-    system = export_system(problem.compiled, plant_parameters)
+    system = export_system(problem.compiled, of_plant)
     known = sum(loop.added_columns if loop else (), system.known.column_names)
     check_known("the run has no column", columns, known)
     lines = provenance(title, problem.system, (integrator,), notes)
     chosen = tuple(c for c in columns if c != "time") or known
     return ExportedRun(name, system, problem, lines, chosen, loop)
-
-
-def _divided(tunable: Sequence[str] | None) -> tuple[list[str] | None, list[str] | None]:
-    """The tunable parameters of the plant, and those of the controller without the beginning of their paths."""
-    if tunable is None:
-        return None, None
-    plant = [path for path in tunable if not path.startswith(CONTROLLER)]
-    return plant, [path.removeprefix(CONTROLLER) for path in tunable if path.startswith(CONTROLLER)]
 
 
 def write_law(
@@ -201,17 +189,7 @@ def write_law(
     FileError.
     """
     title = title or type(law).__name__
-    return write_files(target.law_files(print_law(law, checked_name(name) or program_name(title), title)), folder)
-
-
-def checked_name(name: str) -> str:
-    """A name given by the user. Raises ParameterError, with a name that is possible, if it is not an identifier."""
-    if name and make_identifier(name) != name:
-        raise ParameterError(
-            f"'{name[:80]}' cannot be the name of an exported program: it must consist of ASCII letters, digits and "
-            f"single underscores, begin with a letter, and be no keyword. Use '{make_identifier(name)}'."
-        )
-    return name
+    return write_files(target.law_files(print_law(law, program_name(name, title), title)), folder)
 
 
 def write_files(files: Mapping[str, str] | Mapping[str, str | bytes], folder: str | Path) -> tuple[Path, ...]:
@@ -265,7 +243,7 @@ def write_controller(
     law = without_simulated(loop.controller)
     of_real_plant = dataclasses.replace(prepared, loop=dataclasses.replace(loop, controller=law))
     notes = () if law == loop.controller else (LEFT_OUT,)
-    name = checked_name(name) or program_name(title or type(law).__name__)
+    name = program_name(name, title or type(law).__name__)
     number = "float" if precision == Single() else "double"
     printed: PrintedController
     if isinstance(law, LinearModelPredictive):
@@ -277,18 +255,13 @@ def write_controller(
     recording = solve(problem).raise_if_incomplete().recording
     rows = np.searchsorted(recording["time"], prepared.instants[:-1] - 1e-9 * loop.sample_time)
     measured = np.column_stack([recording[f"{MEASURED}{column}"][rows] for column in loop.controller.measured_columns])
-    measured = _readings(loop.controller, measured, loop.sample_time)
-    samples = printed.replay(measured, prepared.setpoint_values)
+    enclosing, setpoints = loop.controller, prepared.setpoint_values
+    while isinstance(enclosing, EnclosingLaw) and enclosing.simulated:  # simulated sensors around the law
+        measured = enclosing.readings(measured, loop.sample_time) if isinstance(enclosing, WithSensors) else measured
+        enclosing = enclosing.law
+    commands = printed.replay(measured, setpoints)
     if precision == Single():
-        check_single_precision(printed, samples, loop.sample_time)
+        printed.check_single_precision(measured, setpoints, commands, loop.sample_time)
     if arduino:
-        return write_files(printed.arduino_files(loop.sample_time, prepared.setpoint_values[0].tolist()), folder)
-    return write_files(printed.files(samples), folder)
-
-
-def _readings(law: Controller, measured: Array, sample_time: float) -> Array:
-    """The measurements (K, m) of a run behind the simulated sensors around its law."""
-    while isinstance(law, EnclosingLaw) and law.simulated:
-        measured = law.readings(measured, sample_time) if isinstance(law, WithSensors) else measured
-        law = law.law
-    return measured
+        return write_files(printed.arduino_files(loop.sample_time, setpoints[0].tolist()), folder)
+    return write_files(printed.files(measured, setpoints, commands), folder)

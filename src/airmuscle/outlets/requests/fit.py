@@ -112,17 +112,13 @@ def braid_of_length(size: BraidSize, resting_length: float) -> Braid:
 
 PURPOSES: Mapping[str, GroupSplit | None] = {"repeat": RunSplit(), "length": SpecimenSplit(), "both": None}
 """Purposes with the split that serves each: further runs of the measured muscles, other muscles, or both."""
-SPLITS: Mapping[str, GroupSplit] = {
-    "run": RunSplit(), "specimen": SpecimenSplit(), "contraction": LevelSplit("contraction"),
-    "pressure": LevelSplit("pressure"), "block": BlockSplit(),
+_SPLITS: Mapping[str, tuple[GroupSplit, str]] = {
+    "run": (RunSplit(), "one run at a time"), "specimen": (SpecimenSplit(), "one specimen at a time"),
+    "contraction": (LevelSplit("contraction"), "one level of contraction"),
+    "pressure": (LevelSplit("pressure"), "one level of pressure"), "block": (BlockSplit(), "blocks within each run"),
 }  # fmt: skip
+SPLITS = {name: split for name, (split, _) in _SPLITS.items()}
 """Groups of rows that are left out in turn."""
-SPLIT_NAMES = (
-    ("", "automatic"), ("run", "one run at a time"), ("specimen", "one specimen at a time"),
-    ("contraction", "one level of contraction"), ("pressure", "one level of pressure"),
-    ("block", "blocks within each run"),
-)  # fmt: skip
-"""Their names in a form."""
 WEAK = "weak"
 """Name in place of a parameter that stands for all weakly determined ones."""
 
@@ -150,7 +146,7 @@ class FitRequest:
     leave_out: GroupSplit | None = option(
         "Groups of rows for cross-validation (--compare) and resampling (--bootstrap): run, specimen, contraction, "
         "pressure, block.", choices=SPLITS, default=None, metavar="GROUP", label="Cross-validation leaves out",
-        offered=SPLIT_NAMES,
+        offered=(("", "automatic"), *((name, shown) for name, (_, shown) in _SPLITS.items())),
     )  # fmt: skip
     purpose: str | None = option(
         "Use of the law that --compare recommends: repeat (further runs of the measured muscles), length (other "

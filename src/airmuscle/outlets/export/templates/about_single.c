@@ -1,0 +1,1 @@
+/* Replay of a recorded run. The expected commands are those of double precision, which are met within a tolerance. */

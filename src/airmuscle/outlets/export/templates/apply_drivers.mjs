@@ -1,0 +1,1 @@
+      apply_drivers(kinds, settings, driverStates, driverStates, signals, counts, scratch, begin, ulp(end));
