@@ -29,7 +29,7 @@ from ...files.scenario.write import campaign_scenarios
 from ...physics.muscle.geometry import Geometry
 from ...recording import Recording
 from ...report.data import as_json
-from ..requests import BraidSize, ReadingRequest, braid_of_length, check_one_length, option, read_braid, request
+from ..requests import BraidSize, ReadingRequest, braid_of_length, check_one_length, many, optional, read_braid, request
 from .delivery import deliver
 from .execution import Execution
 from .measurements import print_row_notes, reading_chapters
@@ -97,12 +97,10 @@ class KeptStages:
 class CampaignRequest:
     """What a campaign is asked for."""
 
-    validate: tuple[Path, ...] = option(
-        "Record that is kept aside and predicted; repeatable.", default=(), metavar="FILE"
-    )
-    braid: BraidSize | None = option(
+    validate: tuple[Path, ...] = many("Record that is kept aside and predicted; repeatable.", metavar="FILE")
+    braid: BraidSize | None = optional(
         "Braid at rest, such as 'radius=10 mm, angle=24.4 deg'; default: the volume follows from the static law and "
-        "fills at several lengths.", default=None, metavar="SIZE", read=read_braid,
+        "fills at several lengths.", metavar="SIZE", read=read_braid,
     )  # fmt: skip
 
 

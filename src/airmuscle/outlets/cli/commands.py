@@ -58,7 +58,7 @@ COMMANDS = (
     CommandRow("fit-live", "fit_live", "fit_live", "Fit a surface while rows arrive; name the next point."),
     CommandRow("size", "plan", "size", "Size muscles of the catalogue for a lift or a joint."),
     CommandRow("simulate", "simulate", "simulate", "Simulate the plant of a scenario file."),
-    CommandRow("study", "study", "study", "Run a parameter study of a scenario."),
+    CommandRow("study", "simulate", "study", "Run a parameter study of a scenario."),
     CommandRow("tune", "tune", "tune", "Tune the controller of a scenario for a family of plants."),
     CommandRow("benchmark", "tune", "benchmark", "Benchmark controllers of a joint on common tasks."),
     CommandRow("export", "export", "export", "Export to C, MATLAB, FMU, MuJoCo, PyTorch and other targets."),

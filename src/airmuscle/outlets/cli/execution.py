@@ -8,7 +8,7 @@ from ...core import FolderInUseError, check_writable
 from ...engine.executors import SharedFolder, dask_cluster, shared_folder
 from ...engine.processes import Workers, available_cores
 from ...report.write import REPORT_FILE
-from ..requests.declaration import RequestError, Where, option, request
+from ..requests.declaration import RequestError, Where, optional, request
 from .terminal import echo
 
 
@@ -16,14 +16,13 @@ from .terminal import echo
 class Execution:
     """The processes that compute a command."""
 
-    workers: int | None = option(
-        "Number of local processes; by default as many as cores, or one that uses all cores.", default=None,
-        bounds=(1, 1024),
+    workers: int | None = optional(
+        "Number of local processes; by default as many as cores, or one that uses all cores.", bounds=(1, 1024),
     )  # fmt: skip
-    dask: str | None = option("Use a running Dask cluster, such as tcp://host:8786.", default=None, metavar="ADDRESS")
-    join: Path | None = option(
+    dask: str | None = optional("Use a running Dask cluster, such as tcp://host:8786.", metavar="ADDRESS")
+    join: Path | None = optional(
         "Share the computation with all processes that run the same command with this folder, on any machines.",
-        default=None, metavar="FOLDER",
+        metavar="FOLDER",
     )  # fmt: skip
 
     def check(self, where: Where) -> None:

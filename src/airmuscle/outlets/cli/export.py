@@ -18,7 +18,7 @@ from ..export.compiler import PLATFORMS, PROCESSORS, Processor, build_and_run, f
 from ..export.identifiers import make_identifier
 from ..export.robot_description import WRITERS
 from ..export.targets import C99, JavaScript, Octave, Target
-from ..requests.declaration import Where, check_rules, option, request
+from ..requests.declaration import Where, check_rules, many, option, optional, request
 from .options import Folder, Json, complete_entry, with_requests
 from .terminal import echo, print_json
 
@@ -49,23 +49,22 @@ class ExportRequest:
     law: bool = option("Export only the static characteristic of a muscle.", default=False)
     controller: bool = option("Export only the controller of a scenario: c, arduino, fmu.", default=False)
     build: bool = option("Compile the C program with the compiler of this machine, and run it.", default=False)
-    tunable: tuple[str, ...] = option(
-        "A parameter that the program can change; repeatable. Default: all, of a controller none.", default=(),
-        metavar="PATH",
+    tunable: tuple[str, ...] = many(
+        "A parameter that the program can change; repeatable. Default: all, of a controller none.", metavar="PATH",
     )  # fmt: skip
-    fmi: int | None = option("Version of FMI for --to fmu and ssp. Default: 3.", default=None, metavar="2|3")
+    fmi: int | None = optional("Version of FMI for --to fmu and ssp. Default: 3.", metavar="2|3")
     sources_only: bool = option("An FMU without a binary; --to fmu, ssp.", default=False)
-    platforms: tuple[str, ...] = option(
+    platforms: tuple[str, ...] = many(
         f"Binaries of an FMU for a platform, by the package ziglang; repeatable: {', '.join(PLATFORMS)}. Default: this "
-        "machine.", default=(),
+        "machine.",
     )  # fmt: skip
     muscle: str = option("One muscle of the plant; --to mujoco, torch, warp, onnx.", default="")
     precision: Precision = option(
         "Type of the numbers of a controller.", choices=PRECISIONS, default="double", metavar="double|float"
     )
-    processor: Processor | None = option(
+    processor: Processor | None = optional(
         f"With --controller --build: run in the emulator QEMU as {' or '.join(PROCESSORS)}, not on this machine.",
-        choices=PROCESSORS, default=None,
+        choices=PROCESSORS,
     )  # fmt: skip
 
     def check(self, where: Where) -> None:

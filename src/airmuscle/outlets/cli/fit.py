@@ -15,7 +15,16 @@ from ...core import ParameterError, PhysicsError, check_writable
 from ...files.library import Entry, find_initial_law, list_files, load_law, part_toml, resting_lengths, save, to_toml
 from ...physics.muscle.characteristic import ValidityRange, maxwell_defect, validity_range_of
 from ...recording import Recording
-from ..requests import FitRequest, ReadingRequest, RequestError, check_one_length, fit_requested, option, request
+from ..requests import (
+    FitRequest,
+    ReadingRequest,
+    RequestError,
+    check_one_length,
+    fit_requested,
+    option,
+    optional,
+    request,
+)
 from .delivery import deliver, print_result
 from .execution import Execution
 from .measurements import Files, read_recordings, reading_chapters
@@ -66,7 +75,7 @@ def fit(
 class VolumeRequest:
     """What the fit of a volume is asked for."""
 
-    muscle: str | None = option("Muscle whose geometry is replaced, for the Maxwell defect.", default=None)
+    muscle: str | None = optional("Muscle whose geometry is replaced, for the Maxwell defect.")
     temperature: float = option("Temperature of the air at both ends of a fill.", unit="K", default="293.15 K")
 
 
@@ -151,10 +160,10 @@ Out = Annotated[
 class ApproximateRequest:
     """Range and degree of an approximation."""
 
-    min_pressure: float | None = option(LIMIT, unit="Pa", default=None)
-    max_pressure: float | None = option(LIMIT, unit="Pa", default=None)
-    min_contraction: float | None = option(LIMIT, unit="1", default=None)
-    max_contraction: float | None = option(LIMIT, unit="1", default=None)
+    min_pressure: float | None = optional(LIMIT, unit="Pa")
+    max_pressure: float | None = optional(LIMIT, unit="Pa")
+    min_contraction: float | None = optional(LIMIT, unit="1")
+    max_contraction: float | None = optional(LIMIT, unit="1")
     degree: int = option("Total degree of a ContractileSurface.", default=5, bounds=(1, 9))
 
     def validity_range(self, entry: Entry) -> ValidityRange:

@@ -13,7 +13,7 @@ from ...core import check_writable, counted
 from ...files.library import list_files, part_toml, scenario_toml
 from ...files.scenario.identification import load_dynamic_fit
 from ...recording.recording import row_notes
-from ..requests import WEAK, ReadingRequest, option, request
+from ..requests import WEAK, ReadingRequest, many, option, optional, request
 from ..requests.joint import JointFitRequest, fit_requested_arm, inspect_requested
 from .delivery import deliver
 from .measurements import Files, read_recordings, reading_chapters
@@ -29,14 +29,11 @@ Study = Annotated[
 class DynamicFitRequest:
     """What a dynamic fit is asked for beyond its file."""
 
-    profile: tuple[str, ...] = option(
-        "Profile likelihood of this parameter; 'weak': of all undetermined ones. Repeatable.", default=(),
-        metavar="PARAMETER",
+    profile: tuple[str, ...] = many(
+        "Profile likelihood of this parameter; 'weak': of all undetermined ones. Repeatable.", metavar="PARAMETER",
     )  # fmt: skip
     points: int = option("Values of a profile on either side of the estimate.", default=5, bounds=(2, 50))
-    starts: int | None = option(
-        "Number of initial guesses; default: that of the file.", default=None, bounds=(1, 10_000)
-    )
+    starts: int | None = optional("Number of initial guesses; default: that of the file.", bounds=(1, 10_000))
 
 
 @with_requests

@@ -15,7 +15,7 @@ from ...bench.identify.hysteresis.loops import CURVE_DEGREE
 from ...core import check_writable
 from ...files.library import Entry, load_law, part_toml, to_toml, without_parts
 from ...physics.muscle.characteristic.base import ForceLaw
-from ..requests import ReadingRequest, RequestError, Where, option, request
+from ..requests import ReadingRequest, RequestError, Where, option, optional, request
 from .delivery import deliver
 from .measurements import Files, read_recordings, reading_chapters
 from .options import Folder, Json, with_requests
@@ -26,9 +26,7 @@ from .terminal import echo
 class HysteresisRequest:
     """What the fit of friction models is asked for."""
 
-    muscle: str | None = option(
-        "Muscle to which the friction is added: a library entry or a muscle file.", default=None
-    )
+    muscle: str | None = optional("Muscle to which the friction is added: a library entry or a muscle file.")
     use_characteristic: bool = option(
         "Take the muscle's characteristic plus an offset as the friction-free curve; default: a polynomial.",
         default=False,

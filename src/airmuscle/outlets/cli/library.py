@@ -17,7 +17,7 @@ from ...files.library.files import DATA, FOLDERS, LAWS, list_data, list_laws, li
 from ...physics.muscle.characteristic import ForceLaw
 from ...physics.muscle.isobars import describe_point
 from ...report.write import rendered_figure, save_table
-from ..requests import RequestError, Where, option, read_pair, request
+from ..requests import RequestError, Where, many, optional, read_pair, request
 from .delivery import print_result, write_result
 from .options import Json, Name, OptionalFolder, with_requests
 from .terminal import echo, print_json, print_table
@@ -27,15 +27,11 @@ from .terminal import echo, print_json, print_table
 class EntryRequest:
     """How an entry differs from its file."""
 
-    resting_length: str | None = option(
-        "Scale the muscle to this resting length: '200 mm'.", default=None, metavar="QUANTITY"
-    )
-    diameter: str | None = option(
-        "Scale a McKibben muscle to this braid diameter at rest.", default=None, metavar="QUANTITY"
-    )
-    set: tuple[Any, ...] = option(
+    resting_length: str | None = optional("Scale the muscle to this resting length: '200 mm'.", metavar="QUANTITY")
+    diameter: str | None = optional("Scale a McKibben muscle to this braid diameter at rest.", metavar="QUANTITY")
+    set: tuple[Any, ...] = many(
         "Another value of a parameter, by its path: characteristic.slope_factor=2, 'geometry.radius=10 mm'. "
-        "Repeatable.", default=(), metavar="PATH=VALUE", read=read_pair,
+        "Repeatable.", metavar="PATH=VALUE", read=read_pair,
     )  # fmt: skip
 
     def load(self, name: str, find: Callable[[str], Any] = load_law) -> Any:
@@ -79,11 +75,11 @@ def with_values(entry: Any, changes: Mapping[str, float | str]) -> Any:
 class EvaluateRequest:
     """Two of pressure, contraction and force."""
 
-    pressure: float | None = option(
-        "Pressure with unit: '3 bar' (gauge), '400 kPa', '4 bara' (at 101.325 kPa ambient).", unit="Pa", default=None
+    pressure: float | None = optional(
+        "Pressure with unit: '3 bar' (gauge), '400 kPa', '4 bara' (at 101.325 kPa ambient).", unit="Pa"
     )
-    contraction: float | None = option("Contraction: 0.12 or '12 %'.", unit="1", default=None)
-    force: float | None = option("Tension with unit: '100 N', '0.1 kN'.", unit="N", default=None)
+    contraction: float | None = optional("Contraction: 0.12 or '12 %'.", unit="1")
+    force: float | None = optional("Tension with unit: '100 N', '0.1 kN'.", unit="N")
 
     def check(self, where: Where) -> None:
         """Raise RequestError unless two quantities are given."""

@@ -18,7 +18,7 @@ from ...files.library import load_data
 from ...recording import Recording
 from ...recording.recording import row_notes
 from ...report.chapter import Chapter
-from ..requests import ReadingRequest, option, request
+from ..requests import ReadingRequest, option, optional, request
 from .delivery import deliver
 from .options import Json, OptionalFolder, complete_data, with_requests
 from .terminal import echo, print_json, reading_progress
@@ -118,9 +118,7 @@ class ConvertRequest:
     """Form of the files that are written."""
 
     plain: bool = option("CSV without comments, as pandas and spreadsheets expect it.", default=False)
-    max_rows: int | None = option(
-        "Keep every n-th row, N at most; default: all rows.", default=None, bounds=(1, math.inf)
-    )
+    max_rows: int | None = optional("Keep every n-th row, N at most; default: all rows.", bounds=(1, math.inf))
 
 
 @with_requests

@@ -13,7 +13,7 @@ from ...files.library import is_path, load_law, read_toml
 from ...files.scenario.identification import load_dynamic_fit
 from ...physics.muscle.characteristic import ValidityRange
 from ...report.write import save_table
-from ..requests.declaration import RequestError, option, request
+from ..requests.declaration import RequestError, many, option, optional, request
 from ..requests.size import SizeRequest
 from .delivery import deliver
 from .options import Json, Name, OptionalFolder, with_requests
@@ -26,11 +26,9 @@ PLAN_FILE = "plan.csv"
 class PlanRequest:
     """Limits of a test bench and of its plan, or the parameters that a further record is to separate."""
 
-    max_pressure: float | None = option(
-        "Maximum pressure, such as '6 bar'; needed for static runs.", unit="Pa", default=None
-    )
-    max_force: float | None = option(
-        "Maximum force of the load cell or frame, such as '1 kN'; needed for static runs.", unit="N", default=None
+    max_pressure: float | None = optional("Maximum pressure, such as '6 bar'; needed for static runs.", unit="Pa")
+    max_force: float | None = optional(
+        "Maximum force of the load cell or frame, such as '1 kN'; needed for static runs.", unit="N"
     )
     min_pressure: float = option("Minimum pressure.", unit="Pa", default="50 kPa")
     max_contraction: float = option("Maximum contraction.", unit="1", default="25 %")
@@ -42,11 +40,9 @@ class PlanRequest:
     sigma: float = option(
         "Standard deviation of a measured value, in the SI unit of the fitted quantity (mostly N).", default=1.0
     )
-    fix: tuple[str, ...] = option(
-        "Parameter that the fit will keep fixed; repeatable.", default=(), metavar="PARAMETER"
-    )
-    separate: tuple[str, ...] = option(
-        "Study of fit-dynamic: one of the two parameters to separate; give two.", default=(), metavar="PARAMETER"
+    fix: tuple[str, ...] = many("Parameter that the fit will keep fixed; repeatable.", metavar="PARAMETER")
+    separate: tuple[str, ...] = many(
+        "Study of fit-dynamic: one of the two parameters to separate; give two.", metavar="PARAMETER"
     )
 
 

@@ -11,7 +11,7 @@ from ...bench.identify.prediction.prediction_chapter import prediction_chapters
 from ...core import FileError, check_writable
 from ...files.library import PlantEntry, is_path, kind_of, list_plants, load_law, read_toml
 from ...files.scenario.prediction import load_plant_model, predict_with_entry
-from ..requests import ReadingRequest, RequestError, Where, option, request
+from ..requests import ReadingRequest, RequestError, Where, many, optional, request
 from .delivery import deliver
 from .measurements import read_recordings, reading_chapters
 from .options import Folder, Json, complete_model, with_requests
@@ -36,14 +36,12 @@ Records = Annotated[
 class PredictRequest:
     """What the prediction of transient records is asked for."""
 
-    start_time: float | None = option(
-        "Scenario: time of the record at which its input begins; default 0 s.", unit="s", default=None
+    start_time: float | None = optional(
+        "Scenario: time of the record at which its input begins; default 0 s.", unit="s"
     )
-    start_margin: float | None = option(
-        "Scenario: estimate the start time within this margin, '50 ms'.", unit="s", default=None
-    )
-    own: tuple[str, ...] = option(
-        "Scenario: parameter that is estimated from each record; repeatable.", default=(), metavar="PARAMETER"
+    start_margin: float | None = optional("Scenario: estimate the start time within this margin, '50 ms'.", unit="s")
+    own: tuple[str, ...] = many(
+        "Scenario: parameter that is estimated from each record; repeatable.", metavar="PARAMETER"
     )
 
     def check(self, where: Where) -> None:

@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from ..requests.declaration import option, request
+from ..requests.declaration import option, optional, request
 from ..studio import export_page, serve
 from ..studio.page import open_sheets
 from ..studio.server import warning_of
@@ -24,9 +24,7 @@ class StudioRequest:
         metavar="ADDRESS",
     )  # fmt: skip
     browser: bool = option("Open the page in the browser.", default=True, flag="--browser/--no-browser")
-    export: Path | None = option(
-        "Write one self-contained page instead, without a server.", default=None, metavar="FILE.html"
-    )
+    export: Path | None = optional("Write one self-contained page instead, without a server.", metavar="FILE.html")
 
 
 @with_requests

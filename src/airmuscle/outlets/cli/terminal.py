@@ -12,18 +12,17 @@ import typer
 
 from ...bench.readers.missing_values import MISSING_VALUES
 from ...bench.readers.time_base import TIME_BASES
-from ...core import Hint, HintedText, printable
+from ...core import Hint, printable
 from ...report.chapter import Table
 from ...report.data import as_json
 from ...report.text import table_lines
+from ..requests.declaration import Instruction, reworded
 from .interruption import check_interrupted
 
 TIME_BASE_NAMES = {base: name for name, base in TIME_BASES.items()}
 """Names of the time bases of the option --time."""
 MISSING_NAMES = {treatment: name for name, treatment in MISSING_VALUES.items()}
 """Names of the treatments of missing values of the option --missing."""
-Instruction = Callable[[Hint], str]
-"""The end of a sentence that states what to do on the command line."""
 
 
 def _toml_table(hint: Hint) -> str:
@@ -100,15 +99,7 @@ INSTRUCTIONS: Mapping[str, Mapping[str, Instruction]] = {
 
 def in_options(text: str, command: str | None) -> str:
     """The text with hints in the words of a command; a hint for which the command has no remedy is omitted."""
-    if not isinstance(text, HintedText):
-        return text
-    instructions = INSTRUCTIONS.get(command or "", {})
-
-    def sentence(hint: Hint) -> str:
-        instruction = instructions.get(hint.argument or hint.function)
-        return f"{hint.purpose}, {instruction(hint)}." if instruction else ""
-
-    return text.written(sentence)
+    return reworded(text, INSTRUCTIONS.get(command or "", {}))
 
 
 WIDE = 160

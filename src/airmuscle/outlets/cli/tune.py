@@ -26,7 +26,7 @@ from ...engine.processes import Workers
 from ...files.library.files import is_path
 from ...files.scenario.controller import signal_units
 from ...report.write import save_table
-from ..requests.declaration import RequestError, option, request
+from ..requests.declaration import RequestError, many, option, request
 from .delivery import deliver
 from .execution import Execution
 from .interruption import check_interrupted
@@ -63,9 +63,9 @@ def read_factors(text: str, where: str) -> tuple[float, ...]:
 class TuneRequest:
     """What a tuning is asked for."""
 
-    bounds: tuple[str, ...] = option(
+    bounds: tuple[str, ...] = many(
         "Range of a gain, such as 'gain=5 1/m:500 1/m'; repeatable. Default: every gain and time that is not 0, from a "
-        "tenth of its present value to ten times it.", default=(), metavar="GAIN=MIN:MAX",
+        "tenth of its present value to ten times it.", metavar="GAIN=MIN:MAX",
     )  # fmt: skip
     index: type[TrackingIndex] = option(
         f"Tracking index of a run: {', '.join(INDICES)}.", choices=INDICES, default="rmse"
@@ -171,10 +171,8 @@ class BenchmarkRequest:
     valves: Callable[..., BenchmarkJoint] = option(
         "Valves of the joint.", choices=JOINTS, default="proportional", metavar="|".join(JOINTS)
     )
-    controller: tuple[str, ...] = option(
-        "A controller, or a scenario file with one; repeat it for more. Default: all.", default=()
-    )
-    task: tuple[str, ...] = option("A task; repeat it for several. Default: all.", default=())
+    controller: tuple[str, ...] = many("A controller, or a scenario file with one; repeat it for more. Default: all.")
+    task: tuple[str, ...] = many("A task; repeat it for several. Default: all.")
     truths: int = option(
         "Plants on which controllers are judged.", default=len(TRUTH_SEEDS), bounds=(1, len(TRUTH_SEEDS))
     )

@@ -24,10 +24,9 @@ from ...physics.mechanism.loads import SHORTENING, SHORTENING_SPEED
 from ...physics.plant import Plant, open_plant
 from .printed_system import make_labels
 
-SAFETY = 1.0
-"""Largest product of the default step and the fastest rate of the plant; 2.8 is the limit of the method (chosen)."""
-MAX_STEP = 1e-3
-"""Longest default step [s] (chosen)."""
+SAFETY, MAX_STEP = 1.0, 1e-3
+"""Largest product of the default step and the fastest rate of the plant, of which 2.8 is the limit of the method, and
+longest default step [s] (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -84,15 +84,15 @@ def build_and_run(sources: Sequence[Path]) -> BuiltProgram:
 
     Raises ParameterError where there is no compiler, and FileError where the compiler or the program fails.
     """
-    files = " ".join(p.name for p in sources if p.suffix == ".c")
+    units = [p for p in sources if p.suffix == ".c"]
     compiler = find_compiler(
-        f". The sources are in {sources[0].parent}; install gcc or clang, or compile them elsewhere: cc -O2 {files} "
-        "-lm -o program. JavaScript and Octave need no compiler."
+        f". The sources are in {sources[0].parent}; install gcc or clang, or compile them elsewhere: cc -O2 "
+        f"{' '.join(p.name for p in units)} -lm -o program. JavaScript and Octave need no compiler."
     )
     with temporary_folder() as folder:
-        program, units = folder / "program", [str(p) for p in sources if p.suffix == ".c"]
-        run_command([compiler, "-std=c99", "-O2", "-ffp-contract=off", *units, "-o", str(program), "-lm"])
-        done = run_command([str(program)])
+        program = str(folder / "program")
+        run_command([compiler, "-std=c99", "-O2", "-ffp-contract=off", *map(str, units), "-o", program, "-lm"])
+        done = run_command([program])
         code, _ = measure_sizes([compiler], shutil.which("size"), sources, folder)
         return BuiltProgram(done.stdout, done.stderr, code)
 
@@ -108,16 +108,14 @@ def measure_sizes(
     units = [p for p in sources if p.suffix == ".c" and p.name != "main.c"]
     if not units:
         return None, None
-    code, stack = 0, 0
-    options = ["-std=c99", "-Os", "-ffp-contract=off", "-fstack-usage", "-c"]
+    code, stack, options = 0, 0, ["-std=c99", "-Os", "-ffp-contract=off", "-fstack-usage", "-c"]
     for unit in units:
         target = folder / f"{unit.stem}.o"
         run_command([*command, *options, str(unit), "-o", str(target)])
         numbers = re.search(r"^\s*(\d+)", run_command([size, str(target)]).stdout, re.MULTILINE) if size else None
         code += int(numbers.group(1)) if numbers else 0
         usage = target.with_suffix(".su")
-        text = usage.read_text() if usage.exists() else ""
-        stack += sum(int(n) for n in re.findall(r"\t(\d+)\t", text))
+        stack += sum(map(int, re.findall(r"\t(\d+)\t", usage.read_text() if usage.exists() else "")))
     return code or None, stack or None
 
 
@@ -227,9 +225,8 @@ def find_cross_compiler() -> list[str]:
 
 def this_platform() -> Platform:
     """The platform of this machine."""
-    system = {"win32": "windows", "darwin": "darwin"}.get(sys.platform, "linux")
-    suffix = {"windows": ".dll", "darwin": ".dylib", "linux": ".so"}[system]
+    systems = {"win32": ("windows", ".dll", "win64"), "darwin": ("darwin", ".dylib", "darwin64")}
+    system, suffix, of_fmi_2 = systems.get(sys.platform, ("linux", ".so", "linux64"))
     machine = {"AMD64": "x86_64", "arm64": "aarch64"}.get(platform.machine(), platform.machine())
-    of_fmi_2 = {"windows": "win64", "darwin": "darwin64", "linux": "linux64"}[system]
     folder = f"{machine}-{system}"
     return Platform(of_fmi_2 if machine == "x86_64" or system == "darwin" else folder, folder, suffix)

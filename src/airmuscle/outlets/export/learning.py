@@ -5,7 +5,7 @@ import dataclasses
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -109,7 +109,7 @@ def _model(
         nodes.append(helper.make_node("Concat", [f"{name}_table{i}" for i in range(len(elements))], [name], axis=0))
         outputs.append(helper.make_tensor_value_info(name, kind, (len(elements), "count")))
     constants: dict[str, Any] = {
-        name: np.int64(value) if name[0] == "i" else number(value) for name, value in graph.constants.items()
+        key: np.int64(value) if key[0] == "i" else number(value) for key, value in graph.constants.items()
     }
     defaults = np.array([float(leaf.value) for leaf in model.parameters], number)[:, None]
     constants |= {"first_axis": np.zeros(1, np.int64), **({} if tunable else {"parameters": defaults})}
@@ -172,9 +172,6 @@ class ExportedActuator:
 class Stack(abc.ABC):
     """A learning stack that an actuator is written for."""
 
-    word: ClassVar[str]
-    """Name of the stack in file names and in the option --to."""
-
     @abc.abstractmethod
     def files(self, actuator: ExportedActuator) -> dict[str, str | bytes]:
         """The files by name."""
@@ -184,8 +181,6 @@ class Stack(abc.ABC):
 class TorchStack(Stack):
     """A module of PyTorch, with adapters for mjlab and Isaac Lab."""
 
-    word: ClassVar[str] = "torch"
-
     def files(self, actuator: ExportedActuator) -> dict[str, str | bytes]:
         return actuator.files(TorchLanguage(), {"": "torch", "_mjlab": "mjlab", "_isaaclab": "isaaclab"})
 
@@ -194,7 +189,6 @@ class TorchStack(Stack):
 class WarpStack(Stack):
     """Kernels of NVIDIA Warp, with an adapter for Newton."""
 
-    word: ClassVar[str] = "warp"
     precision: Precision = Single()
 
     def files(self, actuator: ExportedActuator) -> dict[str, str | bytes]:
@@ -206,7 +200,6 @@ class WarpStack(Stack):
 class OnnxStack(Stack):
     """Graphs of ONNX with states as inputs and outputs: one of the start, one of a step."""
 
-    word: ClassVar[str] = "onnx"
     precision: Precision = Double()
     tunable: bool = False
     """Whether the parameters are an input."""

@@ -147,10 +147,10 @@ def write_mujoco_plugin(plant: Plant, folder: str | Path, *, name: str = "", mus
     files = _sources(part, program, controls, lines)
     library, remark = f"lib{program}_plugin.so", ""
     try:
-        folder = Path(check_mujoco().__file__).parent
-        linked = [str(path) for path in sorted(folder.glob("libmujoco.*"))[:1]]
+        installed = Path(check_mujoco().__file__).parent
+        linked = [str(path) for path in sorted(installed.glob("libmujoco.*"))[:1]]
         units = [file for file in files if file.endswith(".c")]
-        files[library] = compile_library(files, units, library, [f"-I{folder / 'include'}", *linked])
+        files[library] = compile_library(files, units, library, [f"-I{installed / 'include'}", *linked])
     except ParameterError as reason:
         remark = str(reason)
     written = dict(zip(files, write_files(files, folder), strict=True))

@@ -59,8 +59,7 @@ class ExportedSystem:
         states, inputs = self.compiled.system.states, self.compiled.system.input_variables
         units, outputs = self.units, self.known.output_names
         return make_labels({
-            "x": [(s.name, s.unit, s.meaning) for s in states],
-            "u": [(i.name, i.unit, i.meaning) for i in inputs],
+            "x": [(s.name, s.unit, s.meaning) for s in states], "u": [(i.name, i.unit, i.meaning) for i in inputs],
             "o": [(name, units[name], meaning_of(name)) for name in outputs],
             "p": [(leaf.path, leaf.declared.unit, leaf.declared.meaning) for leaf in self.tunable],
             "f": [(f"{s.name}_rate", per_second(s.unit), "") for s in states],

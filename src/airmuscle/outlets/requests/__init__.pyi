@@ -2,7 +2,9 @@ from .declaration import Option as Option
 from .declaration import RequestError as RequestError
 from .declaration import build as build
 from .declaration import form_fields as form_fields
+from .declaration import many as many
 from .declaration import option as option
+from .declaration import optional as optional
 from .declaration import options_of as options_of
 from .declaration import request as request
 from .fit import BraidRequest as BraidRequest

@@ -13,7 +13,7 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar, dataclass_transform
 
-from ...core import InputError, quantity, suggestion
+from ...core import Hint, HintedText, InputError, quantity, suggestion
 
 T = TypeVar("T")
 Where = Callable[[str], str]
@@ -29,6 +29,23 @@ class RequestError(InputError):
     def __init__(self, message: str, field: str = "") -> None:
         super().__init__(message)
         self.field = field
+
+
+Instruction = Callable[[Hint], str]
+"""The end of a sentence that states what to do in the words of an outlet."""
+
+
+def reworded(text: str, instructions: Mapping[str, Instruction]) -> str:
+    """The text with its hints in the words of an outlet, by argument or function; a hint without a remedy there is
+    omitted."""
+    if not isinstance(text, HintedText):
+        return text
+
+    def sentence(hint: Hint) -> str:
+        instruction = instructions.get(hint.argument or hint.function)
+        return f"{hint.purpose}, {instruction(hint)}." if instruction else ""
+
+    return text.written(sentence)
 
 
 def check_rules(rules: Mapping[str, Any]) -> None:
@@ -118,6 +135,16 @@ def option(meaning: str, *, default: Any = dataclasses.MISSING, choices: Any = N
     if isinstance(default, str):
         value = Option("default", str, False, **{**metadata, "default": None}).convert(default, "default")
     return dataclasses.field(metadata={_KEY: metadata}, default=value)
+
+
+def optional(meaning: str, **declared: Any) -> Any:
+    """Declare a field that is None unless it is given."""
+    return option(meaning, default=None, **declared)
+
+
+def many(meaning: str, **declared: Any) -> Any:
+    """Declare a field that may be given several times."""
+    return option(meaning, default=(), **declared)
 
 
 @dataclass_transform(frozen_default=True, kw_only_default=True, field_specifiers=(option,))

@@ -12,7 +12,7 @@ from ...core import ParameterError, quantity, tree
 from ...files.library import Entry, resting_lengths
 from ...physics.muscle.geometry import Braid, Geometry
 from ...recording import Recording
-from .declaration import RequestError, Where, check_rules, option, request
+from .declaration import RequestError, Where, check_rules, many, option, optional, request
 
 _UNITS = {"radius": "m", "angle": "rad"}
 
@@ -28,12 +28,12 @@ class BraidSize(NamedTuple):
 class BraidRequest:
     """The braid in two fields of a form, both or none."""
 
-    braid_radius: float | None = option(
-        "Outer radius of the braid at rest.", unit="m", default=None,
+    braid_radius: float | None = optional(
+        "Outer radius of the braid at rest.", unit="m",
         label="Radius of the braid, for the geometry of the muscle file", example="optional: 10 mm",
     )  # fmt: skip
-    braid_angle: float | None = option(
-        "Angle between threads and axis at rest.", unit="rad", default=None,
+    braid_angle: float | None = optional(
+        "Angle between threads and axis at rest.", unit="rad",
         label="Angle of the braid to the axis at rest", example="optional: 24.4 deg",
     )  # fmt: skip
 
@@ -138,52 +138,47 @@ def read_free_contraction(text: str, where: str) -> tuple[float, float]:
 class FitRequest:
     """What a static fit is asked for."""
 
-    characteristic: str | None = option(
+    characteristic: str | None = optional(
         "Initial law: a library entry, a muscle file (TOML), or a model that needs no initial values, such as "
-        "ContractileSurface.", default=None,
+        "ContractileSurface.",
     )  # fmt: skip
     compare: bool = option("Fit every characteristic that the data determine, and rank them.", default=False)
-    leave_out: GroupSplit | None = option(
+    leave_out: GroupSplit | None = optional(
         "Groups of rows for cross-validation (--compare) and resampling (--bootstrap): run, specimen, contraction, "
-        "pressure, block.", choices=SPLITS, default=None, metavar="GROUP", label="Cross-validation leaves out",
+        "pressure, block.", choices=SPLITS, metavar="GROUP", label="Cross-validation leaves out",
         offered=(("", "automatic"), *((name, shown) for name, (_, shown) in _SPLITS.items())),
     )  # fmt: skip
-    purpose: str | None = option(
+    purpose: str | None = optional(
         "Use of the law that --compare recommends: repeat (further runs of the measured muscles), length (other "
         "muscles of the type), both (one law for both). Default: both, if three specimens or more were each measured "
-        "in several runs.", choices=tuple(PURPOSES), default=None, metavar="PURPOSE",
+        "in several runs.", choices=tuple(PURPOSES), metavar="PURPOSE",
     )  # fmt: skip
-    bootstrap: int | None = option(
-        "Bootstrap with N refits to resampled groups of rows.", default=None, bounds=(20, 100_000)
-    )
-    profile: tuple[str, ...] = option(
-        "Profile-likelihood interval of this parameter; 'weak': of all weakly determined ones. Repeatable.", default=(),
+    bootstrap: int | None = optional("Bootstrap with N refits to resampled groups of rows.", bounds=(20, 100_000))
+    profile: tuple[str, ...] = many(
+        "Profile-likelihood interval of this parameter; 'weak': of all weakly determined ones. Repeatable.",
         metavar="PARAMETER",
     )  # fmt: skip
-    length_error: tuple[str, ...] = option(
+    length_error: tuple[str, ...] = many(
         "Estimate the error of the recorded resting length of this specimen together with the law. Repeatable.",
-        default=(), metavar="SPECIMEN",
+        metavar="SPECIMEN",
     )  # fmt: skip
     shape: bool = option(
         "Constrain a ContractileSurface: force must not decrease with pressure nor increase with contraction.",
         default=False,
     )
-    free_contraction: tuple[Any, ...] = option(
-        "With --shape: a point of zero force (free contraction), such as '3 bar=18 %'. Repeatable.", default=(),
+    free_contraction: tuple[Any, ...] = many(
+        "With --shape: a point of zero force (free contraction), such as '3 bar=18 %'. Repeatable.",
         metavar="PRESSURE=CONTRACTION", read=read_free_contraction,
     )  # fmt: skip
-    braid: BraidSize | None = option(
+    braid: BraidSize | None = optional(
         "Braid at rest, such as 'radius=10 mm, angle=24.4 deg' (outer radius; angle between threads and axis): the "
-        "[geometry] of a muscle whose law contains none. Requires the resting length.", default=None, metavar="SIZE",
-        read=read_braid,
+        "[geometry] of a muscle whose law contains none. Requires the resting length.", metavar="SIZE", read=read_braid,
     )  # fmt: skip
     degree: int = option("Total degree of a ContractileSurface.", default=5, bounds=(1, 9))
-    fix: tuple[str, ...] = option(
-        "Keep this parameter at its initial value; repeatable.", default=(), metavar="PARAMETER"
-    )
-    robust: str | None = option(
+    fix: tuple[str, ...] = many("Keep this parameter at its initial value; repeatable.", metavar="PARAMETER")
+    robust: str | None = optional(
         "Threshold of the Huber loss, such as '10 N' or '0.5 %'; default: squared. With --compare: a force.",
-        default=None, metavar="QUANTITY",
+        metavar="QUANTITY",
     )  # fmt: skip
     uncensored: bool = option("Fit rows at zero force as measured values, not as censored data.", default=False)
     equal_weights: bool = option("Equal weights; default: by the sensor resolution of each test rig.", default=False)

@@ -17,7 +17,7 @@ from ...files.scenario import load_scenario
 from ...files.scenario.plant_uncertainty import uncertainty_table
 from ...physics import PressureDriven
 from ...report.chapter import Chapter
-from .declaration import RequestError, Where, option, request
+from .declaration import RequestError, Where, many, option, optional, request
 
 FIRST_LAG = 0.02
 """Lag [s] of the pressures from which the search of a known joint starts (chosen)."""
@@ -29,15 +29,14 @@ DURATION, STEP = 2.0, 0.15
 class JointFitRequest:
     """What the identification of a joint is asked for."""
 
-    mapping: Path | None = option(
-        "Mapping file (TOML): which column is what. Without it one is proposed, and nothing is fitted.", default=None
+    mapping: Path | None = optional(
+        "Mapping file (TOML): which column is what. Without it one is proposed, and nothing is fitted."
     )
     inspect: bool = option("State what the record contains; fit nothing.", default=False)
-    left_out: float | None = option(
+    left_out: float | None = optional(
         "Share of the episodes, the last ones, that judges the fit; default: a tenth, or 19 episodes if that is more, "
-        "but a third at most.", default=None, metavar="SHARE", bounds=(0.01, 0.9),
-        label="Share of the episodes that judges the fit", hint="empty: at least 19 of them, a third at most",
-        example="0.1",
+        "but a third at most.", metavar="SHARE", bounds=(0.01, 0.9), label="Share of the episodes that judges the fit",
+        hint="empty: at least 19 of them, a third at most", example="0.1",
     )  # fmt: skip
     horizon: int = option(
         "Rows of the free run.", default=40, bounds=(5, 1000), metavar="ROWS", label="Rows of the free run",
@@ -48,16 +47,16 @@ class JointFitRequest:
         default=False, label="A hybrid law for what physics leaves (takes longer)",
     )  # fmt: skip
     seed: int = option("Seed of the order of the windows.", default=0)
-    known: str | None = option(
+    known: str | None = optional(
         "A joint of known muscles and geometry, a scenario or a plant of the library: the numbers of --free are "
-        "estimated.", default=None, metavar="SCENARIO",
+        "estimated.", metavar="SCENARIO",
         complete=lambda incomplete: [name for name in list_plants() if name.startswith(incomplete)],
         label="Joint of known muscles and geometry", hint="a plant of the library, or the text of a scenario",
         example="joint-dmsp-20-matrix",
     )  # fmt: skip
-    free: tuple[str, ...] = option(
+    free: tuple[str, ...] = many(
         "With --known: path of a parameter that is estimated, zeros, gains or lags. Repeatable; by default inertia, "
-        "damping, offset, weight and friction of the mechanism, lags and zeros.", default=(), metavar="PATH",
+        "damping, offset, weight and friction of the mechanism, lags and zeros.", metavar="PATH",
         label="Parameters of a known joint that are estimated", hint="empty: mechanism, lags and zeros",
         example="mechanism.inertia, zeros",
     )  # fmt: skip

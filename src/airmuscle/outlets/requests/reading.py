@@ -6,7 +6,7 @@ from typing import Any
 from ...bench.readers import ColumnMapping
 from ...bench.readers.mapping import mapping_of_tables, read_mapping
 from ...bench.readers.missing_values import parse_code
-from .declaration import RequestError, option, request
+from .declaration import RequestError, many, optional, request
 
 
 def read_pair(text: str, where: str) -> tuple[str, str]:
@@ -25,74 +25,67 @@ Pairs = tuple[Any, ...]
 class ReadingRequest:
     """How measurement files are read; each field has precedence over the mapping file, and this over the files."""
 
-    resting_length: str | None = option(
-        "Length without pressure and load, such as '300 mm'.", default=None, metavar="QUANTITY",
+    resting_length: str | None = optional(
+        "Length without pressure and load, such as '300 mm'.", metavar="QUANTITY",
         label="Resting length, without pressure and load", example="300 mm",
     )  # fmt: skip
-    ambient: str | None = option(
-        "Ambient pressure, subtracted from absolute pressures, such as '98 kPa'.", default=None, metavar="QUANTITY",
+    ambient: str | None = optional(
+        "Ambient pressure, subtracted from absolute pressures, such as '98 kPa'.", metavar="QUANTITY",
         label="Ambient pressure (for absolute pressures)", example="98 kPa",
     )  # fmt: skip
-    unit: Pairs = option(
-        "Unit of a column whose header states none; repeatable.", default=(), metavar="COLUMN=UNIT", read=read_pair
-    )
-    mapping: Path | None = option(
-        "Column mapping (TOML) for headers without quantity or unit.", default=None, metavar="FILE"
-    )
-    column: Pairs = option(
-        "Header of a column, by name or number: 'Channel 1=pressure [bara]', '3=length [mm]'. Repeatable.", default=(),
+    unit: Pairs = many("Unit of a column whose header states none; repeatable.", metavar="COLUMN=UNIT", read=read_pair)
+    mapping: Path | None = optional("Column mapping (TOML) for headers without quantity or unit.", metavar="FILE")
+    column: Pairs = many(
+        "Header of a column, by name or number: 'Channel 1=pressure [bara]', '3=length [mm]'. Repeatable.",
         metavar="COLUMN=HEADER", read=read_pair,
     )  # fmt: skip
-    constant: Pairs = option(
-        "Quantity that was held and not recorded, 'length=73.2 mm', or specimen, run. Repeatable.", default=(),
+    constant: Pairs = many(
+        "Quantity that was held and not recorded, 'length=73.2 mm', or specimen, run. Repeatable.",
         metavar="NAME=QUANTITY", read=read_pair,
     )  # fmt: skip
-    file_name: str | None = option(
-        "Values in the names of the files: 'cut{specimen}_held{length [cm]}cm'; {} is any text.", default=None,
+    file_name: str | None = optional(
+        "Values in the names of the files: 'cut{specimen}_held{length [cm]}cm'; {} is any text.",
         metavar="PATTERN", label="Values in file names", example="cut{specimen}_held{length [mm]}mm",
     )  # fmt: skip
-    time: str | None = option(
-        "Time base: recorded, uniform (by the number of rows, for rounded stamps), unordered or none.", default=None,
+    time: str | None = optional(
+        "Time base: recorded, uniform (by the number of rows, for rounded stamps), unordered or none.",
         metavar="BASE", label="Time base",
         offered=(("", "as recorded"), ("uniform", "uniform, for rounded stamps"), ("unordered", "unordered"),
                  ("none", "none")),
     )  # fmt: skip
-    displacement_zero: str | None = option(
+    displacement_zero: str | None = optional(
         "Reading of a displacement, shortening or elongation at the resting length, such as '12 mm'; default: 0.",
-        default=None, metavar="QUANTITY", label="Displacement at the resting length", example="0 mm",
+        metavar="QUANTITY", label="Displacement at the resting length", example="0 mm",
     )  # fmt: skip
-    skip_rows: int | None = option(
-        "Lines above the headings of text files and worksheets; default: detected, or found by --column.", default=None,
+    skip_rows: int | None = optional(
+        "Lines above the headings of text files and worksheets; default: detected, or found by --column.",
         bounds=(0, float("inf")), label="Lines above the headings", example="detected",
     )  # fmt: skip
-    missing: str | None = option(
+    missing: str | None = optional(
         "Missing values (empty, '---', NaN, '#N/A', --missing-code): error (default), drop (leave out the rows), "
-        "interpolate (short gaps in time; other rows are left out).", default=None, metavar="TREATMENT",
-        label="Missing values",
+        "interpolate (short gaps in time; other rows are left out).", metavar="TREATMENT", label="Missing values",
         offered=(("", "are an error"), ("drop", "leave out the rows"), ("interpolate", "interpolate short gaps")),
     )  # fmt: skip
-    missing_code: tuple[Any, ...] = option(
-        "Number or text that stands for a missing value: -999. Repeatable.", default=(), metavar="CODE",
+    missing_code: tuple[Any, ...] = many(
+        "Number or text that stands for a missing value: -999. Repeatable.", metavar="CODE",
         read=lambda text, where: parse_code(text), label="Codes of missing values", example="-999, OL",
     )  # fmt: skip
-    outliers: str | None = option(
-        "Suspected outliers, as inspect lists them: keep (default) or drop (leave out).", default=None,
+    outliers: str | None = optional(
+        "Suspected outliers, as inspect lists them: keep (default) or drop (leave out).",
         metavar="TREATMENT", label="Suspected outliers", offered=(("", "keep"), ("drop", "leave out")),
     )  # fmt: skip
-    delimiter: str | None = option(
-        "Column delimiter of text files; default: detected.", default=None, metavar="CHARACTER",
+    delimiter: str | None = optional(
+        "Column delimiter of text files; default: detected.", metavar="CHARACTER",
         label="Column delimiter of text files",
         offered=(("", "detected"), (";", "semicolon"), (",", "comma"), ("\t", "tab"), (" ", "blank")),
     )  # fmt: skip
-    decimal: str | None = option(
-        "Decimal mark of text files; default: detected.", default=None, metavar="CHARACTER",
+    decimal: str | None = optional(
+        "Decimal mark of text files; default: detected.", metavar="CHARACTER",
         label="Decimal mark of text files", offered=(("", "detected"), (",", "comma"), (".", "point")),
     )  # fmt: skip
-    sheet: str | None = option(
-        "Worksheet of an Excel file; default: all.", default=None, label="Worksheet of Excel files"
-    )
-    group: str | None = option(
-        "Group of a TDMS or MDF file, struct of a MAT file, segment of an LVM file.", default=None,
+    sheet: str | None = optional("Worksheet of an Excel file; default: all.", label="Worksheet of Excel files")
+    group: str | None = optional(
+        "Group of a TDMS or MDF file, struct of a MAT file, segment of an LVM file.",
         label="Group, struct or segment of TDMS, MDF, HDF5, MAT and LVM files",
     )  # fmt: skip
 

@@ -8,7 +8,7 @@ from ...core import UnitError, quantity
 from ...design.sizing import JointRequirement, LiftRequirement, SizingConditions, SizingResult, size_muscles
 from ...design.sizing.choice import SORT_KEYS, Requirement
 from ...files.library import load_law
-from .declaration import RequestError, Where, option, request
+from .declaration import RequestError, Where, many, option, optional, request
 
 LIFT, JOINT = ("load", "stroke", "stiffness"), ("torque", "angle", "inertia")
 """Fields of either requirement; the first two are needed."""
@@ -38,27 +38,24 @@ class SizeRequest:
     supply: float = option(
         "Supply pressure: '6 bar' (gauge).", unit="Pa", label="Supply pressure", hint="gauge", filled="6 bar"
     )
-    load: Mapping[str, float] | None = option(
-        "Lift: mass or force of the load, '20 kg' or '200 N'.", metavar="QUANTITY", read=read_load, default=None,
+    load: Mapping[str, float] | None = optional(
+        "Lift: mass or force of the load, '20 kg' or '200 N'.", metavar="QUANTITY", read=read_load,
         label="Load", hint="mass or force", filled="20 kg",
     )  # fmt: skip
-    stroke: float | None = option(
-        "Lift: stroke, such as '40 mm'.", unit="m", default=None, label="Stroke", filled="40 mm"
-    )
-    stiffness: float | None = option(
-        "Lift: stiffness of a spring, relaxed at the start: '2 N/mm'.", unit="N/m", default=None,
+    stroke: float | None = optional("Lift: stroke, such as '40 mm'.", unit="m", label="Stroke", filled="40 mm")
+    stiffness: float | None = optional(
+        "Lift: stiffness of a spring, relaxed at the start: '2 N/mm'.", unit="N/m",
         label="Stiffness of a spring", hint="optional: 2 N/mm",
     )  # fmt: skip
-    torque: float | None = option(
-        "Joint: torque in either direction, such as '5 N m'.", unit="N m", default=None,
+    torque: float | None = optional(
+        "Joint: torque in either direction, such as '5 N m'.", unit="N m",
         label="Torque in either direction", filled="5 N m",
     )  # fmt: skip
-    angle: float | None = option(
-        "Joint: range of the angle, such as '60 deg'.", unit="rad", default=None, label="Range of the angle",
-        filled="60 deg",
+    angle: float | None = optional(
+        "Joint: range of the angle, such as '60 deg'.", unit="rad", label="Range of the angle", filled="60 deg",
     )  # fmt: skip
-    inertia: float | None = option(
-        "Joint: inertia, such as '0.05 kg m^2'.", unit="kg m^2", default=None, label="Moment of inertia",
+    inertia: float | None = optional(
+        "Joint: inertia, such as '0.05 kg m^2'.", unit="kg m^2", label="Moment of inertia",
         hint="optional: 0.05 kg m^2",
     )  # fmt: skip
     safety: float = option(
@@ -69,17 +66,17 @@ class SizeRequest:
         "Time of a cycle, there and back.", unit="s", default="2 s", label="Cycle time", hint="there and back",
         filled="2 s",
     )  # fmt: skip
-    max_length: float | None = option(
-        "Maximum nominal length.", unit="m", default=None, label="Maximum length", hint="optional", filled="400 mm"
+    max_length: float | None = optional(
+        "Maximum nominal length.", unit="m", label="Maximum length", hint="optional", filled="400 mm"
     )
-    max_diameter: float | None = option(
-        "Maximum outer diameter.", unit="m", default=None, label="Maximum diameter", hint="optional: 60 mm"
+    max_diameter: float | None = optional(
+        "Maximum outer diameter.", unit="m", label="Maximum diameter", hint="optional: 60 mm"
     )
     max_count: int = option(
         "Maximum number of muscles in parallel.", default=3, label="Maximum number in parallel", filled="3"
     )
-    count: int | None = option("Exact number of muscles in parallel.", default=None)
-    muscle: tuple[str, ...] = option("Muscle or file instead of the catalogue; repeatable.", metavar="NAME", default=())
+    count: int | None = optional("Exact number of muscles in parallel.")
+    muscle: tuple[str, ...] = many("Muscle or file instead of the catalogue; repeatable.", metavar="NAME")
     sort: str = option(
         f"Criterion of ranking: {', '.join(SORT_KEYS)}.", choices=SORT_KEYS, default="air", metavar="KEY",
         label="Rank by", offered=SORTS,

@@ -16,31 +16,18 @@ from . import tasks
 from .fit_routes import FitService
 from .joint_sheet import joint_names, sheet_of_joint
 from .page import MAX_PAGE_SHEETS, self_contained_page, server_page, web_files
-from .security import (
-    Access,
-    Application,
-    BadRequest,
-    cookie_name,
-    given_token,
-    json_answer,
-    limited_text,
-    secured,
-    table_of,
-)
+from .security import Access, Application, BadRequest, json_answer, limited_table, limited_text, secured
 from .worker import LimitError, WorkerPool
 
-WORKERS = 5
-"""Number of worker processes for sheets, some of which are kept ready (chosen)."""
-LONG_WORKERS = 3
-"""The same for what may take long: measurement files, sizings and joints (chosen)."""
+WORKERS, LONG_WORKERS = 5, 3
+"""Number of worker processes for sheets, some of which are kept ready, and of those for what may take long: measurement
+files, sizings and joints (chosen)."""
 TIME_LIMIT = 20.0
 """Limit [s] of the computation of a sheet of a user (chosen)."""
 LIBRARY_LIMIT = 120.0
 """The same of the library, and of a sizing (chosen: a joint with an elaborate law takes some seconds)."""
-MAX_SHEETS = 100
-"""Number of sheets that the server keeps (chosen)."""
-MAX_PAGE = 256 * 1024
-"""Largest size of a request for a self-contained page [bytes] (chosen)."""
+MAX_SHEETS, MAX_PAGE = 100, 256 * 1024
+"""Number of sheets that the server keeps, and largest size of a request for a self-contained page [bytes] (chosen)."""
 LONG_TASKS = (sheet_of_joint, tasks.size_sheet)
 """Tasks that leave the workers of the other sheets free."""
 
@@ -153,10 +140,9 @@ class Handlers:
         """The page; a token in its address becomes a cookie, so that it does not stay in the address."""
         from starlette.responses import HTMLResponse, RedirectResponse
 
-        if self._access.token and given_token(request.scope):
+        if cookie := self._access.cookie(request.scope):
             answer = RedirectResponse("/", status_code=303)
-            # "lax": a link to the page in a text opens it; requests that cost computation need their header as well
-            answer.set_cookie(cookie_name(request.scope), self._access.token, httponly=True, samesite="lax")
+            answer.set_cookie(**cookie)
             return answer
         return HTMLResponse(self._page)
 
@@ -212,16 +198,15 @@ class Handlers:
         """One file of what is on the screen: the request names the sheets and the state of the page."""
         from starlette.responses import Response
 
-        names, state = _page_request(await limited_text(request, MAX_PAGE))
+        names, state = _page_request(await limited_table(request, MAX_PAGE))
         sheets = [sheet for sheet in map(self._sheets.get, names) if sheet is not None]
         if len(sheets) < len(names):
             raise BadRequest("a program is no longer kept; reload the page.", 404)
         return Response(self_contained_page(sheets, state), media_type="text/html")
 
 
-def _page_request(text: str) -> tuple[list[str], dict[str, Any]]:
+def _page_request(wanted: Mapping[str, Any]) -> tuple[list[str], dict[str, Any]]:
     """The identifiers of sheets and the state in a request for a page, without that of fits. Raises BadRequest."""
-    wanted = table_of(text)
     names, state = wanted.get("sheets"), wanted.get("state")
     if not isinstance(state, dict) or not isinstance(names, list) or not all(isinstance(name, str) for name in names):
         raise BadRequest("the request must contain sheets, a list of identifiers, and a state.")

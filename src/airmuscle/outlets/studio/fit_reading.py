@@ -3,7 +3,7 @@
 import dataclasses
 import os
 import warnings
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 
 import airmuscle as am
@@ -14,16 +14,14 @@ from ...bench.readers.interpret import interpret, resolve_headings, unit_convers
 from ...bench.readers.mapping import apply_mapping
 from ...bench.readers.reader import check_bench, read_tables
 from ...bench.segment import Outlier, check_contents, find_bench_outliers
-from ...core import AMBIENT_PRESSURE, AirmuscleError, AirmuscleWarning, ColumnError, Hint, HintedText, quantity
+from ...core import AMBIENT_PRESSURE, AirmuscleError, AirmuscleWarning, ColumnError, Hint, quantity
 from ...recording.columns import parse_heading
-from ..requests.declaration import RequestError
+from ..requests.declaration import Instruction, RequestError, reworded
 from .fit_settings import FitSettings
 from .fit_uploads import FILES
 
-MAX_ROWS = 200_000
-"""Maximum number of rows of a file that are used; of a longer file every n-th one (chosen)."""
-MAX_COLUMNS = 400
-"""Maximum number of columns that are shown (chosen)."""
+MAX_ROWS, MAX_COLUMNS = 200_000, 400
+"""Maximum number of rows of a file that are used, of more every n-th, and of columns that are shown (chosen)."""
 NEEDED = ("pressure", "contraction", "force")
 """Quantities of a static fit."""
 
@@ -240,7 +238,7 @@ def _missing(hint: Hint) -> str:
     )
 
 
-_INSTRUCTIONS: Mapping[str, tuple[str, Callable[[Hint], str]]] = {
+_INSTRUCTIONS: Mapping[str, tuple[str, Instruction]] = {
     "units": ("columns", lambda hint: f"select it in the table Columns, row {', '.join(map(str, hint.value))}"),
     "columns": ("columns", lambda hint: "select the quantity of each column in the table Columns"),
     "constants": ("files", lambda hint: "write it into the row of the file, in the table Files"),
@@ -264,14 +262,7 @@ _INSTRUCTIONS: Mapping[str, tuple[str, Callable[[Hint], str]]] = {
 
 def in_page_words(text: str) -> str:
     """The text with hints that name fields of the page; a hint for which the page has no field is left out."""
-    if not isinstance(text, HintedText):
-        return text
-
-    def sentence(hint: Hint) -> str:
-        known = _INSTRUCTIONS.get(hint.argument or hint.function)
-        return f"{hint.purpose}, {known[1](hint)}." if known else ""
-
-    return text.written(sentence)
+    return reworded(text, {name: instruction for name, (_, instruction) in _INSTRUCTIONS.items()})
 
 
 def as_field_error(error: AirmuscleError, field: str = "") -> RequestError:

@@ -27,22 +27,16 @@ from .fit_settings import FitSettings, read_settings
 from .fit_sheet import sheet_of_files
 from .fit_task import DOWNLOADS, RESULT, run_fit
 from .fit_uploads import UploadStore, check_file_name
-from .security import BadRequest, json_answer, limited_text, table_of
+from .security import BadRequest, json_answer, limited_table
 from .worker import LimitedWorker
 
 MAX_SETTINGS = 256 * 1024
 """Largest size of the settings [bytes] (chosen)."""
-FIT_WORKERS = 2
-"""Maximum number of fits at a time (chosen)."""
-TIME_LIMIT = 1800.0
-"""Limit [s] of a fit (chosen)."""
-MAX_WAITING = 20
-"""Maximum number of fits that wait (chosen)."""
-MAX_TASKS = 200
-"""Number of tasks whose state and result the server keeps (chosen)."""
+TIME_LIMIT, READING_LIMIT = 1800.0, 90.0
+"""Limits [s] of a fit, and of the reading of a set (chosen)."""
+FIT_WORKERS, MAX_WAITING, MAX_TASKS = 2, 20, 200
+"""Number of fits at a time and of fits that wait, and of tasks whose state and result the server keeps (chosen)."""
 WAITING, RUNNING, DONE, FAILED, CANCELLED = "waiting", "running", "done", "failed", "cancelled"
-READING_LIMIT = 90.0
-"""Limit [s] of the reading of a set (chosen)."""
 _TYPES = {"html": "text/html", "toml": "application/toml", "zip": "application/zip", "json": "application/json"}
 
 
@@ -112,8 +106,8 @@ class FitQueue:
         with self._changed:
             waiting = self._in(WAITING)
             before = waiting.index(task) if task in waiting else 0
-        keys = ("state", "fraction", "text", "error", "field")
-        return {**{key: getattr(task, key) for key in keys}, "before": before}
+        shown = {key: getattr(task, key) for key in ("state", "fraction", "text", "error", "field")}
+        return {**shown, "before": before}
 
     def is_needed(self, set_name: str) -> bool:
         """Whether a task of a set waits or runs."""
@@ -142,21 +136,18 @@ class FitQueue:
 
     def _serve(self) -> None:
         worker = self._make_worker()
-        while (task := self._next(worker)) is not None:
+        while True:
+            with self._changed:
+                self._changed.wait_for(lambda: self._stopped or self._in(WAITING))
+                if self._stopped:
+                    break
+                task = self._in(WAITING)[0]
+                task.state = RUNNING
+                self._running[task.identifier] = worker
             self._run(task, worker)
             with self._changed:
                 del self._running[task.identifier]
         worker.stop()
-
-    def _next(self, worker: Any) -> FitTask | None:
-        with self._changed:
-            self._changed.wait_for(lambda: self._stopped or self._in(WAITING))
-            if self._stopped:
-                return None
-            task = self._in(WAITING)[0]
-            task.state = RUNNING
-            self._running[task.identifier] = worker
-            return task
 
     def _run(self, task: FitTask, worker: Any) -> None:
         def report(fraction: float, text: str) -> None:
@@ -211,7 +202,7 @@ class FitService:
 
     async def remove_file(self, request: Any) -> Any:
         """Remove a file; returns the remaining ones."""
-        wanted = await _content(request)
+        wanted = await limited_table(request, MAX_SETTINGS)
         self._uploads.remove(_name(wanted, "set"), _name(wanted, "name"))
         return json_answer({"set": wanted["set"], "files": self._uploads.names(wanted["set"])})
 
@@ -219,7 +210,7 @@ class FitService:
         """What was understood of the files of a set."""
         from starlette.concurrency import run_in_threadpool
 
-        wanted = await _content(request)
+        wanted = await limited_table(request, MAX_SETTINGS)
         folder, settings = self._uploads.folder(_name(wanted, "set")), _settings(wanted)
         task = sheet_of_episodes if isinstance(settings, ArmSettings) else sheet_of_files
         sheet = await run_in_threadpool(self._pool.call, task, str(folder), settings, limit=READING_LIMIT)
@@ -227,7 +218,7 @@ class FitService:
 
     async def start(self, request: Any) -> Any:
         """Start a fit; returns the identifier of its task."""
-        wanted = await _content(request)
+        wanted = await limited_table(request, MAX_SETTINGS)
         name, settings = _name(wanted, "set"), _settings(wanted)
         return json_answer({"task": self._queue.submit(name, self._uploads.folder(name), settings)})
 
@@ -264,8 +255,3 @@ def _name(wanted: dict[str, Any], key: str) -> str:
     if not isinstance(name, str):
         raise BadRequest(f"the request must state '{key}'.")
     return name
-
-
-async def _content(request: Any) -> dict[str, Any]:
-    """The table in the body of a request. Raises BadRequest."""
-    return table_of(await limited_text(request, MAX_SETTINGS))

@@ -19,10 +19,8 @@ from ...files.library.files import list_laws
 from ..requests import SPLITS as GROUPS
 from ..requests import BraidRequest, BraidSize, ReadingRequest, RequestError, build, form_fields
 
-MAX_RULES = 200
-"""Maximum number of selections of rows (chosen)."""
-MAX_CHOICES = 500
-"""Maximum number of corrected columns, or of files with facts of their own (chosen)."""
+MAX_RULES, MAX_CHOICES = 200, 500
+"""Maximum number of selections of rows; of corrected columns, or of files with facts of their own (chosen)."""
 TEXTS = tuple(each["name"] for each in form_fields(ReadingRequest))
 """Fields with a text that applies to all files."""
 BRAID = ("braid_radius", "braid_angle")

@@ -18,12 +18,10 @@ from .fit_reading import FileColumn, ReadSet, in_page_words, read_set
 from .fit_settings import FitSettings, Rule, used_rows
 from .fit_uploads import FILES
 
-MAX_POINTS = 9000
-"""Maximum number of points of the chart; of more rows every n-th one is shown (chosen)."""
+MAX_POINTS, DIGITS = 9000, 7
+"""Maximum number of points of the chart, of more rows every n-th one, and their significant digits (chosen)."""
 MAX_LISTED = 60
 """Maximum number of runs or findings of a recording that are listed (chosen)."""
-DIGITS = 7
-"""Significant digits of a point of the chart (chosen)."""
 SHOWN = ("time", "pressure", "contraction", "length", "force")
 
 

@@ -48,10 +48,8 @@ GEOMETRY = (
 """Remark on a muscle without geometry."""
 FRICTION_LAWS = 4
 """Number of friction laws that are fitted to each loop and to all loops together, for the progress."""
-MAX_POINTS = 2000
-"""Maximum number of points of a loop that the page draws (chosen)."""
-MAX_PARITY_POINTS = 4000
-"""Maximum number of points of the parity chart; of more rows every n-th one is shown (chosen)."""
+MAX_POINTS, MAX_PARITY_POINTS = 2000, 4000
+"""Maximum number of points of a loop and of the parity chart; of more rows every n-th one is shown (chosen)."""
 
 
 def run_fit(folder: str, out: str, settings: FitSettings | ArmSettings, report: Report) -> None:

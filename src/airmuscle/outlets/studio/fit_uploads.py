@@ -19,14 +19,10 @@ from ...bench.readers.reader import EXTENSIONS
 from ...core import is_running
 from .security import BadRequest
 
-MAX_FILE = 32 * 10**6
-"""Largest size of a measurement file [bytes] (chosen)."""
-MAX_SET = 64 * 10**6
-"""Largest size of all files of a set [bytes] (chosen)."""
-MAX_FILES = 400
-"""Maximum number of files of a set (chosen)."""
-MAX_SETS = 40
-"""Maximum number of sets that the server keeps (chosen)."""
+MAX_FILE, MAX_SET = 32 * 10**6, 64 * 10**6
+"""Largest size of a measurement file, and of all files of a set [bytes] (chosen)."""
+MAX_FILES, MAX_SETS = 400, 40
+"""Maximum number of files of a set, and of sets that the server keeps (chosen)."""
 MAX_IDLE = 600.0
 """Time [s] without a request after which a set may be removed for the sake of another one (chosen); one without files
 may be removed at once."""
@@ -57,10 +53,9 @@ class UploadStore:
     """The sets of files, each in a folder of its own."""
 
     def __init__(self, parent: Path | None = None) -> None:
-        self._parent = parent
+        self._parent, self._lock = parent, threading.Lock()
         self._root: Path | None = None
         self._used: dict[str, float] = {}
-        self._lock = threading.Lock()
 
     def new_set(self, is_needed: Callable[[str], bool]) -> str:
         """The identifier of a new set; idle ones that are not needed make room. Raises BadRequest if none is idle."""

@@ -22,11 +22,9 @@ INVERSE_STEPS = 3
 """Newton steps of the inverse for torque and stiffness (chosen); one is exact for laws that are affine in pressure."""
 MAX_SPEED = 20.0
 """Largest angular speed that the outer law of the cascade commands [rad/s] (chosen)."""
-OPENING = 0.1
-"""Opening of the valves at which the joint is linearised (chosen): at closed valves the derivatives are one-sided."""
-
-SLIGHT_OPENING = 0.01
-"""The same for pressure regulators, whose bands are as wide as their range (chosen)."""
+OPENING, SLIGHT_OPENING = 0.1, 0.01
+"""Opening of the valves at which the joint is linearised (chosen): at closed valves the derivatives are one-sided; and
+that of pressure regulators, whose bands are as wide as their range."""
 
 
 @dataclasses.dataclass(frozen=True)

@@ -12,10 +12,8 @@ from ...core import FileError, ParameterError, atomic_file
 from .joint_sheet import joint_names, sheet_of_joint
 from .tasks import sheet_of_any
 
-MAX_PAGE_SHEETS = 12
-"""Maximum number of muscles and plants in a self-contained page (chosen)."""
-MAX_MUSCLES = 6
-"""Maximum number of muscles in one chart (chosen)."""
+MAX_PAGE_SHEETS, MAX_MUSCLES = 12, 6
+"""Maximum number of muscles and plants in a self-contained page, and of muscles in one chart (chosen)."""
 _NAMES = """
     numbers roots law elements source figure chart outline parameters muscle-chart muscle-point muscle-tab
     plant-start plant-run plant-drawing plant-traces plant-tab fit-source fit-scatter fit-data fit-arm fit-files
@@ -113,8 +111,7 @@ def export_page(names: Sequence[str], path: str | Path) -> Path:
     shown = {sheet["name"]: None for sheet in sheets if "plant" in sheet and not sheet["own_text"]}
     joints = tuple(sheet_of_joint(name) for name in shown if name in joint_names())
     state = first_state(sheets) | ({"joint": {"name": joints[0]["name"]}} if joints else {})
-    text = self_contained_page((*sheets, *joints), state)
-    path = Path(path)
+    text, path = self_contained_page((*sheets, *joints), state), Path(path)
     try:
         with atomic_file(path) as unfinished:
             unfinished.write_text(text, encoding="utf-8")

@@ -20,10 +20,8 @@ from .law_sheet import parameter_row, sampled_outline, toml_template, with_scrip
 
 NAMES = ("states", "inputs", "outputs", "run", "Solver", "prepare", "outputsOf", "SIZES")
 """What the page uses of a printed program; of one with a controller also the run of the loop."""
-MAX_DURATION = 1000.0
-"""Longest run in the page [s] (chosen)."""
-MAX_PARAMETERS = 120
-"""Maximum number of parameters with a slider (chosen)."""
+MAX_DURATION, MAX_PARAMETERS = 1000.0, 120
+"""Longest run in the page [s], and maximum number of parameters with a slider (chosen)."""
 OUTLINE_CONTRACTIONS, OUTLINE_POINTS = 31, 25
 """Grid of an outline (chosen)."""
 OPENED = 0.01

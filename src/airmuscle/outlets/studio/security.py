@@ -91,6 +91,13 @@ class Access:
                 return None
         return 403, "This request comes from another origin."
 
+    def cookie(self, scope: Scope) -> dict[str, Any] | None:
+        """The cookie that keeps a token which the address of a request contains; None without one."""
+        if not (self.token and given_token(scope)):
+            return None
+        # "lax": a link to the page in a text opens it; requests that cost computation need their header as well
+        return {"key": cookie_name(scope), "value": self.token, "httponly": True, "samesite": "lax"}
+
 
 def given_token(scope: Scope) -> list[str]:
     """The token in the query of a request."""
@@ -159,6 +166,11 @@ async def limited_text(request: Any, limit: int) -> str:
         return body.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         raise BadRequest(f"the text is not UTF-8 (byte {error.start}).") from None
+
+
+async def limited_table(request: Any, limit: int) -> dict[str, Any]:
+    """The table in the body of a request. Raises BadRequest."""
+    return table_of(await limited_text(request, limit))
 
 
 def table_of(text: str, error: type[AirmuscleError] = BadRequest) -> dict[str, Any]:

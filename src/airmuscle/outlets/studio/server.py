@@ -106,15 +106,16 @@ def access_of(host: str) -> Access:
 
     Other users of this machine reach a loopback address as well, so it has a token too.
     """
-    name = f"[{host}]" if ":" in host and not host.startswith("[") else host
-    return Access((*LOOPBACK, name.lower()) if is_loopback(host) else (), secrets.token_urlsafe(32))
+    return Access((*LOOPBACK, _bracketed(host).lower()) if is_loopback(host) else (), secrets.token_urlsafe(32))
+
+
+def _bracketed(host: str) -> str:
+    return f"[{host}]" if ":" in host and not host.startswith("[") else host
 
 
 def warning_of(host: str) -> str:
     """The remark that belongs to an address that other machines reach; empty for this machine alone."""
-    if is_loopback(host):
-        return ""
-    return "the connection is not encrypted; use it only in a network that you trust."
+    return "" if is_loopback(host) else "the connection is not encrypted; use it only in a network that you trust."
 
 
 def bound_socket(host: str, port: int) -> socket.socket:
@@ -136,10 +137,8 @@ def bound_socket(host: str, port: int) -> socket.socket:
 
 def address_of(listening: socket.socket, host: str, access: Access) -> str:
     """The address of the page; with the token if there is one."""
-    port = listening.getsockname()[1]
-    host = reachable_host(host)
-    name = f"[{host}]" if ":" in host and not host.startswith("[") else host
-    return f"http://{name}:{port}/" + (f"?token={access.token}" if access.token else "")
+    token = f"?token={access.token}" if access.token else ""
+    return f"http://{_bracketed(reachable_host(host))}:{listening.getsockname()[1]}/{token}"
 
 
 def reachable_host(host: str) -> str:
@@ -161,15 +160,14 @@ def reachable_host(host: str) -> str:
 @contextlib.contextmanager
 def ending_signals(end: Callable[[], None]) -> Iterator[None]:
     """Within the block SIGTERM and SIGHUP, the end of a session, call `end`; the process is not ended at once."""
-    names = [name for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
-    if threading.current_thread() is not threading.main_thread():
-        names = []
-    before = {name: signal.signal(getattr(signal, name), lambda number, frame: end()) for name in names}
+    is_main = threading.current_thread() is threading.main_thread()
+    signals = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if is_main and hasattr(signal, name)]
+    before = {each: signal.signal(each, lambda number, frame: end()) for each in signals}
     try:
         yield
     finally:
-        for name, handler in before.items():
-            signal.signal(getattr(signal, name), handler)
+        for each, handler in before.items():
+            signal.signal(each, handler)
 
 
 def serve(host: str, port: int, opened: tuple[dict[str, Any], ...], started: Callable[[str], None]) -> None:

@@ -93,14 +93,21 @@ def check_self_contained(value: Any, path: str = "") -> None:
         for key, item in value.items():
             inner = f"{path}.{key}" if path else key
             if key in FILE_KEYS:
-                raise ParameterError(_refusal(inner))
+                raise _refusal(inner)
             if key not in TEXT_KEYS:
                 check_self_contained(item, inner)
     elif isinstance(value, list):
         for i, item in enumerate(value):
             check_self_contained(item, f"{path}[{i}]")
     elif isinstance(value, str) and is_path(value) and not _is_quantity(value):
-        raise ParameterError(_refusal(path))
+        raise _refusal(path)
+
+
+def _refusal(path: str) -> ParameterError:
+    return ParameterError(
+        f"{path[:200]}: a text in the studio must not refer to files; write the numbers themselves, or a name of the "
+        "library. The command line reads files that refer to others."
+    )
 
 
 def _is_quantity(text: str) -> bool:
@@ -112,25 +119,14 @@ def _is_quantity(text: str) -> bool:
     return is_known_unit(unit.strip())
 
 
-def _refusal(path: str) -> str:
-    return (
-        f"{path[:200]}: a text in the studio must not refer to files; write the numbers themselves, or a name of the "
-        "library. The command line reads files that refer to others."
-    )
-
-
 # Sizings: ranked muscles for a lift or a joint with their charts and scenarios, for the tab Size
 
 OMITTED = ("count", "muscle")
 """Fields of the command that the page does not have."""
 FIELDS = tuple(each.name for each in options_of(SizeRequest) if each.name not in OMITTED)
 """Fields of the page; each is a text as a user types it, and may be empty where it is optional."""
-MAX_CHOICES = 30
-"""Maximum number of choices that the page receives (chosen)."""
-MAX_FIELD = 60
-"""Maximum length of a field (chosen)."""
-POINTS = 81
-"""Points of a curve (chosen)."""
+MAX_CHOICES, MAX_FIELD, POINTS = 30, 60, 81
+"""Maximum number of choices that the page receives, maximum length of a field, and points of a curve (chosen)."""
 
 
 def size_form() -> dict[str, Any]:
@@ -185,20 +181,18 @@ def _chart(choice: am.design.MuscleChoice) -> dict[str, Any]:
     curves = compute_isobars(entry.characteristic, validity_range_of(entry.characteristic, entry.validity_range))
     grid = np.linspace(*muscle.contraction_range, POINTS)
     points = [point._asdict() for point in (design.extended, design.contracted)]
-    chart = {
-        "pressures": curves.pressures.tolist(),
-        "contractions": _rounded(curves.contractions),
-        "forces": [_rounded(row) for row in curves.forces],
-        "capacity": {"contractions": _rounded(grid), "forces": _rounded(muscle.capacity(grid))},
-        "points": [{key: float(value) for key, value in point.items()} for point in points],
-        "load": None,
-    }
+    shown = None
     if isinstance(choice.requirement, am.design.LiftRequirement):
         displacement, load = choice.requirement.path
         contractions = design.extended.contraction + displacement / choice.length
-        chart["load"] = {"contractions": _rounded(contractions), "forces": _rounded(load / choice.count),
-                         "factor": choice.conditions.safety_factor}  # fmt: skip
-    return chart
+        shown = {"contractions": _rounded(contractions), "forces": _rounded(load / choice.count),
+                 "factor": choice.conditions.safety_factor}  # fmt: skip
+    return {
+        "pressures": curves.pressures.tolist(), "contractions": _rounded(curves.contractions),
+        "forces": [_rounded(row) for row in curves.forces],
+        "capacity": {"contractions": _rounded(grid), "forces": _rounded(muscle.capacity(grid))},
+        "points": [{key: float(value) for key, value in point.items()} for point in points], "load": shown,
+    }  # fmt: skip
 
 
 def _rounded(values: Array) -> list[float | None]:
