@@ -14,7 +14,6 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
-import typer
 
 from ...bench.identify.campaign import STAGES, Campaign, LeftOutStage, StaticStage, identify_campaign
 from ...bench.identify.campaign.campaign_chapters import UnreadFile, ValidationRow, campaign_chapters, stage_data
@@ -33,7 +32,7 @@ from ..requests import BraidSize, ReadingRequest, braid_of_length, check_one_len
 from .delivery import deliver
 from .execution import Execution
 from .measurements import print_row_notes, reading_chapters
-from .options import Folder, Json, with_requests
+from .options import Folder, Json, argument, with_requests
 from .terminal import computation_progress, echo, in_options, reading_progress
 
 OMITTED_ROOMS = ("outlets", "papers", "report", "design", "files", "control")
@@ -44,10 +43,8 @@ _HASH = hashlib.sha256().digest_size
 STAGES_FILE, SCENARIOS = "stages.json", "scenarios"
 """File of the finished stages, which is replaced at the end of each stage, and folder of the scenarios."""
 
-CampaignFolder = Annotated[
-    list[Path],
-    typer.Argument(metavar="FOLDER", help="Folder with the files of one rig; or its files, or a glob pattern."),
-]
+FOLDER = "Folder with the files of one rig; or its files, or a glob pattern."
+CampaignFolder = Annotated[list[Path], argument("FOLDER", FOLDER)]
 
 
 class KeptStages:

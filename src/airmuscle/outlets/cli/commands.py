@@ -188,21 +188,15 @@ def _print_version(requested: bool) -> None:
         raise typer.Exit
 
 
+VERSION, COMPLETION = "Print the version and exit.", "Print the completion script of bash, zsh or fish and exit."
+Version = Annotated[bool, typer.Option("--version", callback=_print_version, is_eager=True, help=VERSION)]
+Shell = Annotated[
+    str | None, typer.Option(metavar="SHELL", callback=print_completion_script, is_eager=True, help=COMPLETION)
+]
+
+
 @app.callback()
-def airmuscle(
-    version: Annotated[
-        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit.")
-    ] = False,
-    completion: Annotated[
-        str | None,
-        typer.Option(
-            metavar="SHELL",
-            callback=print_completion_script,
-            is_eager=True,
-            help="Print the completion script of bash, zsh or fish and exit.",
-        ),
-    ] = None,
-) -> None:
+def airmuscle(version: Version = False, completion: Shell = None) -> None:
     """Models, identification and simulation of pneumatic artificial muscles.
 
     Pressures are gauge pressures unless the unit is an absolute one (bara, kPa(a), psia).

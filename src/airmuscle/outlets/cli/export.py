@@ -5,8 +5,6 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
-import typer
-
 from ...core import check_writable
 from ...engine.run.batch.lanes import Precision
 from ...files import list_plants
@@ -19,7 +17,7 @@ from ..export.identifiers import make_identifier
 from ..export.robot_description import WRITERS
 from ..export.targets import C99, JavaScript, Octave, Target
 from ..requests.declaration import Where, check_rules, many, option, optional, request
-from .options import Folder, Json, complete_entry, with_requests
+from .options import Folder, Json, argument, complete_entry, with_requests
 from .terminal import echo, print_json
 
 TARGETS: dict[str, Target] = {"c": C99(), "js": JavaScript(), "octave": Octave()}
@@ -30,14 +28,8 @@ NAMES = (*TARGETS, "arduino", "fmu", "ssp", "mujoco", *WRITERS, "modelica", *STA
 """All values of the option --to."""
 DEFAULT_FOLDER = Path("export")
 
-Source = Annotated[
-    str,
-    typer.Argument(
-        metavar="SOURCE",
-        help="A scenario file or a plant of the library; with --law a library entry or a muscle file.",
-        autocompletion=complete_entry,
-    ),
-]
+SOURCE = "A scenario file or a plant of the library; with --law a library entry or a muscle file."
+Source = Annotated[str, argument("SOURCE", SOURCE, complete_entry)]
 
 
 @request

@@ -28,7 +28,7 @@ from ..requests import (
 from .delivery import deliver, print_result
 from .execution import Execution
 from .measurements import Files, read_recordings, reading_chapters
-from .options import Folder, Json, Name, complete_law, with_requests
+from .options import Folder, Json, Name, argument, complete_law, with_requests
 from .terminal import computation_progress
 
 
@@ -143,17 +143,10 @@ def _limits(entry: Entry, fit: VolumeFit) -> ValidityRange | None:
 
 LIMIT = "Limit of the validity range; default: that of the muscle."
 LIMITS = ("min_pressure", "max_pressure", "min_contraction", "max_contraction")
-Model = Annotated[
-    str,
-    typer.Argument(
-        metavar="MODEL",
-        help="The other model: ContractileSurface, Sarosi2012, or a library entry of it.",
-        autocompletion=complete_law,
-    ),
-]
-Out = Annotated[
-    Path | None, typer.Option("--out", metavar="FILE", help="Muscle file to write, with the other characteristic.")
-]
+MODEL = "The other model: ContractileSurface, Sarosi2012, or a library entry of it."
+Model = Annotated[str, argument("MODEL", MODEL, complete_law)]
+OUT = "Muscle file to write, with the other characteristic."
+Out = Annotated[Path | None, typer.Option("--out", metavar="FILE", help=OUT)]
 
 
 @request

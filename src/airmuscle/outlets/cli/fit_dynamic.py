@@ -4,8 +4,6 @@ import dataclasses
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from ...bench.identify.dynamic import fit_regulator
 from ...bench.identify.dynamic.dynamic_chapter import dynamic_chapters, regulator_chapters
 from ...bench.segment import inspect
@@ -17,12 +15,11 @@ from ..requests import WEAK, ReadingRequest, many, option, optional, request
 from ..requests.joint import JointFitRequest, fit_requested_arm, inspect_requested
 from .delivery import deliver
 from .measurements import Files, read_recordings, reading_chapters
-from .options import Folder, Json, with_requests
+from .options import Folder, Json, argument, with_requests
 from .terminal import echo
 
-Study = Annotated[
-    Path, typer.Argument(metavar="STUDY.toml", help="A file with [plant], [observed], [fit] and [[record]].")
-]
+Study = Annotated[Path, argument("STUDY.toml", "A file with [plant], [observed], [fit] and [[record]].")]
+Episodes = Annotated[Path, argument("EPISODES", "A folder of episodes or bags, or one file with all.")]
 
 
 @request
@@ -122,12 +119,7 @@ def fit_regulator_command(
 
 @with_requests
 def fit_joint_command(
-    source: Annotated[
-        Path, typer.Argument(metavar="EPISODES", help="A folder of episodes or bags, or one file with all.")
-    ],
-    request: JointFitRequest,
-    out: Folder = Path("joint"),
-    json: Json = False,
+    source: Episodes, request: JointFitRequest, out: Folder = Path("joint"), json: Json = False
 ) -> None:
     """Identify a joint or an arm from its episodes.
 

@@ -116,11 +116,10 @@ def evaluate(
     chapter = found.chapter()
     print_result([chapter], {}, json)
     if out is not None:
-        files = {
+        write_result(out, [], "", {
             "isobars.csv": lambda path: save_table(found.isobar_table(), path),
             "isobars.png": lambda path: path.write_bytes(rendered_figure(chapter.plots[0])["png"]),
-        }
-        write_result(out, [], "", files)
+        })  # fmt: skip
         echo(f"chart: {out / 'isobars.png'}, data: {out / 'isobars.csv'} ({describe_point(found.point)})", err=json)
 
 
@@ -196,10 +195,9 @@ def _library_rows() -> list[ListRow]:
 
 def _law_kind(tables: Mapping[str, Any]) -> str:
     law = tables["characteristic"]
-    muscle = issubclass(model_class(law["model"], tables["title"]), ForceLaw) and (
-        "geometry" in tables or "geometry" in law
-    )
-    return f"{'muscle' if muscle else 'characteristic'}, {law['model']}"
+    has_force = issubclass(model_class(law["model"], tables["title"]), ForceLaw)
+    is_muscle = has_force and ("geometry" in tables or "geometry" in law)
+    return f"{'muscle' if is_muscle else 'characteristic'}, {law['model']}"
 
 
 def _data_row(path: Path) -> ListRow:
@@ -208,16 +206,14 @@ def _data_row(path: Path) -> ListRow:
         comments = list(itertools.takewhile(lambda line: line.startswith("#"), file))
     text = " ".join(line.lstrip("# ").strip() for line in comments)
     title = comments[0].lstrip("# ").strip() if comments else ""
-    secondary = "secondary source" in text
-    provenance = "secondary source" if secondary else "measured" if "measured" in text else ""
+    provenance = next((word for word in ("secondary source", "measured") if word in text), "")
     return ListRow(path.stem, title, "data set", provenance)
 
 
-def cite(
-    name: Name,
-    json: Json = False,
-    bibtex: Annotated[bool, typer.Option("--bibtex", help="Print BibTeX entries.")] = False,
-) -> None:
+Bibtex = Annotated[bool, typer.Option("--bibtex", help="Print BibTeX entries.")]
+
+
+def cite(name: Name, json: Json = False, bibtex: Bibtex = False) -> None:
     """Print the references of a library entry.
 
     The list covers the formulas and the parameter values.

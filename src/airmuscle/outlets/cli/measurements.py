@@ -20,17 +20,11 @@ from ...recording.recording import row_notes
 from ...report.chapter import Chapter
 from ..requests import ReadingRequest, option, optional, request
 from .delivery import deliver
-from .options import Json, OptionalFolder, complete_data, with_requests
+from .options import Json, OptionalFolder, argument, complete_data, with_requests
 from .terminal import echo, print_json, reading_progress
 
-Files = Annotated[
-    list[Path],
-    typer.Argument(
-        metavar="FILES",
-        help="CSV, LVM, Excel, MAT, TDMS or MDF files with pressure, contraction or length, and force.",
-        autocompletion=complete_data,
-    ),
-]
+MEASURED = "CSV, LVM, Excel, MAT, TDMS or MDF files with pressure, contraction or length, and force."
+Files = Annotated[list[Path], argument("FILES", MEASURED, complete_data)]
 _OPTIONS = {"units": "unit", "columns": "column", "constants": "constant", "drop_outliers": "outliers"}
 """Options by the names of their fields, where these differ."""
 
@@ -74,13 +68,8 @@ def reading_chapters(recordings: Iterable[Recording]) -> list[Chapter]:
 
 UNORDERED = ColumnMapping(time=RecordedTime(ordered=False))
 """Stamps that repeat or decrease are shown, not refused."""
-AnyFiles = Annotated[
-    list[str],
-    typer.Argument(
-        metavar="FILES",
-        help="Files, folders or glob patterns: CSV, LVM, Excel, MAT, TDMS, MDF; '-' is text on standard input.",
-    ),
-]
+INSPECTED = "Files, folders or glob patterns: CSV, LVM, Excel, MAT, TDMS, MDF; '-' is text on standard input."
+AnyFiles = Annotated[list[str], argument("FILES", INSPECTED)]
 
 
 @with_requests
@@ -109,8 +98,8 @@ def inspect(files: AnyFiles, reading: ReadingRequest, json: Json = False, out: O
 EVERY_ROW = 2**62
 """A number of rows that no file has."""
 
-Source = Annotated[str, typer.Argument(metavar="FILE", help="A file, folder or glob pattern, as for inspect.")]
-Target = Annotated[Path, typer.Argument(metavar="TARGET", help=f"The file to write: {', '.join(EXTENSIONS)}.")]
+Source = Annotated[str, argument("FILE", "A file, folder or glob pattern, as for inspect.")]
+Target = Annotated[Path, argument("TARGET", f"The file to write: {', '.join(EXTENSIONS)}.")]
 
 
 @request

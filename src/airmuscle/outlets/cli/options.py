@@ -37,14 +37,15 @@ complete_data = _beginning_with(list_data)
 """Names of data sets, for an argument that also takes files."""
 complete_model = _beginning_with(lambda: (*list_laws(), *list_plants()))
 """Names of muscles, laws and plants, for an argument that also takes their files."""
-Name = Annotated[
-    str,
-    typer.Argument(
-        metavar="NAME",
-        help="A library entry, a unique prefix of its name, or a muscle file (TOML).",
-        autocompletion=complete_entry,
-    ),
-]
+
+
+def argument(metavar: str, meaning: str, complete: Callable[[str], list[str]] | None = None) -> Any:
+    """Declare an argument of a command: its placeholder, its help text, and the completion of its names."""
+    return typer.Argument(metavar=metavar, help=meaning, autocompletion=complete)
+
+
+NAME = "A library entry, a unique prefix of its name, or a muscle file (TOML)."
+Name = Annotated[str, argument("NAME", NAME, complete_entry)]
 Json = Annotated[bool, typer.Option("--json", help="Print JSON in SI units instead of a table.")]
 Folder = Annotated[Path, typer.Option("--out", metavar="DIR", help="Output folder; created if it does not exist.")]
 """An output folder that the command always writes."""

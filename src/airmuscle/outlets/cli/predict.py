@@ -3,8 +3,6 @@
 from pathlib import Path
 from typing import Annotated, Any
 
-import typer
-
 from ...bench.identify.dynamic import StartTime
 from ...bench.identify.prediction import RecordPrediction
 from ...bench.identify.prediction.prediction_chapter import prediction_chapters
@@ -14,22 +12,12 @@ from ...files.scenario.prediction import load_plant_model, predict_with_entry
 from ..requests import ReadingRequest, RequestError, Where, many, optional, request
 from .delivery import deliver
 from .measurements import read_recordings, reading_chapters
-from .options import Folder, Json, complete_model, with_requests
+from .options import Folder, Json, argument, complete_model, with_requests
 
-Model = Annotated[
-    str,
-    typer.Argument(
-        metavar="MODEL",
-        help="A muscle file, a scenario of fit-dynamic or campaign, or a muscle, law or plant of the library.",
-        autocompletion=complete_model,
-    ),
-]
-Records = Annotated[
-    list[Path],
-    typer.Argument(
-        metavar="FILES", help="Measurement files; for a scenario also a TOML file with [[record]], as of fit-dynamic."
-    ),
-]
+MODEL = "A muscle file, a scenario of fit-dynamic or campaign, or a muscle, law or plant of the library."
+Model = Annotated[str, argument("MODEL", MODEL, complete_model)]
+RECORDS = "Measurement files; for a scenario also a TOML file with [[record]], as of fit-dynamic."
+Records = Annotated[list[Path], argument("FILES", RECORDS)]
 
 
 @request

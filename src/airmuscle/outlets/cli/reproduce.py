@@ -4,8 +4,6 @@ import textwrap
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from ...core import AirmuscleError, counted
 from ...engine.processes import available_cores
 from ...papers.run import reproduce as reproduce_papers
@@ -15,7 +13,7 @@ from ...report.claims import Kind, Statement, statements
 from ...report.formatting import MARKS, count_verdicts, format_published, format_reproduced
 from ...report.formula import to_plain
 from ...report.text import GAP
-from .options import Folder
+from .options import Folder, argument
 from .terminal import echo, print_table, terminal_width
 
 HEADERS = ("claim", "expected", "reproduced", "verdict")
@@ -24,13 +22,11 @@ MIN_CLAIM = 28
 PREFIXES = {Kind.CLAIM: "", Kind.FINDING: "comparison: ", Kind.CHECK: "check: "}
 
 
-def reproduce(
-    papers: Annotated[
-        list[str] | None,
-        typer.Argument(metavar="PAPER", help="saga2007, borzikova, hosovsky, or a prefix of one; default: all."),
-    ] = None,
-    out: Folder = Path("report"),
-) -> None:
+PAPERS = "saga2007, borzikova, hosovsky, or a prefix of one; default: all."
+Papers = Annotated[list[str] | None, argument("PAPER", PAPERS)]
+
+
+def reproduce(papers: Papers = None, out: Folder = Path("report")) -> None:
     """Reproduce three papers and test each of their claims.
 
     \b

@@ -23,8 +23,12 @@ from ...report.write import REPORT_FILE
 from ..requests import many, read_pair, request
 from .delivery import Files, deliver, print_result, write_result
 from .execution import Execution, contributions
-from .options import Folder, Json, complete_plant, with_requests
+from .options import Folder, Json, argument, complete_plant, with_requests
 from .terminal import counted_progress, echo, print_json
+
+SCENARIO = "A file with [plant], [input] and [run], or the name of a plant of the library."
+ScenarioFile = Annotated[Path, argument("SCENARIO.toml", SCENARIO, complete_plant)]
+StudyFile = Annotated[Path, argument("STUDY.toml", "A file with scenario, [vary], [design] and [metrics].")]
 
 
 @request
@@ -38,19 +42,7 @@ class SimulateRequest:
 
 
 @with_requests
-def simulate(
-    scenario: Annotated[
-        Path,
-        typer.Argument(
-            metavar="SCENARIO.toml",
-            help="A file with [plant], [input] and [run], or the name of a plant of the library.",
-            autocompletion=complete_plant,
-        ),
-    ],
-    request: SimulateRequest,
-    out: Folder = Path("run"),
-    json: Json = False,
-) -> None:
+def simulate(scenario: ScenarioFile, request: SimulateRequest, out: Folder = Path("run"), json: Json = False) -> None:
     """Simulate the plant of a scenario file.
 
     \b
@@ -86,14 +78,7 @@ def _results(scenario: Scenario, recording: Recording) -> tuple[list[Chapter], s
 
 
 @with_requests
-def study(
-    file: Annotated[
-        Path, typer.Argument(metavar="STUDY.toml", help="A file with scenario, [vary], [design] and [metrics].")
-    ],
-    execution: Execution,
-    out: Folder = Path("study"),
-    json: Json = False,
-) -> None:
+def study(file: StudyFile, execution: Execution, out: Folder = Path("study"), json: Json = False) -> None:
     """Run a parameter study of a scenario.
 
     \b
@@ -148,14 +133,12 @@ def _run(study: Study, folder: Path | None, execution: Execution) -> tuple[Study
         raise
 
 
-def schema(
-    muscle: Annotated[
-        bool, typer.Option("--muscle", help="The schema of muscle files; default: of scenario files.")
-    ] = False,
-    out: Annotated[
-        Path | None, typer.Option("--out", metavar="FILE", help="Output file; default: print to stdout.")
-    ] = None,
-) -> None:
+OfMuscles = Annotated[bool, typer.Option("--muscle", help="The schema of muscle files; default: of scenario files.")]
+WRITTEN = "Output file; default: print to stdout."
+SchemaFile = Annotated[Path | None, typer.Option("--out", metavar="FILE", help=WRITTEN)]
+
+
+def schema(muscle: OfMuscles = False, out: SchemaFile = None) -> None:
     """Print the JSON schema of scenario or muscle files.
 
     \b

@@ -4,14 +4,15 @@ import webbrowser
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from ..requests.declaration import option, optional, request
 from ..studio import export_page, serve
 from ..studio.page import open_sheets
 from ..studio.server import warning_of
-from .options import complete_law, with_requests
+from .options import argument, complete_law, with_requests
 from .terminal import echo
+
+OPENED = "Muscles or laws to open: library entries or muscle files (TOML)."
+Names = Annotated[list[str] | None, argument("[NAME]...", OPENED, complete_law)]
 
 
 @request
@@ -28,17 +29,7 @@ class StudioRequest:
 
 
 @with_requests
-def studio(
-    request: StudioRequest,
-    names: Annotated[
-        list[str] | None,
-        typer.Argument(
-            metavar="[NAME]...",
-            help="Muscles or laws to open: library entries or muscle files (TOML).",
-            autocompletion=complete_law,
-        ),
-    ] = None,
-) -> None:
+def studio(request: StudioRequest, names: Names = None) -> None:
     """Show muscles and plants in the browser.
 
     \b

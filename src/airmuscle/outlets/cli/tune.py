@@ -30,7 +30,7 @@ from ..requests.declaration import RequestError, many, option, request
 from .delivery import deliver
 from .execution import Execution
 from .interruption import check_interrupted
-from .options import Folder, Json, with_requests
+from .options import Folder, Json, argument, with_requests
 from .terminal import computation_progress, counted_progress, echo
 
 HISTORY_FILE = "history.csv"
@@ -40,13 +40,9 @@ INDICES: dict[str, type[TrackingIndex]] = {
     "itae": IntegralTimeAbsoluteError,
 }
 """Tracking indices by their names."""
-ScenarioFile = Annotated[Path, typer.Argument(metavar="SCENARIO.toml", help="A scenario file with [input.controller].")]
-Save = Annotated[
-    Path | None,
-    typer.Option(
-        metavar="FILE.toml", help="Scenario with the tuned gains; default: SCENARIO-tuned.toml next to the scenario."
-    ),
-]
+ScenarioFile = Annotated[Path, argument("SCENARIO.toml", "A scenario file with [input.controller].")]
+SAVE = "Scenario with the tuned gains; default: SCENARIO-tuned.toml next to the scenario."
+Save = Annotated[Path | None, typer.Option(metavar="FILE.toml", help=SAVE)]
 
 
 def read_factors(text: str, where: str) -> tuple[float, ...]:

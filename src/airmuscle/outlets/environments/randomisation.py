@@ -65,8 +65,7 @@ class UniformRange(Randomisation):
         return 1
 
     def _draw(self, uniform: Array) -> Array:
-        number: Array = self.low + (self.high - self.low) * uniform
-        return number
+        return np.asarray(self.low + (self.high - self.low) * uniform)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -133,8 +132,7 @@ class FitUncertainty(ShortRepr, Randomisation):
         found = self.uncertainty
         fitted = parameter_uncertainty(found) if isinstance(found, PlantUncertainty) else found
         draws = fitted.deviations(ndtri(np.clip(uniform, 1e-12, 1.0 - 1e-12)))
-        values: Array = nominal + np.repeat(draws, [len(group) for group in self.groups], axis=1)
-        return values
+        return np.asarray(nominal + np.repeat(draws, [len(group) for group in self.groups], axis=1))
 
     def variations(self, plant: Plant, count: int, seed: int = 0) -> dict[str, Array]:
         """Values (N,) of N draws by the path in the plant, as `simulate_batch(plant, variations, ...)` takes them."""
@@ -213,9 +211,8 @@ class EpisodeDraw:
         for i in self._varied:
             values[i] = parameters[:, i].view(Column)
         plants: EnvironmentTask = tree.unflatten(self.task, values)
-        initial = {}
-        for i, (name, (low, high)) in enumerate(plants.initial_ranges.items(), first):
-            initial[name] = low + (high - low) * uniform[:, i]
+        ranges = enumerate(plants.initial_ranges.items(), first)
+        initial = {name: low + (high - low) * uniform[:, i] for i, (name, (low, high)) in ranges}
         plant = plants.plant
         pressures = [initial.pop(f"{prefix}pressure") for prefix in plant.prefixes]
         start: dict[str, Any] = {n: 0.0 for c in plant.mechanism.coordinates for n in (c.name, c.speed)} | initial

@@ -7,7 +7,7 @@ from xml.etree.ElementTree import Element, SubElement
 
 from ...core import ParameterError
 from ...engine.compile.text.programs import CLanguage
-from ...engine.loop import MEASURED, SETPOINT, ControlLoop, Schedule, named_signal_units
+from ...engine.loop import MEASURED, SETPOINT, Schedule, named_signal_units
 from ...engine.run import Problem, solve
 from ...engine.run.sampled_loop import SampledLoop, prepare_loop
 from ...recording.columns import column_units
@@ -48,7 +48,7 @@ def controller_package(problem: Problem, fmi: int, name: str = "", title: str = 
     prepared = prepare_loop(problem, loop.init(problem.start_time))
     chosen = program_name(name, title or type(loop.controller).__name__)
     printed = print_controller(prepared, chosen, title, None)
-    variables = _variables(problem, loop, printed, prepared)
+    variables = _variables(problem, printed, prepared)
     start = [float(v.start or 0.0) for v in variables if v.causality == "input"]
     token = token_of(*variables, *printed.source_files().values(), fmi)
     outputs = [v.reference for v in variables if v.causality == "output"]
@@ -61,9 +61,7 @@ def controller_package(problem: Problem, fmi: int, name: str = "", title: str = 
     return FmuPackage(about, printed.provenance, {f"{chosen}_instance.h": instance})
 
 
-def _variables(
-    problem: Problem, loop: ControlLoop, printed: PrintedController, prepared: SampledLoop
-) -> list[Variable]:
+def _variables(problem: Problem, printed: PrintedController, prepared: SampledLoop) -> list[Variable]:
     """Time, measurements, set points, commands and parameters, in the order of the template `controller_instance.h`."""
     law, first, variables = printed.law, _first_row(problem), Variables()
     of_columns = column_units(problem.system, problem.compiled.description.output_names)
@@ -74,10 +72,9 @@ def _variables(
     for signal, value in zip(law.setpoints, prepared.setpoint_values[0].tolist(), strict=True):
         variables.add(f"{SETPOINT}{signal}", "input", f"{signal} wanted", start=value, unit=units.get(signal, ""))
     for command, (low, high) in zip(law.inputs, printed.ranges, strict=True):
-        variables.add(
-            command, "output", f"command of {command}, held for {loop.sample_time:g} s", variability="discrete",
-            initial="calculated", minimum=low, maximum=high, unit=units.get(command, ""),
-        )  # fmt: skip
+        about = f"command of {command}, held for {prepared.loop.sample_time:g} s"
+        given = {"minimum": low, "maximum": high, "unit": units.get(command, "")}
+        variables.add(command, "output", about, variability="discrete", initial="calculated", **given)
     variables.add_parameters(printed.tunable)
     return variables.checked()
 

@@ -46,7 +46,7 @@ def make_identifiers(names: Sequence[str]) -> tuple[str, ...]:
     last: dict[str, int] = {}
     identifiers = []
     for name in names:
-        word = _shortened(_word(name), name)
+        word = _word(name)
         number = last.get(word, 1)
         candidate = word if number == 1 else f"{word[: LONGEST - 8]}_{number}"
         while candidate.casefold() in taken:
@@ -82,10 +82,7 @@ def _word(name: str) -> str:
     word = re.sub(r"_+", "_", re.sub(r"[^A-Za-z0-9]", "_", letters)).strip("_")
     if not word or not word[0].isalpha():
         word = f"n_{word}".rstrip("_")
-    return f"{word}_" if word.casefold() in RESERVED else word
-
-
-def _shortened(word: str, name: str) -> str:
+    word = f"{word}_" if word.casefold() in RESERVED else word
     if len(word) <= LONGEST:
         return word
     digest = hashlib.sha256(name.encode("utf-8", "surrogatepass")).hexdigest()[:_DIGEST]

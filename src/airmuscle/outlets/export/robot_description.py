@@ -78,23 +78,19 @@ def _planar_model(mechanism: PlanarArm) -> RobotModel:
         tip = mechanism.payload if number == len(mechanism.links) else 0.0
         mass = link.mass + tip
         centre = (link.mass * link.centre + tip * link.length) / mass
-        inertia = (
-            link.inertia + link.mass * (link.centre - centre) ** 2 + tip * (link.length - centre) ** 2
-        )  # parallel axes
+        own = link.inertia + link.mass * (link.centre - centre) ** 2
+        inertia = own + tip * (link.length - centre) ** 2  # parallel axes
         position, at = (0.0, 0.0, -before), (0.0, 0.0, -centre)
         links.append(SpatialLink((0, -1, 0), position, max(mass, LEAST), at, inertia, 0.0, link.damping))
         before = link.length
-    return _arm_model(mechanism, links)
+    names = [c.name for c in mechanism.coordinates]
+    return RobotModel(names, links, mechanism.routes, mechanism.gravity, [0.0] * len(links))
 
 
 @_robot_model.register
 def _spatial_model(mechanism: SerialArm) -> RobotModel:
-    return _arm_model(mechanism, mechanism.links)
-
-
-def _arm_model(arm: PlanarArm | SerialArm, links: Sequence[SpatialLink]) -> RobotModel:
-    names = [c.name for c in arm.coordinates]
-    return RobotModel(names, links, arm.routes, arm.gravity, [0.0] * len(links))
+    names, links = [c.name for c in mechanism.coordinates], mechanism.links
+    return RobotModel(names, links, mechanism.routes, mechanism.gravity, [0.0] * len(links))
 
 
 @_robot_model.register
@@ -199,8 +195,7 @@ def write_urdf(plant: Plant, folder: str | Path, *, name: str = "robot") -> Writ
         for name, link in list(zip(robot.joints, robot.links, strict=True))[1:] if link.rotor_inertia
     ]  # fmt: skip
     robot = dataclasses.replace(robot, left_out=(*robot.left_out, *rotors))
-    root = ET.Element("robot", name=program)
-    lines = []
+    root, lines = ET.Element("robot", name=program), []
     for muscle, route in zip(plant.muscles, robot.routes, strict=True):
         arms = (f"{r!r} m about {robot.joints[j - 1]}" for j, r in zip(route.joints, route.radii, strict=True))
         rest = f"resting length {muscle.geometry.resting_length!r} m, contraction {route.offset!r} at angles 0"

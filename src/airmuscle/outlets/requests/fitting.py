@@ -3,7 +3,6 @@
 import dataclasses
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -116,7 +115,16 @@ def _more(
     chapters, notes = list[Chapter](), list[str]()
     uncertainty = _uncertainty(request, found, recordings, progress, workers)
     if request.shape:
-        shaped = _shaped(request, found, recordings)
+        if not isinstance(found.model, ContractileSurface):
+            raise ParameterError(
+                f"--shape: the shape of {type(found.model).__name__} is given by its formula; only a "
+                "ContractileSurface can be constrained. Give --characteristic ContractileSurface, or omit --shape."
+            )
+        free = None
+        if request.free_contraction:
+            pressure, contraction = np.array(request.free_contraction).T
+            free = Recording({"pressure": pressure, "contraction": contraction}, "--free-contraction")
+        shaped = fit_shape_constrained(found.model, recordings, free=free)
         chapters.append(shape_chapter(shaped, found, len(request.free_contraction)))
         note = f"{entry.note} With shape constraints: rms error {shaped.rmse:.4g} N."
         entry = dataclasses.replace(entry, characteristic=shaped.model, note=note, error_band=None)
@@ -143,19 +151,6 @@ def _uncertainty(
         )
     profiles = tuple(profile(found, name) for name in names)
     return Uncertainty(found, sample, profiles, WEAK in request.profile and not weak)
-
-
-def _shaped(request: FitRequest, found: Fit, recordings: list[Recording]) -> Any:
-    if not isinstance(found.model, ContractileSurface):
-        raise ParameterError(
-            f"--shape: the shape of {type(found.model).__name__} is given by its formula; only a "
-            "ContractileSurface can be constrained. Give --characteristic ContractileSurface, or omit --shape."
-        )
-    free = None
-    if request.free_contraction:
-        pressure, contraction = np.array(request.free_contraction).T
-        free = Recording({"pressure": pressure, "contraction": contraction}, "--free-contraction")
-    return fit_shape_constrained(found.model, recordings, free=free)
 
 
 def _in_one_screen(chapters: Sequence[Chapter]) -> list[Chapter]:

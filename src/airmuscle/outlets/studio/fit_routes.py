@@ -24,11 +24,10 @@ from ...core import AirmuscleError
 from ..requests import RequestError
 from .arm_task import ArmSettings, read_arm_settings, sheet_of_episodes
 from .fit_settings import FitSettings, read_settings
-from .fit_sheet import sheet_of_files
-from .fit_task import DOWNLOADS, RESULT, run_fit
+from .fit_task import DOWNLOADS, RESULT, run_fit, sheet_of_files
 from .fit_uploads import UploadStore, check_file_name
 from .security import BadRequest, json_answer, limited_table
-from .worker import LimitedWorker
+from .worker import LimitedWorker, Task
 
 MAX_SETTINGS = 256 * 1024
 """Largest size of the settings [bytes] (chosen)."""
@@ -58,15 +57,12 @@ class FitTask:
 class FitQueue:
     """Fits in order of their arrival. `task` is called with the arguments of a fit and a function for its progress."""
 
-    def __init__(
-        self, task: Callable[..., Any], count: int = FIT_WORKERS, make_worker: Callable[[], Any] = LimitedWorker
-    ) -> None:
+    def __init__(self, task: Task, count: int = FIT_WORKERS, make_worker: Callable[[], Any] = LimitedWorker) -> None:
         self._task, self._count, self._make_worker = task, count, make_worker
         self._tasks: collections.OrderedDict[str, FitTask] = collections.OrderedDict()
         self._running: dict[str, Any] = {}
         self._threads: list[threading.Thread] = []
-        self._changed = threading.Condition()
-        self._stopped = False
+        self._changed, self._stopped = threading.Condition(), False
 
     def submit(self, set_name: str, folder: Path, *arguments: Any) -> str:
         """The identifier of a new task, which receives `arguments` after the folder of its result.
@@ -83,9 +79,8 @@ class FitQueue:
             for old in self._in(DONE, FAILED, CANCELLED)[: max(0, len(self._tasks) - MAX_TASKS)]:
                 shutil.rmtree(self._tasks.pop(old.identifier).folder, ignore_errors=True)
             if len(self._threads) < self._count:
-                thread = threading.Thread(target=self._serve, name="airmuscle studio fit", daemon=True)
-                self._threads.append(thread)
-                thread.start()
+                self._threads.append(threading.Thread(target=self._serve, name="airmuscle studio fit", daemon=True))
+                self._threads[-1].start()
             self._changed.notify()
         return identifier
 

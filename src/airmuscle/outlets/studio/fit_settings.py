@@ -120,9 +120,8 @@ def _check(settings: FitSettings) -> None:
     if settings.entry and settings.entry not in list_laws():
         raise RequestError(f"the library has no muscle or law '{settings.entry}'.", "entry")
     if settings.leave_out not in SPLITS:
-        raise RequestError(
-            f"'{settings.leave_out}' is no group; allowed: {', '.join(filter(None, SPLITS))}.", "leave_out"
-        )
+        allowed = ", ".join(filter(None, SPLITS))
+        raise RequestError(f"'{settings.leave_out}' is no group; allowed: {allowed}.", "leave_out")
     settings.mapping()
 
 

@@ -31,6 +31,7 @@ MAX_NAME = 120
 FILES = "files"
 ACCEPTED = (*EXTENSIONS, ".npz", ".json", ".jsonl", ".zip")
 """Extensions of measurement files and of episodes."""
+IsNeeded = Callable[[str], bool]
 _PREFIX = "airmuscle-studio-"
 _IDENTIFIER = re.compile(r"[A-Za-z0-9_-]{22}")
 _FORBIDDEN = set('<>:"/\\|?*')
@@ -57,7 +58,7 @@ class UploadStore:
         self._root: Path | None = None
         self._used: dict[str, float] = {}
 
-    def new_set(self, is_needed: Callable[[str], bool]) -> str:
+    def new_set(self, is_needed: IsNeeded) -> str:
         """The identifier of a new set; idle ones that are not needed make room. Raises BadRequest if none is idle."""
         with self._lock:
             if len(self._used) >= MAX_SETS:
@@ -67,7 +68,7 @@ class UploadStore:
             self._used[identifier] = time.monotonic()
         return identifier
 
-    def _remove_idle(self, is_needed: Callable[[str], bool]) -> None:
+    def _remove_idle(self, is_needed: IsNeeded) -> None:
         latest = time.monotonic() - MAX_IDLE
         filled = {name: any(self._files(name).iterdir()) for name in self._used}
         idle = [n for n, used in self._used.items() if (used < latest or not filled[n]) and not is_needed(n)]
@@ -89,9 +90,7 @@ class UploadStore:
         """The names of the files of a set, in order."""
         return sorted(path.name for path in (self.folder(identifier) / FILES).iterdir())
 
-    async def add(
-        self, identifier: str, name: str, parts: AsyncIterator[bytes], is_needed: Callable[[str], bool]
-    ) -> str:
+    async def add(self, identifier: str, name: str, parts: AsyncIterator[bytes], is_needed: IsNeeded) -> str:
         """Add a file, or replace the one of this name; the identifier of the set, of a new one if none is given.
 
         Raises BadRequest beyond the limits; then there is no new set.

@@ -41,6 +41,7 @@ _FIRST = 7.0e250
 _STEP = 1.0e240
 _MARK = re.compile(r"7(?:\.\d+)?e\+250")
 
+Law = am.characteristic.Characteristic
 Template = list[str | int]
 MAX_PARAMETERS = 60
 """Maximum number of parameters with a slider; a law with more, such as a table, has none (chosen)."""
@@ -98,7 +99,7 @@ def with_script(sheet: Mapping[str, Any], text: str, functions: Sequence[str]) -
     return {**sheet, "id": identifier, "script": script}
 
 
-def _in_closed_form(entry: Entry) -> tuple[am.characteristic.Characteristic, dict[str, Any] | None]:
+def _in_closed_form(entry: Entry) -> tuple[Law, dict[str, Any] | None]:
     """The law, or its approximation with its errors [N]."""
     law = entry.characteristic
     if law.traceable:
@@ -202,9 +203,7 @@ def fill_template(template: Template, values: list[float]) -> str:
 # The printed law
 
 
-def print_law(
-    law: am.characteristic.Characteristic, geometry: am.geometry.Geometry | None
-) -> tuple[str, list[str], int]:
+def print_law(law: Law, geometry: am.geometry.Geometry | None) -> tuple[str, list[str], int]:
     """The program of a traceable law, and of the outline where the geometry is in closed form, as JavaScript text; the
     names of its functions, and the length of `c`.
 
@@ -222,7 +221,7 @@ def print_law(
     return printer.module(), names, printer.held
 
 
-def parameter_model(law: am.characteristic.Characteristic, geometry: am.geometry.Geometry | None) -> Any:
+def parameter_model(law: Law, geometry: am.geometry.Geometry | None) -> Any:
     """What has the parameters of the page as leaves: the law, or the pair with a geometry that is not part of it."""
     return law if geometry is None or geometry == getattr(law, "geometry", None) else (law, geometry)
 

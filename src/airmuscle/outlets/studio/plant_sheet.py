@@ -106,13 +106,8 @@ def _input_rows(plant: am.Plant) -> list[dict[str, Any]]:
 def _column_rows(columns: Any, units: Mapping[str, str]) -> list[dict[str, Any]]:
     rows = []
     for name in columns:
-        factor, unit = display_scale(name)
-        if units[name] == "rad":
-            factor, unit = 180.0 / np.pi, "deg"
-        elif units[name] == "Pa":
-            factor, unit = 1e-3, "kPa"
-        elif not unit:
-            factor, unit = 1.0, units[name]
+        usual = {"rad": (180.0 / np.pi, "deg"), "Pa": (1e-3, "kPa")}.get(units[name], display_scale(name))
+        factor, unit = usual if usual[1] else (1.0, units[name])
         rows.append({"name": name, "factor": factor, "unit": "" if unit in ("1", "-") else unit})
     return rows
 

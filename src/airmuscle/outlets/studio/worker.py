@@ -20,6 +20,9 @@ MEMORY = 4 * 2**30
 """Largest data memory of a worker [bytes] (chosen); it is not limited on Windows and macOS."""
 
 
+Task = Callable[..., Any]
+
+
 class LimitError(InputError):
     """A task took more time or memory than is allowed, or all workers are occupied."""
 
@@ -34,9 +37,7 @@ class LimitedWorker:
         self._worker = Worker(_prepare)
         self.kill, self.stop = self._worker.kill, self._worker.stop
 
-    def call(
-        self, task: Callable[..., Any], arguments: tuple[Any, ...], limit: float, report: Report | None = None
-    ) -> Any:
+    def call(self, task: Task, arguments: tuple[Any, ...], limit: float, report: Report | None = None) -> Any:
         """The result of `task(*arguments)`, as `Worker.call`. Raises LimitError after `limit` [s]."""
         try:
             return self._worker.call(run_task, (task, *arguments), limit, report)
@@ -46,7 +47,7 @@ class LimitedWorker:
             raise LimitError(f"the computation {late if error.late else memory}") from None
 
 
-def run_task(task: Callable[..., Any], *arguments: Any) -> Any:
+def run_task(task: Task, *arguments: Any) -> Any:
     """The result of a task in a process of its own. Raises AirmuscleError with a message for the page."""
     try:
         return task(*arguments)
@@ -107,7 +108,7 @@ class WorkerPool:
                     worker.stop()  # it starts again with its next task
                 self._free.put(worker)
 
-    def call(self, task: Callable[..., Any], *arguments: Any, limit: float) -> Any:
+    def call(self, task: Task, *arguments: Any, limit: float) -> Any:
         """The result of a task in a free worker. Raises what it raises, LimitError after `limit` [s]."""
         end = time.monotonic() + limit
         with self._borrowed(limit) as worker:
