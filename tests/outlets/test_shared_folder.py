@@ -227,7 +227,7 @@ def test_the_process_that_does_not_write_names_the_files_of_the_other(folder: Pa
 
 def test_the_output_of_a_process_that_has_ended_is_written_by_the_other(folder: Path, monkeypatch: pytest.MonkeyPatch):
     """At the start another process holds the folder of the output; at the end it is free, and without a report."""
-    monkeypatch.setattr("airmuscle.outlets.cli.execution.Execution.writes", lambda self, out: False)
+    monkeypatch.setattr("airmuscle.outlets.cli.delivery.Execution.writes", lambda self, out: False)
     command = ("study", str(folder / "study.toml"), "--join", str(folder / "shared"), "--workers", "1")
     done = airmuscle(*command, "--out", str(folder / "out"))
     assert done.exit_code == 0, done.stderr

@@ -29,8 +29,7 @@ from ...physics.muscle.geometry import Geometry
 from ...recording import Recording
 from ...report.data import as_json
 from ..requests import BraidSize, ReadingRequest, braid_of_length, check_one_length, many, optional, read_braid, request
-from .delivery import deliver
-from .execution import Execution
+from .delivery import Execution, deliver
 from .measurements import print_row_notes, reading_chapters
 from .options import Folder, Json, argument, with_requests
 from .terminal import computation_progress, echo, in_options, reading_progress

@@ -55,7 +55,7 @@ COMMANDS = (
     CommandRow("predict", "predict", "predict", "Predict further records by an identified muscle or plant."),
     CommandRow("fit-volume", "fit", "fit_volume_command", "Fit the volume of a muscle over its contraction."),
     CommandRow("plan", "plan", "plan", "Design the most informative experiments."),
-    CommandRow("fit-live", "fit_live", "fit_live", "Fit a surface while rows arrive; name the next point."),
+    CommandRow("fit-live", "plan", "fit_live", "Fit a surface while rows arrive; name the next point."),
     CommandRow("size", "plan", "size", "Size muscles of the catalogue for a lift or a joint."),
     CommandRow("simulate", "simulate", "simulate", "Simulate the plant of a scenario file."),
     CommandRow("study", "simulate", "study", "Run a parameter study of a scenario."),

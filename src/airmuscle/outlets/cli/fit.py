@@ -25,8 +25,7 @@ from ..requests import (
     optional,
     request,
 )
-from .delivery import deliver, print_result
-from .execution import Execution
+from .delivery import Execution, deliver, print_result
 from .measurements import Files, read_recordings, reading_chapters
 from .options import Folder, Json, Name, argument, complete_law, with_requests
 from .terminal import computation_progress

@@ -21,8 +21,7 @@ from ...report.chapter import Chapter
 from ...report.data import as_json
 from ...report.write import REPORT_FILE
 from ..requests import many, read_pair, request
-from .delivery import Files, deliver, print_result, write_result
-from .execution import Execution, contributions
+from .delivery import Execution, Files, contributions, deliver, print_result, write_result
 from .options import Folder, Json, argument, complete_plant, with_requests
 from .terminal import counted_progress, echo, print_json
 

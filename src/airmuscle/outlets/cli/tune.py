@@ -27,8 +27,7 @@ from ...files.library.files import is_path
 from ...files.scenario.controller import signal_units
 from ...report.write import save_table
 from ..requests.declaration import RequestError, many, option, request
-from .delivery import deliver
-from .execution import Execution
+from .delivery import Execution, deliver
 from .interruption import check_interrupted
 from .options import Folder, Json, argument, with_requests
 from .terminal import computation_progress, counted_progress, echo

@@ -18,6 +18,7 @@ from .task import EnvironmentTask
 
 STEP = RungeKutta4(1e-3)
 """Default integrator."""
+Floats = npt.NDArray[np.float32]
 
 
 def observation_space(task: EnvironmentTask) -> Any:
@@ -63,9 +64,7 @@ class PlantEnv(gymnasium.Env):  # type: ignore[misc, unused-ignore]
         self._inputs, self._elapsed = [0.0] * (self._actions + 1), 0
         self._window: Any = None
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[npt.NDArray[np.float32], dict[str, Any]]:
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Floats, dict[str, Any]]:
         """Begin an episode: its first observation, and an empty dictionary."""
         super().reset(seed=seed)
         parameters, states = self._draw.begin(self.np_random.random((1, self._draw.dimension)))
@@ -75,7 +74,7 @@ class PlantEnv(gymnasium.Env):  # type: ignore[misc, unused-ignore]
             self.render()
         return outputs[: self._count].astype(np.float32), {}
 
-    def step(self, action: Any) -> tuple[npt.NDArray[np.float32], float, bool, bool, dict[str, Any]]:
+    def step(self, action: Any) -> tuple[Floats, float, bool, bool, dict[str, Any]]:
         """Hold an action for one period: observation, reward, terminated, truncated (never), the terms of the reward.
 
         The terms are `closeness`, exp(-sum e^2), and `effort`, which is subtracted from it.
@@ -158,7 +157,7 @@ def with_on_off_valves(env: Any) -> Any:
     return gymnasium.wrappers.vector.TransformAction(env, openings_of, all_spaces, space)
 
 
-def openings_of(action: Any) -> npt.NDArray[np.float32]:
+def openings_of(action: Any) -> Floats:
     """The actions from -1 to 1 for those of on/off valves."""
     return np.asarray(action, np.float32) - 1.0
 
@@ -191,7 +190,7 @@ class MeasuredObservations(gymnasium.ObservationWrapper):  # type: ignore[misc, 
         self._late.clear()
         return super().reset(seed=seed, options=options)
 
-    def observation(self, observation: Any) -> npt.NDArray[np.float32]:
+    def observation(self, observation: Any) -> Floats:
         """The reading of the sensors for an observation (k,)."""
         noisy = observation + self.noise * self.unwrapped.np_random.normal(size=observation.shape)
         step = np.where(self.resolution > 0, self.resolution, 1.0)

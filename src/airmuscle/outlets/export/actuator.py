@@ -93,8 +93,8 @@ class ActuatorModel:
 
         t, z = self._traced, casadi.SX.sym("z", 3)
         o = casadi.substitute(t.o, t.u, self._inputs(z, t.p))
-        known = {**{n: t.x[i] for i, n in enumerate(s.name for s in self.part.states)},
-                 **{n: o[i] for i, n in enumerate(t.output_names)}}  # fmt: skip
+        names = (*(s.name for s in self.part.states), *t.output_names)
+        known = dict(zip(names, casadi.vertsplit(casadi.vertcat(t.x, o)), strict=True))
         valid = casadi.SX(1.0)
         for limit in (each for each in self.part.column_limits if each.column in known):
             value, (low, high) = known[limit.column], limit.bounds

@@ -144,17 +144,13 @@ def base_powers(unit: str) -> dict[str, int] | None:
                 return None
             for base, power in BASE[atom[1]].items():
                 powers[base] = powers.get(base, 0) + sign * power * int(atom[2] or 1)
-    if "" in denominators:
-        return None
-    return {base: power for base, power in powers.items() if power}
+    return None if "" in denominators else {base: power for base, power in powers.items() if power}
 
 
 def add_units(parent: Element, units: Iterable[str]) -> None:
     """The element UnitDefinitions with these units, each once."""
     names = sorted({unit for unit in units if has_unit(unit)})
-    if not names:
-        return
-    definitions = SubElement(parent, "UnitDefinitions")
+    definitions = SubElement(parent, "UnitDefinitions") if names else parent
     for name in names:
         element, powers = SubElement(definitions, "Unit", name=name), base_powers(name)
         if powers is not None:

@@ -4,7 +4,6 @@ The computation is that of `airmuscle fit-joint`. A ZIP archive is a folder of e
 """
 
 import contextlib
-import dataclasses
 import tempfile
 import zipfile
 from collections.abc import Callable, Iterator, Mapping
@@ -34,29 +33,26 @@ FIELDS = ("mapping", *(each["name"] for each in form_fields(JointFitRequest)))
 """Fields of the page; each is a text, and may be empty."""
 
 
-@dataclasses.dataclass(frozen=True)
-class ArmSettings:
-    """What the user states about episodes: the texts of FIELDS, that of the mapping file among them."""
+ArmTexts = Mapping[str, str]
+"""What the user states about episodes: the texts of FIELDS, that of the mapping file among them."""
 
-    texts: Mapping[str, str]
 
-    def request(self, folder: Path) -> JointFitRequest:
-        """The request, whose mapping file and known joint are written to a folder. Raises InputError."""
-        given: dict[str, Any] = dict(self.texts)
-        given["mapping"] = _written(folder / MAPPING, given["mapping"])
-        known = given["known"].strip()
-        if known and ("=" in known or "[" in known):
-            try:
-                check_self_contained(parse_toml(known, KNOWN))
-            except AirmuscleError as error:
-                raise RequestError(str(error.message), "known") from None
-            given["known"] = str(_written(folder / KNOWN, known))
-        elif known and known not in list_plants():
-            raise RequestError(
-                f"'{known[:60]}' is no plant of the library; write the name of one, or the text of a scenario."
-                f"{suggestion(known, list_plants())}", "known",
-            )  # fmt: skip
-        return build(JointFitRequest, given, lambda name: name.replace("_", " "))
+def _request(texts: ArmTexts, folder: Path) -> JointFitRequest:
+    """The request, whose mapping file and known joint are written to a folder. Raises InputError."""
+    given: dict[str, Any] = {**texts, "mapping": _written(folder / MAPPING, texts["mapping"])}
+    known = texts["known"].strip()
+    if known and ("=" in known or "[" in known):
+        try:
+            check_self_contained(parse_toml(known, KNOWN))
+        except AirmuscleError as error:
+            raise RequestError(str(error.message), "known") from None
+        given["known"] = str(_written(folder / KNOWN, known))
+    elif known and known not in list_plants():
+        raise RequestError(
+            f"'{known[:60]}' is no plant of the library; write the name of one, or the text of a scenario."
+            f"{suggestion(known, list_plants())}", "known",
+        )  # fmt: skip
+    return build(JointFitRequest, given, lambda name: name.replace("_", " "))
 
 
 def _written(path: Path, text: str) -> Path:
@@ -65,26 +61,25 @@ def _written(path: Path, text: str) -> Path:
     return path
 
 
-def read_arm_settings(data: dict[str, Any]) -> ArmSettings:
+def read_arm_settings(data: dict[str, Any]) -> ArmTexts:
     """The settings in a request of the page. Raises RequestError."""
     values = {name: data.get(name, "") for name in FIELDS}
     for name in (n for n, value in values.items() if not isinstance(value, str) or len(value) > MAX_TEXT):
         raise RequestError(f"{name} must be a text of at most {MAX_TEXT} characters.", name)
-    return ArmSettings(values)
+    return values
 
 
-def sheet_of_episodes(folder: str, settings: ArmSettings) -> dict[str, Any]:
+def sheet_of_episodes(folder: str, texts: ArmTexts) -> dict[str, Any]:
     """What was understood of the episodes of a set; problems are part of the sheet, and no exception."""
     names = sorted(path.name for path in (Path(folder) / FILES).iterdir())
     sheet: dict[str, Any] = {
         "files": [{"name": name, "columns": []} for name in names], "recordings": [], "remarks": [], "problems": [],
-        "mapping": settings.texts["mapping"], "lines": [], "ready": False,
+        "mapping": texts["mapping"], "lines": [], "ready": False,
     }  # fmt: skip
     try:
         with _opened(Path(folder)) as (source, place):
             sheet["mapping"] = sheet["mapping"] or propose_mapping(source)
-            request = ArmSettings({**settings.texts, "mapping": sheet["mapping"]}).request(place)
-            found = inspect_requested(source, request)
+            found = inspect_requested(source, _request({**texts, "mapping": sheet["mapping"]}, place))
             sheet["lines"] = [line for line in str(found).splitlines() if not line.startswith("error: ")]
             sheet["problems"] = [{"field": "mapping", "text": text} for text in found.errors]
     except RequestError as error:
@@ -94,9 +89,8 @@ def sheet_of_episodes(folder: str, settings: ArmSettings) -> dict[str, Any]:
 
 
 def run_arm_fit(
-    folder: str, out: str, settings: ArmSettings, report: Callable[[float, str], None],
-    pack: Callable[[Path], list[str]],
-) -> None:  # fmt: skip
+    folder: str, out: str, texts: ArmTexts, report: Callable[[float, str], None], pack: Callable[[Path], list[str]]
+) -> None:
     """Fit an arm to the episodes of a set, and write its result into `out`; `pack` returns the files that are offered.
 
     Raises RequestError.
@@ -109,7 +103,7 @@ def run_arm_fit(
         report(1.0 - 0.9 ** len(lines) ** 1.5, text)  # the number of joints is not known before
 
     with _opened(Path(folder), "fit") as (source, place):
-        chapter, files = fit_requested_arm(source, settings.request(place), progress)
+        chapter, files = fit_requested_arm(source, _request(texts, place), progress)
     report(0.95, "report")
     with atomic_folder(out) as staging:
         write_into(staging, [chapter], title="Identified arm")

@@ -22,7 +22,7 @@ from typing import Any
 
 from ...core import AirmuscleError
 from ..requests import RequestError
-from .arm_task import ArmSettings, read_arm_settings, sheet_of_episodes
+from .arm_task import ArmTexts, read_arm_settings, sheet_of_episodes
 from .fit_settings import FitSettings, read_settings
 from .fit_task import DOWNLOADS, RESULT, run_fit, sheet_of_files
 from .fit_uploads import UploadStore, check_file_name
@@ -207,7 +207,7 @@ class FitService:
 
         wanted = await limited_table(request, MAX_SETTINGS)
         folder, settings = self._uploads.folder(_name(wanted, "set")), _settings(wanted)
-        task = sheet_of_episodes if isinstance(settings, ArmSettings) else sheet_of_files
+        task = sheet_of_files if isinstance(settings, FitSettings) else sheet_of_episodes
         sheet = await run_in_threadpool(self._pool.call, task, str(folder), settings, limit=READING_LIMIT)
         return json_answer(sheet)
 
@@ -238,7 +238,7 @@ class FitService:
         return FileResponse(path, media_type=_TYPES[name.rpartition(".")[2]], filename=shown)
 
 
-def _settings(wanted: dict[str, Any]) -> FitSettings | ArmSettings:
+def _settings(wanted: dict[str, Any]) -> FitSettings | ArmTexts:
     """The settings of measurement files of a muscle, or of episodes of an arm."""
     given = wanted.get("settings", {})
     is_arm = isinstance(given, dict) and given.get("record") == "arm"

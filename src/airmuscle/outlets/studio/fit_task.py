@@ -32,7 +32,7 @@ from ...report.data import as_json, as_sheet, in_words
 from ...report.formula import to_display_mathml
 from ...report.write import write_into
 from ..requests import FitRequest, RequestError, fit_requested, problem_of_lengths
-from .arm_task import ArmSettings, run_arm_fit
+from .arm_task import ArmTexts, run_arm_fit
 from .fit_reading import FileColumn, ReadSet, as_field_error, in_page_words, read_set
 from .fit_settings import SPLITS, FitSettings, Rule, selected, used_rows
 from .fit_uploads import FILES
@@ -56,12 +56,12 @@ MAX_POINTS, MAX_PARITY_POINTS = 2000, 4000
 """Maximum number of points of a loop and of the parity chart; of more rows every n-th one is shown (chosen)."""
 
 
-def run_fit(folder: str, out: str, settings: FitSettings | ArmSettings, report: Report) -> None:
+def run_fit(folder: str, out: str, settings: FitSettings | ArmTexts, report: Report) -> None:
     """Fit the selected rows of a set of files, and write result.json, report and muscle into `out`.
 
     Raises RequestError for input of the page that is not possible.
     """
-    if isinstance(settings, ArmSettings):
+    if not isinstance(settings, FitSettings):
         run_arm_fit(folder, out, settings, report, _pack)
         return
     report(0.0, "reading the files")
