@@ -165,15 +165,12 @@ def _instance(
         ),
         *(f"static const int {name}_{key}[] = {{{', '.join(map(str, [*at, 0]))}}};\n" for key, at in indices.items()),
         c_array(f"static const double {name}_start_pressures[]", [each.pressure for each in starts], 1),
-        "/* Ranges that are reported once when a column leaves them. */\n"
-        f"static const struct {{\n  int column;\n  double low, high;\n  const char *text;\n}} {name}_limits[] = {{\n"
-        f'{ranges}  {{0, 0.0, 0.0, ""}}\n}};\n',
     ]
     return {
         "file": name, "token": token, "partials": str(len(derivatives.places)), "limits": str(len(limits)),
         "indicators": str(indicators.count), "pressures": str(len(starts)), "slack": c_number(SLACK),
         "rtol": c_number(program.tolerance or 0.0), "start": c_number(problem.start_time),
-        "constants": "".join(constants),
+        "constants": "".join(constants), "ranges": ranges,
     }  # fmt: skip
 
 

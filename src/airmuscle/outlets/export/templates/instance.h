@@ -35,7 +35,15 @@ void model_partials(const double *restrict x, const double *restrict u, const do
 /* Differences that change sign where the rates are not smooth. */
 void model_indicators(const double *restrict x, const double *restrict u, const double *restrict c, double *restrict z);
 
-@constants@
+@constants@/* Ranges that are reported once when a column leaves them. */
+static const struct {
+  int column;
+  double low, high;
+  const char *text;
+} model_limits[] = {
+@ranges@  {0, 0.0, 0.0, ""}
+};
+
 typedef struct {
   model_solver s;
   double u[MODEL_INPUTS + 1], w[MODEL_INPUTS + 1], p[MODEL_PARAMETERS + 1], c[MODEL_PRECOMPUTED + 1];
