@@ -3,7 +3,7 @@
 import csv
 import dataclasses
 import io
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -11,10 +11,11 @@ import numpy as np
 from ...engine.compile.functions import ArraySizes, Extension
 from ...engine.compile.kernel_text import CKernels
 from ...engine.compile.text.programs import CLanguage
+from ...engine.loop import PiecewiseLinear
 from ...engine.run.integrators import Integrator
 from ...recording.recording import column_heading
 from .exported_run import BETWEEN, SHAPES, STEP, TABLEAU, ExportedLoop, ExportedRun, SolverText
-from .identifiers import block_comment, c_array, c_integers, c_number, c_string, c_strings, filled, make_identifiers
+from .identifiers import block_comment, c_integers, c_number, c_string, c_strings, c_values, filled, make_identifiers
 from .printed_system import ExportedSystem
 
 PUBLIC = frozenset({"prepare", "rhs", "outputs", "partials", "indicators"})
@@ -47,7 +48,7 @@ class CSource:
         }  # fmt: skip
         places = {
             "provenance": block_comment(self.provenance), "file": self.name, "enumerations": self._enumerations(),
-            **{key: str(number) for key, number in numbers.items()}, "constants": self._constants(),
+            **{key: str(number) for key, number in numbers.items()}, **self._constants(),
             **{key.lower(): c_number(constants[key]) for key in ("FIRST_STEP", "CLOSE")}, "functions": functions,
             "solver": self._solver_constants(sizes, constants) + filled("solver.c", solver.places, self.name),
         }  # fmt: skip
@@ -73,18 +74,17 @@ class CSource:
             text += f"enum {{\n{rows}\n}};\n" if words else ""
         return text
 
-    def _constants(self) -> str:
-        known, system, text, m, upper = self.system.known, self.system, "", self.name, self.upper
+    def _constants(self) -> dict[str, str]:
+        """The elements of the arrays of names, units and numbers, by the places of the template."""
+        known, system = self.system.known, self.system
         units = system.units | {leaf.path: leaf.declared.unit for leaf in system.tunable}
-        for kind, names in self._kinds.items():
-            size = f"{upper}_{kind.upper()}S + 1"
-            text += c_strings(f"const char *const {m}_{kind}_names[{size}]", names)
-            text += c_strings(f"const char *const {m}_{kind}_units[{size}]", [units[name] for name in names])
-        text += c_array(f"const double {m}_defaults[{upper}_PARAMETERS + 1]", system.defaults, 1)
-        text += c_array(f"const double {m}_nominal[{upper}_STATES]", system.compiled.nominal)
-        text += c_array(f"const double {m}_state_minimum[{upper}_STATES]", known.lower_bounds)
-        text += c_array(f"const double {m}_input_minimum[{upper}_INPUTS + 1]", known.input_minimum, 1)
-        return text + c_array(f"const double {m}_input_maximum[{upper}_INPUTS + 1]", known.input_maximum, 1)
+        places = {f"{kind}_names": c_strings(names) for kind, names in self._kinds.items()}
+        places |= {f"{kind}_units": c_strings(units[name] for name in names) for kind, names in self._kinds.items()}
+        return places | {
+            "defaults": c_values(system.defaults, 1), "nominal": c_values(system.compiled.nominal),
+            "state_minimum": c_values(known.lower_bounds), "input_minimum": c_values(known.input_minimum, 1),
+            "input_maximum": c_values(known.input_maximum, 1),
+        }  # fmt: skip
 
     def _solver(self) -> SolverText:
         shapes = {name: tuple(f"{self.upper}_{size}" for size in sizes) for name, sizes in SHAPES.items()}
@@ -101,7 +101,7 @@ class CSource:
             numbers["STAGES"] = len(tableau["NODES"])
         text = "".join(f"#define {self.upper}_{key} {value}\n" for key, value in numbers.items())
         for key, value in tableau.items():
-            text += c_array(f"static double {key}{f'[{len(value)}]' * value.ndim}", value)
+            text += f"static double {key}{f'[{len(value)}]' * value.ndim} = {{{c_values(value)}}};\n"
         return text
 
 
@@ -122,29 +122,49 @@ def main_program(program: ExportedRun) -> str:
     name, loop = program.name, program.loop
     columns, segments = program.columns, program.segments.ends
     numbers: dict[str, float] = {"rows": program.times.size, "segments": segments.size, "columns": len(columns)}
-    places = {"provenance": block_comment(program.provenance), "file": name, "valid": filled("valid.c", {}, name)}
+    places = {
+        "provenance": block_comment(program.provenance), "file": name, "valid": filled("valid.c", {}, name),
+        "header": c_string(csv_header(columns)), "start": c_number(program.problem.start_time),
+        "initial": c_values(program.problem.initial_vector), "times": c_values(program.times),
+        **_signal("", program.segments),
+    }  # fmt: skip
     if loop is None:
         every = program.system.known.column_names
-        columns_at = ", ".join(str(every.index(each)) for each in columns)
-        places["constants"] = "".join((
-            f"static const char header[] = {c_string(csv_header(columns))};\n",
-            f"static const int columns[COLUMNS] = {{{columns_at}}};\n",
-            f"static const double start = {c_number(program.problem.start_time)};\n", *_run_arrays(program),
-        ))  # fmt: skip
+        places["columns_at"] = ", ".join(str(every.index(each)) for each in columns)
     else:
-        drivers = len(loop.drivers.kinds)
         numbers |= {
-            "samples": loop.numbers["samples"], "pieces": loop.prepared.setpoint_signal.ends.size, "drivers": drivers,
-            "capacity": loop.capacity,
+            "samples": loop.numbers["samples"], "pieces": loop.prepared.setpoint_signal.ends.size,
+            "drivers": len(loop.drivers.kinds), "capacity": loop.capacity,
         }  # fmt: skip
-        places |= {
-            "apply_drivers": filled("apply_drivers.c", {}, name) if drivers else "",
-            "constants": _loop_constants(program, loop),
-            "kernels": CKernels(_shapes(f"{name.upper()}_INPUTS")).text("driven_inputs", loop.kernels),
-        }  # fmt: skip
+        places |= _loop_places(program, loop)
     places |= {key: str(number) for key, number in numbers.items()}
     places["program"] = filled("program.c", {"failures": filled("not_commanded.c", {}, name) if loop else ""}, name)
     return filled("loop.c" if loop else "main.c", places, name)
+
+
+def _signal(kind: str, signal: PiecewiseLinear) -> dict[str, str]:
+    """The places of the segments of a signal."""
+    tables = {"values": c_values(signal.values, 1), "slopes": c_values(signal.slopes, 1), "ends": c_values(signal.ends)}
+    return {f"{kind}{name}": text for name, text in tables.items()}
+
+
+def _loop_places(program: ExportedRun, loop: ExportedLoop) -> dict[str, str]:
+    """The places of a control loop; its arrays, which its kernels are given, are not const."""
+    name, known, table = program.name, program.system.known, loop.drivers
+    tables = {
+        "kinds": c_integers(list(map(tuple, table.kinds.tolist()))), "settings": c_values(table.settings),
+        "states": c_values(table.kept),
+    }  # fmt: skip
+    driven = len(table.kinds) > 0
+    return {
+        **{key: c_number(loop.numbers[key]) for key in ("sample_time", "near", "finish")},
+        "columns_at": c_integers(loop.column_at(known, program.columns)),
+        "measured_at": c_integers(loop.measured_at(known)), "commanded": c_integers(loop.prepared.commanded),
+        **_signal("setpoint_", loop.prepared.setpoint_signal),
+        "driver_tables": filled("driver_tables.c", tables, name) if driven else "",
+        "apply_drivers": filled("apply_drivers.c", {}, name) if driven else "",
+        "kernels": CKernels(_shapes(f"{name.upper()}_INPUTS")).text("driven_inputs", loop.kernels),
+    }  # fmt: skip
 
 
 def _shapes(inputs: str) -> dict[str, tuple[str, ...]]:
@@ -158,38 +178,3 @@ def _shapes(inputs: str) -> dict[str, tuple[str, ...]]:
         **dict.fromkeys(("given_values", "given_slopes"), ("", f"{inputs} + 1")),
         **dict.fromkeys(("setpoint_values", "setpoint_slopes"), ("", "SETPOINTS + 1")),
     }  # fmt: skip
-
-
-def _run_arrays(program: ExportedRun) -> Iterator[str]:
-    """The arrays of a run; those of a loop, which its kernels are given, are not const."""
-    upper, loop = program.name.upper(), program.loop
-    yield c_array(f"static const double initial[{upper}_STATES]", program.problem.initial_vector)
-    yield c_array("static const double times[ROWS]", program.times)
-    signals = [("", program.segments, "SEGMENTS", f"{upper}_INPUTS")]
-    if loop is not None:
-        signals.append(("setpoint_", loop.prepared.setpoint_signal, "PIECES", "SETPOINTS"))
-    for kind, signal, count, width in signals:
-        yield c_array(f"static const double {kind}ends[{count}]", signal.ends)
-        for name, table in (("values", signal.values), ("slopes", signal.slopes)):
-            yield c_array(f"static {'' if loop else 'const '}double {kind}{name}[{count}][{width} + 1]", table, 1)
-
-
-def _loop_constants(program: ExportedRun, loop: ExportedLoop) -> str:
-    known, numbers = program.system.known, loop.numbers
-    stated = {
-        "SAMPLE_TIME": numbers["sample_time"], "NEAR": numbers["near"], "start": program.problem.start_time,
-        "finish": numbers["finish"],
-    }  # fmt: skip
-    text = "".join(f"static const double {key} = {c_number(value)};\n" for key, value in stated.items())
-    text += f"static const char header[] = {c_string(csv_header(program.columns))};\n"
-    text += "/* Kind of each column (state, input, output, set point, measurement, command), and its number there. */\n"
-    text += c_integers("static const int columns[COLUMNS][2]", loop.column_at(known, program.columns))
-    text += c_integers("static const int measured_at[MEASUREMENTS][2]", loop.measured_at(known))
-    text += c_integers("static const int commanded[COMMANDS]", loop.prepared.commanded)
-    text += "".join(_run_arrays(program))
-    if len(loop.drivers.kinds):
-        text += c_integers("static int driver_kinds[DRIVERS][2]", list(map(tuple, loop.drivers.kinds.tolist())))
-        text += c_array("static double driver_settings[DRIVERS][4]", loop.drivers.settings)
-        text += c_array("static double driver_states[DRIVERS][4]", loop.drivers.kept)
-        text += "static double scratch[2][3][CAPACITY];\n"
-    return text

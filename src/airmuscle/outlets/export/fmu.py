@@ -17,7 +17,7 @@ from .compiler import Platform
 from .exported_run import ExportedRun
 from .fmi_package import FmuDescription, FmuExperiment, FmuPackage, WrittenFmu, check_target, token_of, write_archive
 from .fmi_variables import has_unit, make_variables, references_of
-from .identifiers import c_array, c_number, c_string, c_strings, filled
+from .identifiers import c_number, c_string, c_strings, c_values, filled
 from .printed_system import acting_parameters
 from .write import make_run
 
@@ -146,31 +146,20 @@ def _instance(
     ranges = "".join(
         f"  {{{column}, {c_number(low)}, {c_number(high)}, {c_string(text)}}},\n" for column, low, high, text in limits
     )
-    upper, bounds = name.upper(), [leaf.declared.bounds for leaf in system.tunable]
+    bounds = [leaf.declared.bounds for leaf in system.tunable]
     scales = indicators.scales(initial, np.array(inputs), system.defaults, system.compiled.nominal)
     indices = {"rows": [row for row, _ in derivatives.places], "columns": [column for _, column in derivatives.places],
                "pressure_rows": [each.row for each in starts], "air_masses": [each.air_mass for each in starts],
     }  # fmt: skip
-    padded = {
-        "start_inputs": ("INPUTS", inputs), "lowest": ("PARAMETERS", [low for low, _ in bounds]),
-        "highest": ("PARAMETERS", [high for _, high in bounds]), "scales": ("INDICATORS", scales),
-    }  # fmt: skip
-    constants = [
-        c_strings(f"static const char *const {name}_names[]", known.column_names),
-        c_array(f"static const double {name}_minimum[]", lowest),
-        c_array(f"static const double {name}_start_states[{upper}_STATES]", initial),
-        *(
-            c_array(f"static const double {name}_{table}[{upper}_{size} + 1]", values, 1)
-            for table, (size, values) in padded.items()
-        ),
-        *(f"static const int {name}_{key}[] = {{{', '.join(map(str, [*at, 0]))}}};\n" for key, at in indices.items()),
-        c_array(f"static const double {name}_start_pressures[]", [each.pressure for each in starts], 1),
-    ]
     return {
         "file": name, "token": token, "partials": str(len(derivatives.places)), "limits": str(len(limits)),
         "indicators": str(indicators.count), "pressures": str(len(starts)), "slack": c_number(SLACK),
-        "rtol": c_number(program.tolerance or 0.0), "start": c_number(problem.start_time),
-        "constants": "".join(constants), "ranges": ranges,
+        "rtol": c_number(program.tolerance or 0.0), "start": c_number(problem.start_time), "ranges": ranges,
+        "names": c_strings(known.column_names), "minimum": c_values(lowest), "start_states": c_values(initial),
+        "start_inputs": c_values(inputs, 1), "lowest": c_values([low for low, _ in bounds], 1),
+        "highest": c_values([high for _, high in bounds], 1), "scales": c_values(scales, 1),
+        **{key: ", ".join(map(str, [*at, 0])) for key, at in indices.items()},
+        "start_pressures": c_values([each.pressure for each in starts], 1),
     }  # fmt: skip
 
 

@@ -16,7 +16,7 @@ from .compiler import Platform
 from .fmi_package import FmuDescription, FmuExperiment, FmuPackage, WrittenFmu, archive, check_target, token_of
 from .fmi_variables import Variable, Variables, base_powers, has_unit
 from .fmu import fmu_package
-from .identifiers import block_comment, c_array, c_number, c_strings, filled, program_name
+from .identifiers import block_comment, c_number, c_values, filled, program_name
 from .printed_controller import PrintedController, check_control_law, print_controller
 
 STRUCTURE, COMMON = (f"http://ssp-standard.org/SSP1/SystemStructure{kind}" for kind in ("Description", "Common"))
@@ -90,17 +90,10 @@ def _first_row(problem: Problem) -> dict[str, float]:
 def _instance(printed: PrintedController, token: str, start: float, sample_time: float, inputs: Sequence[float]) -> str:
     """The C source of an instance."""
     name, bounds = printed.name, [leaf.declared.bounds for leaf in printed.tunable]
-    parameters = f"[{name.upper()}_PARAMETERS + 1]"
-    tables = {
-        f"initial_memory[{name.upper()}_MEMORY + 1]": printed.initial_memory, "start_inputs[]": inputs,
-        f"defaults{parameters}": printed.defaults, f"lowest{parameters}": [low for low, _ in bounds],
-        f"highest{parameters}": [high for _, high in bounds],
-    }  # fmt: skip
-    constants = [c_array(f"static const double {name}_{table}", values, 1) for table, values in tables.items()]
-    constants.append(c_strings(f"static const char *const {name}_parameter_names{parameters}", printed.paths))
     places = printed.places | {
         "provenance": block_comment(printed.provenance), "token": token, "period": c_number(sample_time),
-        "start": c_number(start), "constants": "".join(constants),
+        "start": c_number(start), "start_inputs": c_values(inputs, 1),
+        "lowest": c_values([low for low, _ in bounds], 1), "highest": c_values([high for _, high in bounds], 1),
         "functions": printed.sample_in(CLanguage("double", f"{name}_")),
     }  # fmt: skip
     return filled("controller_instance.h", places, name)

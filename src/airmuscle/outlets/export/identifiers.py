@@ -105,25 +105,25 @@ def c_string(text: str) -> str:
     return '"' + "".join(chr(b) if chr(b) in _PLAIN else f"\\{b:03o}" for b in encoded) + '"'
 
 
-def c_strings(declaration: str, texts: Iterable[str]) -> str:
-    """An array of texts, with an empty one at its end."""
-    return f"{declaration} = {{{_wrapped([*map(c_string, texts), c_string('')])}}};\n"
+def c_strings(texts: Iterable[str]) -> str:
+    """The elements of an array of texts, with an empty one at its end."""
+    return _wrapped([*map(c_string, texts), c_string("")])
 
 
-def c_array(declaration: str, values: Any, padding: int = 0, number: str = "double") -> str:
-    """An array (N,) or a table (N, m) of a type of numbers, each row with so many zeros at its end."""
+def c_values(values: Any, padding: int = 0, number: str = "double") -> str:
+    """The elements of an array (N,) or the rows of a table (N, m), each with so many zeros at its end."""
     table = np.asarray(values, dtype=float)
     rows = [
         [c_number(value, number) for value in (*row, *[0.0] * padding)] for row in np.atleast_2d(table).tolist()
     ]  # fmt: skip
     texts = rows[0] if table.ndim == 1 else [f"{{{', '.join(row)}}}" for row in rows]
-    return f"{declaration} = {{{_wrapped(texts)}}};\n"
+    return _wrapped(texts)
 
 
-def c_integers(declaration: str, values: Sequence[Any]) -> str:
-    """An array of whole numbers, or a table of rows of them; of none, one zero, because C has no empty array."""
+def c_integers(values: Sequence[Any]) -> str:
+    """The whole numbers of an array, or the rows of a table; of none, one zero, because C has no empty array."""
     rows = [f"{{{', '.join(map(str, row))}}}" if isinstance(row, tuple) else str(row) for row in values]
-    return f"{declaration} = {{{_wrapped(rows or ['0'])}}};\n"
+    return _wrapped(rows or ["0"])
 
 
 def with_cmake(name: str, files: Mapping[str, str]) -> dict[str, str]:

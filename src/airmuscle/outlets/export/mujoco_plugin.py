@@ -179,14 +179,11 @@ def _sources(part: Plant, name: str, controls: Sequence[Input], lines: Sequence[
     paths, states = [leaf.path for leaf in system.tunable], system.known.state_names
     own = [leaf.path for leaf in leaves(part)]
     places = [*(system.known.input_names.index(i.name) for i in controls), -1, -1]
-    constants = [
-        c_strings("static const char *const attributes[]", [*own, REST_LENGTH]),
-        c_integers("static const int places[]", [paths.index(path) for path in own]),
-        c_integers("static const int own_states[]", [states.index(state.name) for state in part.states]),
-        f"static const double rest_length = {c_number(part.muscles[0].geometry.resting_length)};\n",
-    ]
     values = {
-        "provenance": block_comment(lines), "name": f"airmuscle.{name}", "file": name, "constants": "".join(constants),
+        "provenance": block_comment(lines), "name": f"airmuscle.{name}", "file": name,
+        "attribute_names": c_strings([*own, REST_LENGTH]), "places": c_integers([paths.index(path) for path in own]),
+        "own_states": c_integers([states.index(state.name) for state in part.states]),
+        "rest_length": c_number(part.muscles[0].geometry.resting_length),
         "attributes": str(len(own) + 1), "first": str(places[0]), "second": str(places[1]),
     }  # fmt: skip
     texts = CSource(name, system, Rodas4(TOLERANCE), lines).files()

@@ -18,7 +18,7 @@ from ...engine.loop import ControlLaw, ControlLoop
 from ...engine.run import Problem
 from ...engine.run.compiled_law import trace_sample
 from ...engine.run.sampled_loop import SampledLoop
-from .identifiers import block_comment, c_array, c_number, c_strings, filled, make_identifiers, provenance, with_cmake
+from .identifiers import block_comment, c_number, c_strings, c_values, filled, make_identifiers, provenance, with_cmake
 from .printed_system import find_leaf, make_labels
 
 SINGLE_TOLERANCE = 1e-4
@@ -68,13 +68,14 @@ class PrintedController:
         counts = {key: str(len(names)) for key, names in zip(keys, self._kinds.values(), strict=True)}
         return counts | {
             "provenance": block_comment(self.provenance), "file": self.name, "enumerations": self._enumerations(),
-            "number": self.number,
+            "number": self.number, "initial_memory": c_values(self.initial_memory, 1, self.number),
+            "parameter_values": c_values(self.defaults, 1, self.number), "parameter_names": c_strings(self.paths),
         }  # fmt: skip
 
     def source_files(self) -> dict[str, str]:
         """Header and source, by file name."""
         functions = self.sample_in(CLanguage(self.number, f"{self.name}_"))
-        places = {**self.places, "functions": functions, "constants": self._constants()}
+        places = {**self.places, "functions": functions}
         return {f"{self.name}.{end}": filled(f"controller.{end}", places, self.name) for end in "hc"}
 
     def sample_in(self, language: TargetLanguage) -> str:
@@ -100,19 +101,13 @@ class PrintedController:
     def files(self, measured: Array, setpoints: Array, commands: Array) -> dict[str, str]:
         """Header, source and the program that replays measurements (K, m), set points (K, s) and commands (K, c) of a
         run, by file name."""
-        upper, number, precision = self.name.upper(), self.number, "single" if self.tolerance else "double"
-        tables = (
-            c_array(f"static const {number} measured[SAMPLES][{upper}_MEASUREMENTS + 1]", measured, 1, number),
-            c_array(f"static const {number} setpoints[SAMPLES][{upper}_SETPOINTS + 1]", setpoints, 1, number),
-            c_array(f"static const double commands[SAMPLES][{upper}_COMMANDS + 1]", commands, 1),
-        )
+        number, precision = self.number, "single" if self.tolerance else "double"
+        limits = {"tolerance": c_number(self.tolerance), "ranges": c_values(self.ranges_of(commands), 1)}
         places = {
             "provenance": block_comment(self.provenance), "file": self.name, "samples": str(len(measured)),
-            "tables": "".join(tables), "number": number, "about": filled(f"about_{precision}.c", {}, self.name),
-            "comparison": filled(f"replay_{precision}.c", {
-                "tolerance": c_number(self.tolerance),
-                "ranges": c_array(f"static const double ranges[{upper}_COMMANDS + 1]", self.ranges_of(commands), 1),
-            }, self.name),
+            "number": number, "about": filled(f"about_{precision}.c", {}, self.name),
+            "measured": c_values(measured, 1, number), "setpoints": c_values(setpoints, 1, number),
+            "commands": c_values(commands, 1), "comparison": filled(f"replay_{precision}.c", limits, self.name),
         }  # fmt: skip
         return with_cmake(self.name, {**self.source_files(), "main.c": filled("replay.c", places, self.name)})
 
@@ -148,14 +143,6 @@ class PrintedController:
         largest = np.abs(commands).max(axis=0, initial=0.0)
         width = np.array([high - low for low, high in self.ranges], dtype=float)
         return np.where(np.isfinite(width), width, np.where(largest > 0.0, largest, 1.0))
-
-    def _constants(self) -> str:
-        upper, number = self.name.upper(), self.number
-        return "".join((
-            c_array(f"const {number} {self.name}_initial_memory[{upper}_MEMORY + 1]", self.initial_memory, 1, number),
-            c_array(f"{number} {self.name}_parameters[{upper}_PARAMETERS + 1]", self.defaults, 1, number),
-            c_strings(f"const char *const {self.name}_parameter_names[{upper}_PARAMETERS + 1]", self.paths),
-        ))  # fmt: skip
 
     @property
     def _kinds(self) -> dict[str, Sequence[str]]:

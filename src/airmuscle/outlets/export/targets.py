@@ -12,7 +12,7 @@ from ...engine.compile.text.programs import DEFINITION, CLanguage, JavaScriptLan
 from ...physics.muscle.characteristic import Characteristic, ContractionLaw, ForceLaw, PressureLaw
 from .c_source import CSource, main_program
 from .exported_run import ExportedRun
-from .identifiers import block_comment, c_array, c_strings, filled, line_comment, provenance, with_cmake
+from .identifiers import block_comment, c_strings, c_values, filled, line_comment, provenance, with_cmake
 from .scripting import javascript_files, m_array, m_strings, octave_files, to_json
 
 FORMS: tuple[tuple[type[Characteristic], str, tuple[str, str], tuple[str, str, str]], ...] = (
@@ -30,7 +30,6 @@ class PrintedLaw:
     """A law as expressions, with what its files state."""
 
     name: str
-    method: str
     arguments: tuple[str, str]
     results: tuple[str, str, str]
     symbols: tuple[Any, Any]
@@ -44,19 +43,14 @@ class PrintedLaw:
         """The values of the parameters."""
         return [float(leaf.value) for leaf in self.known]
 
-    def text(self, language: TargetLanguage) -> tuple[str, int]:
-        """`prepare` and the function `evaluate(argument, argument, c, result)`, and the length of c."""
-        printer = Printer(language)
+    def places(self, language: TargetLanguage) -> dict[str, str]:
+        """The places of a template, with `prepare` and the function `evaluate(argument, argument, c, result)`."""
+        printer, (first, second) = Printer(language), self.arguments
         inputs = dict(zip(self.arguments, self.symbols, strict=True))
         printer.add("evaluate", {**inputs, PARAMETERS: self.parameters}, {"result": self.values}, self.arguments)
-        return printer.module(), printer.held
-
-    def places(self, held: int) -> dict[str, str]:
-        """The places of a template of which c has so many numbers."""
-        first, second = self.arguments
         return {
-            "provenance": block_comment(self.provenance), "file": self.name, "held": str(held),
-            "parameters": str(len(self.known)), "first": first, "second": second,
+            "provenance": block_comment(self.provenance), "file": self.name, "functions": printer.module(),
+            "held": str(printer.held), "parameters": str(len(self.known)), "first": first, "second": second,
             "first_unit": UNITS[first], "second_unit": UNITS[second], "results": ", ".join(self.results),
         }  # fmt: skip
 
@@ -85,7 +79,7 @@ def print_law(law: Characteristic, name: str, title: str) -> PrintedLaw:
     known = casadi.logic_and(*(casadi.logic_or(each >= 0, each < 0) for each in x))
     values = casadi.if_else(known, casadi.densify(casadi.vertcat(value, *slopes)), x[0] + x[1])
     lines = provenance(title, law)
-    return PrintedLaw(name, method, arguments, results, x, parameters, casadi.cse(values), tuple(leaves(law)), lines)
+    return PrintedLaw(name, arguments, results, x, parameters, casadi.cse(values), tuple(leaves(law)), lines)
 
 
 class Target(abc.ABC):
@@ -114,11 +108,8 @@ class C99(Target):
         return with_cmake(program.name, {**source, **controller, "main.c": main_program(program)})
 
     def law_files(self, law: PrintedLaw) -> dict[str, str]:
-        text, held = law.text(CLanguage("double", f"{law.name}_", None))
-        size = f"[{law.name.upper()}_PARAMETERS + 1]"
-        constants = c_array(f"const double {law.name}_defaults{size}", law.defaults, 1)
-        constants += c_strings(f"const char *const {law.name}_parameter_names{size}", (p.path for p in law.known))
-        places = {**law.places(held), "functions": text, "constants": constants}
+        constants = {"defaults": c_values(law.defaults, 1), "parameter_names": c_strings(p.path for p in law.known)}
+        places = law.places(CLanguage("double", f"{law.name}_", None)) | constants
         return with_cmake(law.name, {f"{law.name}.{end}": filled(f"law.{end}", places, law.name) for end in "hc"})
 
 
@@ -130,10 +121,9 @@ class JavaScript(Target):
         return javascript_files(program)
 
     def law_files(self, law: PrintedLaw) -> dict[str, str]:
-        text, held = law.text(JavaScriptLanguage())
         stated = {"parameters": [p.path for p in law.known], "defaults": law.defaults, "results": law.results}
         constants = "".join(f"export const {name} = {to_json(value)};\n" for name, value in stated.items())
-        places = {**law.places(held), "functions": text, "constants": constants}
+        places = law.places(JavaScriptLanguage()) | {"constants": constants}
         return {f"{law.name}.mjs": filled("law.mjs", places, law.name)}
 
 
@@ -145,9 +135,9 @@ class Octave(Target):
         return octave_files(program)
 
     def law_files(self, law: PrintedLaw) -> dict[str, str]:
-        text, held = law.text(MatlabLanguage())
-        places = {
-            **law.places(held), "provenance": line_comment(law.provenance), "defaults": m_array(law.defaults),
-            "names": m_strings(p.path for p in law.known), "functions": f"{DEFINITION}\n{text}",
+        places = law.places(MatlabLanguage())
+        places |= {
+            "provenance": line_comment(law.provenance), "defaults": m_array(law.defaults),
+            "names": m_strings(p.path for p in law.known), "functions": f"{DEFINITION}\n{places['functions']}",
         }  # fmt: skip
         return {f"{law.name}.m": filled("law.m", places, law.name)}

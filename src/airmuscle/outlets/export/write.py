@@ -16,7 +16,7 @@ from ...engine.run.batch.lanes import Double, Precision, Single
 from ...engine.run.sampled_loop import SampledLoop, prepare_loop
 from ...physics.muscle.characteristic import Characteristic
 from .exported_run import CONTROLLER, ExportedRun, export_loop
-from .identifiers import c_array, c_integers, c_number, filled, program_name, provenance
+from .identifiers import c_integers, c_number, c_values, filled, program_name, provenance
 from .printed_controller import SINGLE_TOLERANCE, PrintedController, check_control_law, print_controller
 from .printed_system import export_system
 from .targets import C99, Target, print_law
@@ -47,7 +47,7 @@ class PrintedPredictive(PrintedController):
         known = {**law.constants, **self._given, "operating": model.inputs, "sizes": model.input_sizes,
                  "at_measured": model.measured, "at_controlled": law.target.controlled}  # fmt: skip
         places = {
-            **self.places, "constants": self._constants(),
+            **self.places,
             "tables": "".join(_table(f"{self.name}_{name}", array, number) for name, array in known.items()),
             "functions": CKernels(shapes, number=number).text("predictive", ["predictive_sample"]),
             "work": "".join(
@@ -114,9 +114,10 @@ def print_predictive(prepared: SampledLoop, name: str, title: str, number: str) 
 def _table(name: str, array: Array, number: str) -> str:
     """A constant array; a table is not const, because C converts no pointer to rows of constants."""
     if array.dtype == np.int64:
-        return c_integers(f"static const int {name}[{len(array)}]", array.tolist())
+        return f"static const int {name}[{len(array)}] = {{{c_integers(array.tolist())}}};\n"
     size = "".join(f"[{k}]" for k in array.shape)
-    return c_array(f"static {'const ' if array.ndim == 1 else ''}{number} {name}{size}", array, number=number)
+    constant = "const " if array.ndim == 1 else ""
+    return f"static {constant}{number} {name}{size} = {{{c_values(array, number=number)}}};\n"
 
 
 NOTE = (

@@ -7,7 +7,10 @@
 #define restrict
 #endif
 
-@constants@
+const @number@ model_initial_memory[MODEL_MEMORY + 1] = {@initial_memory@};
+@number@ model_parameters[MODEL_PARAMETERS + 1] = {@parameter_values@};
+const char *const model_parameter_names[MODEL_PARAMETERS + 1] = {@parameter_names@};
+
 @functions@
 int model_step(@number@ *memory, const @number@ *measurement, const @number@ *setpoint, @number@ *command)
 {

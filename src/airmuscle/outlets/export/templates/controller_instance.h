@@ -24,7 +24,13 @@
 /* Inputs of which derivatives by time can be given: none, because a controller samples. */
 #define MODEL_LINEAR_INPUTS 0
 
-@constants@
+static const double model_initial_memory[MODEL_MEMORY + 1] = {@initial_memory@};
+static const double model_start_inputs[] = {@start_inputs@};
+static const double model_defaults[MODEL_PARAMETERS + 1] = {@parameter_values@};
+static const double model_lowest[MODEL_PARAMETERS + 1] = {@lowest@};
+static const double model_highest[MODEL_PARAMETERS + 1] = {@highest@};
+static const char *const model_parameter_names[MODEL_PARAMETERS + 1] = {@parameter_names@};
+
 static const double model_nominal[1] = {1.0};
 
 @functions@

@@ -35,7 +35,19 @@ void model_partials(const double *restrict x, const double *restrict u, const do
 /* Differences that change sign where the rates are not smooth. */
 void model_indicators(const double *restrict x, const double *restrict u, const double *restrict c, double *restrict z);
 
-@constants@/* Ranges that are reported once when a column leaves them. */
+static const char *const model_names[] = {@names@};
+static const double model_minimum[] = {@minimum@};
+static const double model_start_states[MODEL_STATES] = {@start_states@};
+static const double model_start_inputs[MODEL_INPUTS + 1] = {@start_inputs@};
+static const double model_lowest[MODEL_PARAMETERS + 1] = {@lowest@};
+static const double model_highest[MODEL_PARAMETERS + 1] = {@highest@};
+static const double model_scales[MODEL_INDICATORS + 1] = {@scales@};
+static const int model_rows[] = {@rows@};
+static const int model_columns[] = {@columns@};
+static const int model_pressure_rows[] = {@pressure_rows@};
+static const int model_air_masses[] = {@air_masses@};
+static const double model_start_pressures[] = {@start_pressures@};
+/* Ranges that are reported once when a column leaves them. */
 static const struct {
   int column;
   double low, high;

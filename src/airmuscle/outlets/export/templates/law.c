@@ -7,5 +7,7 @@
 #define restrict
 #endif
 
-@constants@
+const double model_defaults[MODEL_PARAMETERS + 1] = {@defaults@};
+const char *const model_parameter_names[MODEL_PARAMETERS + 1] = {@parameter_names@};
+
 @functions@

@@ -20,7 +20,24 @@
 #define NOT_COMMANDED 4
 
 @kernels@
-@constants@
+static const double SAMPLE_TIME = @sample_time@;
+static const double NEAR = @near@;
+static const double start = @start@;
+static const double finish = @finish@;
+static const char header[] = @header@;
+/* Kind of each column (state, input, output, set point, measurement, command), and its number there. */
+static const int columns[COLUMNS][2] = {@columns_at@};
+static const int measured_at[MEASUREMENTS][2] = {@measured_at@};
+static const int commanded[COMMANDS] = {@commanded@};
+static const double initial[MODEL_STATES] = {@initial@};
+static const double times[ROWS] = {@times@};
+static const double ends[SEGMENTS] = {@ends@};
+static double values[SEGMENTS][MODEL_INPUTS + 1] = {@values@};
+static double slopes[SEGMENTS][MODEL_INPUTS + 1] = {@slopes@};
+static const double setpoint_ends[PIECES] = {@setpoint_ends@};
+static double setpoint_values[PIECES][SETPOINTS + 1] = {@setpoint_values@};
+static double setpoint_slopes[PIECES][SETPOINTS + 1] = {@setpoint_slopes@};
+@driver_tables@
 /* The run: solver, parameters in the form that the functions need, memory and arrays of the controller, inputs just
    before a sample, and the next row, segment of the other inputs and segment of the set points. */
 static model_solver s;

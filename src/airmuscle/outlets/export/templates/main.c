@@ -9,7 +9,15 @@
 #define SEGMENTS @segments@
 #define COLUMNS @columns@
 
-@constants@
+static const char header[] = @header@;
+static const int columns[COLUMNS] = {@columns_at@};
+static const double start = @start@;
+static const double initial[MODEL_STATES] = {@initial@};
+static const double times[ROWS] = {@times@};
+static const double ends[SEGMENTS] = {@ends@};
+static const double values[SEGMENTS][MODEL_INPUTS + 1] = {@values@};
+static const double slopes[SEGMENTS][MODEL_INPUTS + 1] = {@slopes@};
+
 @valid@
 static int write_row(FILE *out, double time, const double *x, const double *u, const double *c)
 {

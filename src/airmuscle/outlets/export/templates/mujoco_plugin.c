@@ -29,7 +29,11 @@
 /* Attributes: the parameters by their paths, then the length of the transmission at which the muscle is at rest. */
 #define ATTRIBUTES @attributes@
 
-@constants@
+static const char *const attributes[] = {@attribute_names@};
+static const int places[] = {@places@};
+static const int own_states[] = {@own_states@};
+static const double rest_length = @rest_length@;
+
 /* `force` contains the tension of every actuator in the last evaluation, because qfrc_actuator is a sum. */
 typedef struct {
   double p[MODEL_PARAMETERS + 1], rest;

@@ -3,7 +3,10 @@
 
 #include <math.h>
 
-@constants@
+const @number@ model_initial_memory[MODEL_MEMORY + 1] = {@initial_memory@};
+@number@ model_parameters[MODEL_PARAMETERS + 1] = {@parameter_values@};
+const char *const model_parameter_names[MODEL_PARAMETERS + 1] = {@parameter_names@};
+
 /* Constants of the sample; deviations from the operating point, scaled. */
 @tables@
 @functions@

@@ -8,7 +8,10 @@
 
 #define SAMPLES @samples@
 
-@tables@
+static const @number@ measured[SAMPLES][MODEL_MEASUREMENTS + 1] = {@measured@};
+static const @number@ setpoints[SAMPLES][MODEL_SETPOINTS + 1] = {@setpoints@};
+static const double commands[SAMPLES][MODEL_COMMANDS + 1] = {@commands@};
+
 @comparison@
 int main(void)
 {

@@ -1,7 +1,8 @@
 /* Allowed difference, as part of the range of a command (chosen). */
 #define TOLERANCE @tolerance@
 
-@ranges@static double greatest;
+static const double ranges[MODEL_COMMANDS + 1] = {@ranges@};
+static double greatest;
 
 /* Whether a command differs by more than the tolerance from the expected one. */
 static int differs(double command, double expected, int i)
