@@ -24,7 +24,7 @@ from airmuscle.files.library import Location
 from airmuscle.files.library.build import build
 from airmuscle.files.scenario import build_scenario
 from airmuscle.outlets import export_page
-from airmuscle.outlets.studio import fill_template, library_list, sheet_of_any, sheet_of_scenario_text
+from airmuscle.outlets.studio import library_list, sheet_of_any, sheet_of_scenario_text
 from airmuscle.outlets.studio.law_sheet import law_sheet
 from airmuscle.physics import Braid, PleatedTube, StraightFibre
 
@@ -33,6 +33,13 @@ pytestmark = pytest.mark.filterwarnings("ignore::airmuscle.core.errors.Airmuscle
 LAWS = [name for name in list_laws() if name not in WITHOUT_CLOSED_FORM]
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 TOLERANCE = 1e-12
+
+
+def fill_template(template: list[str | int], values: list[float]) -> str:
+    """The text with these values, as the page fills it in."""
+    return "".join(repr(values[item]) if isinstance(item, int) else item for item in template)
+
+
 EVALUATE = """
 console.log(JSON.stringify(DATA.map(([sheet, values, points]) => {
   const law = new airmuscle.Law(sheet);

@@ -15,7 +15,6 @@ from .joint_laws import statics_within_valves as statics_within_valves
 from .joint_sheet import joint_names as joint_names
 from .joint_sheet import joint_tables as joint_tables
 from .joint_sheet import sheet_of_joint as sheet_of_joint
-from .law_sheet import fill_template as fill_template
 from .page import export_page as export_page
 from .page import self_contained_page as self_contained_page
 from .plant_sheet import sheet_of_tables as sheet_of_tables

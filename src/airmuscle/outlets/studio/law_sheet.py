@@ -195,11 +195,6 @@ def toml_template(write: Callable[[Any], str], model: Any) -> Template:
     return template
 
 
-def fill_template(template: Template, values: list[float]) -> str:
-    """The text with these values, as the page fills it in."""
-    return "".join(repr(values[item]) if isinstance(item, int) else item for item in template)
-
-
 # The printed law
 
 
