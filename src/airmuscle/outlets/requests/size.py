@@ -2,7 +2,6 @@
 
 import contextlib
 from collections.abc import Callable, Mapping
-from typing import Any
 
 from ...core import UnitError, quantity
 from ...design.sizing import JointRequirement, LiftRequirement, SizingConditions, SizingResult, size_muscles
@@ -89,26 +88,20 @@ class SizeRequest:
             load, stroke, torque, angle = map(where, (*LIFT[:2], *JOINT[:2]))
             raise RequestError(f"give {load} and {stroke} for a lift, or {torque} and {angle} for a joint")
 
-    @property
-    def requirement(self) -> Requirement:
-        """The lift or the joint. Raises ParameterError."""
-        if self.load is not None and self.stroke is not None:
-            return LiftRequirement(self.stroke, stiffness=self.stiffness or 0.0, **self.load)
-        return JointRequirement(self.angle or 0.0, self.torque or 0.0, self.inertia or 0.0)
-
-    @property
-    def conditions(self) -> SizingConditions:
-        """The conditions of operation. Raises ParameterError."""
-        limits: dict[str, Any] = {
-            name: value for name in ("max_length", "max_diameter") if (value := getattr(self, name)) is not None
-        }
-        low, high = (1, self.max_count) if self.count is None else (self.count, self.count)
-        return SizingConditions(self.supply, self.safety, self.cycle_time, min_count=low, max_count=high, **limits)
-
     def evaluate(self, progress: Callable[[float], None] | None = None) -> SizingResult:
-        """The sizing, with at least one choice. Raises SolveError with what is reachable."""
-        entries = tuple(map(load_law, self.muscle)) or None
-        sort: Any = self.sort
-        result = size_muscles(self.requirement, self.conditions, entries, sort, progress)
+        """The sizing, with at least one choice. Raises ParameterError, and SolveError with what is reachable."""
+        requirement: Requirement
+        if self.load is not None and self.stroke is not None:
+            requirement = LiftRequirement(self.stroke, stiffness=self.stiffness or 0.0, **self.load)
+        else:
+            requirement = JointRequirement(self.angle or 0.0, self.torque or 0.0, self.inertia or 0.0)
+        limits = {name: getattr(self, name) for name in ("max_length", "max_diameter")}
+        limits = {name: limit for name, limit in limits.items() if limit is not None}
+        low, high = (1, self.max_count) if self.count is None else (self.count, self.count)
+        conditions = SizingConditions(
+            self.supply, self.safety, self.cycle_time, min_count=low, max_count=high, **limits
+        )
+        entries, sort = tuple(map(load_law, self.muscle)) or None, self.sort
+        result = size_muscles(requirement, conditions, entries, sort, progress)  # type: ignore[arg-type]
         result.check_reachable()
         return result
