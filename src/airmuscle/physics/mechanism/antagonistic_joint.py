@@ -3,7 +3,7 @@
 import abc
 from collections.abc import Sequence
 
-from ...core import ParameterError, Value, Values, check_structure, model, ops, parameter
+from ...core import ParameterError, Value, Values, model, ops, parameter
 from .base import Coordinate, DampedCoordinate, angle_limit, gravity_parameter
 
 SAMPLES = 101
@@ -129,7 +129,6 @@ class AntagonisticJoint(DampedCoordinate):
     profile: PulleyProfile = ConstantRadius()
 
     def check(self) -> None:
-        check_structure(self)
         reach = max(abs(self.min_angle), abs(self.max_angle))  # the profile of the second muscle is mirrored
         check_profile("AntagonisticJoint", self.profile, -reach, reach)
 

@@ -5,7 +5,7 @@ import itertools
 from collections.abc import Sequence
 from typing import Any
 
-from ...core import ParameterError, Value, Values, check_structure, model, ops, parameter
+from ...core import ParameterError, Value, Values, model, ops, parameter
 from .antagonistic_joint import ConstantRadius, PulleyProfile
 from .base import Coordinate, Mechanism, angle_limit, gravity_parameter
 
@@ -54,7 +54,6 @@ class Arm(Mechanism):
     routes: tuple[MuscleRoute, ...]
 
     def check(self) -> None:
-        check_structure(self)
         name = type(self).__name__
         if not self.links or not self.routes:
             raise ParameterError(

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from typing import cast
 
-from ...core import ParameterError, StateVariable, Value, Values, check_structure, model, ops, parameter
+from ...core import ParameterError, StateVariable, Value, Values, model, ops, parameter
 from .base import Coordinate, Mechanism
 from .serial_arm import SerialArm
 from .wrapper import ForceWrapper
@@ -134,7 +134,6 @@ class WithStickSlip(ForceWrapper):
     residual: GaussianResidual | None = None
 
     def check(self) -> None:
-        check_structure(self)
         angles, owner = self._angles, type(self.inner).__name__
         if len(angles) != len(self.elements) or not angles:
             raise ParameterError(

@@ -5,7 +5,7 @@ import itertools
 from collections.abc import Sequence
 from typing import ClassVar
 
-from ...core import Input, ParameterError, Value, Values, check_structure, model, ops, parameter
+from ...core import Input, ParameterError, Value, Values, model, ops, parameter
 from ...core.declaration import forwarded
 from .base import Coordinate, Mechanism, gravity_parameter
 
@@ -98,7 +98,6 @@ class CoordinateWrapper(ForceWrapper):
     """What acts on the coordinate, in messages."""
 
     def check(self) -> None:
-        check_structure(self)
         name, inner, unit = type(self).__name__, type(self.inner).__name__, self.unit
         candidates = [c.name for c in self.inner.coordinates if c.unit == unit]
         if self.coordinate and self.coordinate not in candidates:
@@ -163,7 +162,6 @@ class JointWithExternalTorque(ForceWrapper):
     inner: Mechanism
 
     def check(self) -> None:
-        check_structure(self)
         coordinates = self.inner.coordinates
         if len(coordinates) != 1 or coordinates[0].unit != "rad":
             names = ", ".join(f"{c.name} [{c.unit}]" for c in coordinates) or "none"
@@ -202,7 +200,6 @@ class MusclesInSeries(MechanismWrapper):
     gravity: float = gravity_parameter()
 
     def check(self) -> None:
-        check_structure(self)
         if not self.node_masses:
             raise ParameterError(
                 "MusclesInSeries: node_masses is empty; give the mass of each node. Two muscles have one node."

@@ -5,7 +5,7 @@ import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any, ClassVar, TypeVar
 
-from ...core import ParameterError, Reference, Value, Values, check_structure, model, ops
+from ...core import ParameterError, Reference, Value, Values, model, ops
 from ...core.declaration import forwarded
 from ...core.system import Input, StateVariable, add_prefix, select_prefix, with_prefix
 from .gas import NO_FLOW, Air, Airs, Ambient, Flow
@@ -206,11 +206,6 @@ class Manifold(Circuit):
     names: tuple[str, ...]
 
     def check(self) -> None:
-        check_structure(self)
-        for field, kind in (("branches", Circuit), ("names", str)):
-            value = getattr(self, field)
-            if not isinstance(value, tuple) or not all(isinstance(item, kind) for item in value):
-                raise ParameterError(f"Manifold: {field} is {value!r}; it must be a tuple of {kind.__name__}.")
         if len(self.names) != len(self.branches) or len(set(self.names)) != len(self.names) or not self.names:
             raise ParameterError(
                 f"Manifold: names is {self.names}; give a distinct name for each of the {len(self.branches)} branches."
