@@ -63,7 +63,11 @@ def stiffness(plant: Plant, state: Mapping[str, float]) -> Stiffness:
 
 
 def _of_muscle(plant: Plant, muscle: Muscle, port: MuscleState) -> StiffnessPair:
-    by_pressure, by_contraction = _slopes(muscle, port)
+    def tension(x: Sequence[Value]) -> list[Value]:
+        return [muscle.tension(x[0], x[1])]  # without the series spring
+
+    at = [float(port.pressure), float(port.inner_contraction)]
+    by_pressure, by_contraction = (float(autodiff.jvp(tension, at, d)[0]) for d in ([1.0, 0.0], [0.0, 1.0]))
     squeezed = float(enclosed_pressure_slope(plant, muscle, port.inner_contraction, port.volume, port.air, port.states))
     inside = (0.0 - by_contraction, 0.0 - by_contraction - by_pressure * squeezed)
     if not isinstance(muscle.series, ElasticSeriesElement):
@@ -72,17 +76,6 @@ def _of_muscle(plant: Plant, muscle: Muscle, port: MuscleState) -> StiffnessPair
     stretch = (float(port.inner_contraction) - float(port.contraction)) * length
     spring = muscle.series.tangent_stiffness(stretch) * length if stretch > 0.0 else 0.0
     return StiffnessPair(*(k * spring / (k + spring) if spring else 0.0 for k in inside))
-
-
-def _slopes(muscle: Muscle, port: MuscleState) -> tuple[float, float]:
-    """dF/dp and dF/deps of the muscle without its series spring."""
-    at = [float(port.pressure), float(port.inner_contraction)]
-
-    def tension(x: Sequence[Value]) -> list[Value]:
-        return [muscle.tension(x[0], x[1])]
-
-    along = [autodiff.jvp(tension, at, direction)[0] for direction in ([1.0, 0.0], [0.0, 1.0])]
-    return float(along[0]), float(along[1])
 
 
 def enclosed_pressure_slope(

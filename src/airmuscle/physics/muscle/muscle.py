@@ -10,7 +10,6 @@ from ...core import (
     StateVariable,
     Value,
     Values,
-    abridged,
     autodiff,
     contraction_text,
     model,
@@ -19,7 +18,7 @@ from ...core import (
 )
 from ...core.errors import AirmuscleWarning, ParameterError
 from ...recording.notebook import Card, NotebookDisplay
-from .characteristic import HOSOVSKY_HILL, Characteristic, Clamped, ForceLaw, VirtualWork
+from .characteristic import HOSOVSKY_HILL, Characteristic, Clamped, VirtualWork
 from .characteristic.validity_range import ValidityRange, validity_range_of
 from .friction.base import Friction, NoFriction
 from .geometry.base import Geometry
@@ -61,14 +60,13 @@ class Muscle(QuantityMethods, NotebookDisplay):
     """
 
     references: ClassVar[tuple[Reference, ...]] = (HOSOVSKY_HILL,)
-    checks_structure: ClassVar[bool] = True
     argument_units: ClassVar[Units] = {
         "tension": ("Pa", "1", "m/s"),
         "static_force": ("Pa", "1"),
         "stiffness": ("Pa", "1"),
     }
 
-    contractile: ForceLaw
+    contractile: Characteristic
     geometry: Geometry
     spring: Spring = LinearSpring(0.0)
     damper: Damper = LinearDamper(0.0)
@@ -112,16 +110,8 @@ class Muscle(QuantityMethods, NotebookDisplay):
         return Card("Muscle" if self.name == "muscle" else f"Muscle {self.name}", rows, self.plot)
 
     def check(self) -> None:
-        kinds = {"contractile": Characteristic, "geometry": Geometry, "spring": Spring, "damper": Damper, "wall": Wall,
-                 "friction": Friction, "series": SeriesElement, "stop": Stop, "creep": CreepElements,
-                 "validity_range": ValidityRange, "ratings": Ratings}  # fmt: skip
-        for field, kind in kinds.items():
-            part, optional = getattr(self, field), field in ("validity_range", "ratings")
-            if not (isinstance(part, kind) or (optional and part is None)):
-                what = f"{kind.__name__} or None" if optional else kind.__name__
-                raise ParameterError(f"Muscle: {field} is {abridged(part)}; it must be a {what}.")
-        if not isinstance(self.name, str) or not self.name:
-            raise ParameterError(f"Muscle: name is {abridged(self.name)}; it must be a non-empty text, such as 'left'.")
+        if not self.name:
+            raise ParameterError("Muscle: name is ''; it must be a non-empty text, such as 'left'.")
         if isinstance(self.series, ElasticSeriesElement):
             self._check_series_elements()
         self._check_lengths()

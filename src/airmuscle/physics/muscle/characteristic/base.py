@@ -86,6 +86,10 @@ class Characteristic(QuantityMethods, abc.ABC):
     def force(self, pressure: Value, contraction: Value) -> Value:
         """Tension [N] at gauge pressure [Pa] and contraction [1]; arrays broadcast. Raises SolveError."""
 
+    def unclamped_force(self, pressure: Value, contraction: Value) -> Value:
+        """Tension [N] before any limit is applied; fits evaluate the residuals with it."""
+        return self.force(pressure, contraction)
+
     @abc.abstractmethod
     def contraction(self, pressure: Value, force: Value) -> Value:
         """Contraction [1] at gauge pressure [Pa] and tension [N]; arrays broadcast. Raises SolveError."""
@@ -128,10 +132,6 @@ class Characteristic(QuantityMethods, abc.ABC):
 
 class ForceLaw(Characteristic):
     """Characteristic given as F(p, eps)."""
-
-    def unclamped_force(self, pressure: Value, contraction: Value) -> Value:
-        """Tension [N] before any limit is applied; fits evaluate the residuals with it."""
-        return self.force(pressure, contraction)
 
     def contraction(self, pressure: Value, force: Value) -> Value:
         return solve_direction(

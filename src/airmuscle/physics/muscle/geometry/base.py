@@ -79,5 +79,4 @@ class Geometry(QuantityMethods, abc.ABC):
 
     def check_contraction(self, contraction: Value) -> None:
         """Raise GeometryLimitError if a contraction [1] is outside `contraction_range`."""
-        values = np.asarray(contraction, dtype=float)
-        check_contraction_range(values, self.contraction_range, type(self).__name__)
+        check_contraction_range(contraction, self.contraction_range, type(self).__name__)

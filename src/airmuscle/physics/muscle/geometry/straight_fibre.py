@@ -4,7 +4,7 @@ import abc
 
 import numpy as np
 
-from ....core import Array, ParameterError, Value, model, ops, parameter
+from ....core import Array, Value, model, ops, parameter, within
 from .base import LENGTHS, RESTING_LENGTH, Geometry, Profile, check_contraction_range
 from .meridian import CircularArc, Meridian, Segment
 
@@ -61,11 +61,7 @@ class FibreTube(Geometry):
 
     resting_length: float = parameter(*RESTING_LENGTH, bounds=LENGTHS, fitted=False)
     end_diameter: float = parameter("m", "d_0", "diameter at the ends and rings", bounds=(1e-4, 0.5), fitted=False)
-    rings: int = 0
-
-    def check(self) -> None:
-        if isinstance(self.rings, bool) or not isinstance(self.rings, int) or self.rings < 0:
-            raise ParameterError(f"{type(self).__name__}.rings is {self.rings!r}; it must be an integer, 0 or more.")
+    rings: int = within(0, 1_000_000, default=0)
 
     @property
     def end_radius(self) -> Value:
