@@ -199,7 +199,15 @@ def state_vector(system: System, state: Mapping[str, float]) -> Array:
             "find_equilibrium(...) do."
         )
     if len(state) != len(names) or any(name not in state for name in names):
-        _check_names(names, state)
+        for name in (n for n in state if n not in names):
+            raise ParameterError(
+                f"the plant has no state '{one_line(name)}'{alternatives(name, names)} "
+                "plant.state_at(pressure=...) gives the state with a pressure."
+            )
+        missing = ", ".join(name for name in names if name not in state)
+        raise ParameterError(
+            f"the initial state lacks {missing}; use plant.state_at(pressure=...) or find_equilibrium."
+        )
     values = np.array([as_float(f"the initial state's {name}", state[name]) for name in names], dtype=float)
     if not np.isfinite(values).all():
         raise ParameterError(
@@ -211,16 +219,3 @@ def state_vector(system: System, state: Mapping[str, float]) -> Array:
             "plant.state_at(pressure=...)."
         )
     return values
-
-
-def _check_names(names: list[str], state: Mapping[str, float]) -> None:
-    for name in state:
-        if name not in names:
-            raise ParameterError(
-                f"the plant has no state '{one_line(name)}'{alternatives(name, names)} "
-                "plant.state_at(pressure=...) gives the state with a pressure."
-            )
-    missing = [name for name in names if name not in state]
-    raise ParameterError(
-        f"the initial state lacks {', '.join(missing)}; use plant.state_at(pressure=...) or find_equilibrium."
-    )

@@ -84,20 +84,6 @@ class CrankProfile(PulleyProfile):
         return (ops.sin(angle - top) + ops.sin(top)) / ops.cos(top)
 
 
-def check_profile(owner: str, profile: PulleyProfile, low: float, high: float) -> None:
-    """Raise ParameterError if a profile is not positive in the range of angles [rad] from `low` to `high`."""
-    step = (high - low) / (SAMPLES - 1)
-    for k in range(SAMPLES):
-        angle = low + k * step
-        ratio = profile.ratio(angle)
-        if not ratio > 0.0:
-            raise ParameterError(
-                f"{owner}: the moment arm of its profile is {ratio:.3g} times that at angle 0 at {angle:.4g} rad; "
-                f"allowed range: greater than 0 from {low:.4g} to {high:.4g} rad. Choose another profile, or a smaller "
-                "range of angles."
-            )
-
-
 @model
 class AntagonisticJoint(DampedCoordinate):
     """Antagonistic joint: J theta'' = r_1 F_1 - r_2 F_2 - M sin(theta + theta_g) - b theta'.
@@ -130,7 +116,15 @@ class AntagonisticJoint(DampedCoordinate):
 
     def check(self) -> None:
         reach = max(abs(self.min_angle), abs(self.max_angle))  # the profile of the second muscle is mirrored
-        check_profile("AntagonisticJoint", self.profile, -reach, reach)
+        for k in range(SAMPLES):
+            angle = -reach + k * (2 * reach / (SAMPLES - 1))
+            ratio = self.profile.ratio(angle)
+            if not ratio > 0.0:
+                raise ParameterError(
+                    f"AntagonisticJoint: the moment arm of its profile is {ratio:.3g} times that at angle 0 at "
+                    f"{angle:.4g} rad; allowed range: greater than 0 from {-reach:.4g} to {reach:.4g} rad. Choose "
+                    "another profile, or a smaller range of angles."
+                )
 
     muscle_count = 2
 

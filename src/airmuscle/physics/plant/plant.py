@@ -40,7 +40,7 @@ class Plant(PlantDisplay, StaticPlant):
     ambient: Ambient = Ambient()
 
     def check(self) -> None:
-        check_parts(self.muscles, self.circuit, self.circuits, self.mechanism, self.gas, self.ambient)
+        check_parts(self)
         convert_pressures(self)
         check_unique([*(s.name for s in self.states), *self.inputs])
 

@@ -13,21 +13,28 @@ from ..muscle.characteristic.validity_range import ValidityRange
 from ..pneumatics import Ambient, Circuit, Gas, check_not_shared
 
 
-def check_parts(
-    muscles: Sequence[Muscle], circuit: Any, circuits: Sequence[Circuit], mechanism: Mechanism, gas: Gas,
-    ambient: Ambient,
-) -> None:  # fmt: skip
+def check_parts(plant: Any) -> None:
     """Raise ParameterError for parts that do not form a plant, TraceError for a law without closed form."""
-    parts: list[tuple[str, Any, type[Any]]] = [("mechanism", mechanism, Mechanism), ("gas", gas, Gas)]
-    parts += [("ambient", ambient, Ambient)]
-    parts += [("muscle", m, Muscle) for m in muscles] + [("circuit", c, Circuit) for c in circuits]
+    parts: list[tuple[str, Any, type[Any]]] = [("mechanism", plant.mechanism, Mechanism), ("gas", plant.gas, Gas)]
+    parts += [("ambient", plant.ambient, Ambient)]
+    parts += [("muscle", m, Muscle) for m in plant.muscles] + [("circuit", c, Circuit) for c in plant.circuits]
     for field, part, kind in parts:
-        _check_kind(field, part, kind)
-    _check_closed_form(muscles)
-    for muscle in muscles:
+        if not isinstance(part, kind):
+            hint = " Put several into a tuple." if isinstance(part, list) else ""
+            hint = f" It has one: give its .{field}." if hasattr(part, field) else hint
+            raise ParameterError(f"Plant: its {field} must be a {kind.__name__}; it is {one_line(part)}.{hint}")
+    for muscle, part in ((m, part) for m in plant.muscles for part in (m.contractile, m.geometry)):
+        if not part.traceable:
+            raise TraceError(
+                f"{type(part).__name__} of {muscle.name} is not closed-form and cannot be part of a plant. Use "
+                "as_force_law(law, validity_range) for a characteristic, as_polynomial(geometry) for a geometry."
+            )
+    for muscle in plant.muscles:
         _check_validity_limits(muscle.contractile)
-    check_structure((tuple(muscles), tuple(circuits), mechanism))
-    _check_counts(muscles, circuit, circuits, mechanism)
+    check_structure((tuple(plant.muscles), tuple(plant.circuits), plant.mechanism))
+    _check_counts(plant.muscles, plant.circuits, plant.mechanism)
+    if isinstance(plant.circuit, tuple) and any(c.port_count != 1 for c in plant.circuits):
+        raise ParameterError("Plant: give a circuit that feeds several muscles alone, not in a tuple.")
 
 
 def convert_pressures(plant: Any) -> None:
@@ -66,25 +73,7 @@ def check_unique(names: Sequence[str]) -> None:
         raise ParameterError(f"Plant: two of its parts use the name '{name}'; rename one of them.")
 
 
-def _check_kind(field: str, part: Any, kind: type[Any]) -> None:
-    if isinstance(part, kind):
-        return
-    hint = " Put several into a tuple." if isinstance(part, list) else ""
-    hint = f" It has one: give its .{field}." if hasattr(part, field) else hint
-    raise ParameterError(f"Plant: its {field} must be a {kind.__name__}; it is {one_line(part)}.{hint}")
-
-
-def _check_closed_form(muscles: Sequence[Muscle]) -> None:
-    for muscle in muscles:
-        for part in (muscle.contractile, muscle.geometry):
-            if not part.traceable:
-                raise TraceError(
-                    f"{type(part).__name__} of {muscle.name} is not closed-form and cannot be part of a plant. Use "
-                    "as_force_law(law, validity_range) for a characteristic, as_polynomial(geometry) for a geometry."
-                )
-
-
-def _check_counts(muscles: Sequence[Muscle], circuit: Any, circuits: Sequence[Circuit], mechanism: Mechanism) -> None:
+def _check_counts(muscles: Sequence[Muscle], circuits: Sequence[Circuit], mechanism: Mechanism) -> None:
     names = [m.name for m in muscles]
     if not names:
         raise ParameterError("Plant: it has no muscle; give one, or a tuple of them.")
@@ -94,8 +83,6 @@ def _check_counts(muscles: Sequence[Muscle], circuit: Any, circuits: Sequence[Ci
     if mechanism.muscle_count not in (None, len(names)):
         owner = type(mechanism).__name__
         raise ParameterError(f"Plant: {owner} takes {mechanism.muscle_count} muscles; {len(names)} are given.")
-    if isinstance(circuit, tuple) and any(c.port_count != 1 for c in circuits):
-        raise ParameterError("Plant: give a circuit that feeds several muscles alone, not in a tuple.")
     if len(set(names)) < len(names):
         raise ParameterError(f"Plant: muscles need different names; they are {names}.")
 
