@@ -1,14 +1,14 @@
 """Settings of all tests: Ctrl-C interrupts, random examples are few, figures of one kind are drawn once.
 
 Ctrl-C interrupts here too, where a shell that runs the tests in the background has it ignored. `--hypothesis-profile
-thorough` draws 300 examples in place of 10. A figure with the kinds of curves and areas alone that were drawn before gets
-the files of one of those, except in tests with the marker `drawn`, which look at the files; its image has a low
-resolution. A command that is called within a test uses one process, because the tests themselves run on all
-cores; tests of several processes state their number. A kernel that is missing in the cache is compiled by one worker,
-while others wait for it. Objects that exist after the collection of tests are no longer searched by the garbage
-collector. The configuration file of the user is not read. Where Python must not write bytecode beside the sources, that
-of the tests, whose assertions pytest rewrites, and of the processes that they start is stored in the cache folder of
-pytest.
+thorough` draws 300 examples in place of 10. A figure with the kinds of curves and areas alone that were drawn before
+gets the files of one of those, except in tests with the marker `drawn`, which look at the files; its image has a low
+resolution. A command that is called within a test uses one process, because the tests themselves run on all cores;
+tests of several processes state their number, and linear algebra uses one thread. A kernel that is missing in the cache
+is compiled by one worker, while others wait for it. Objects that exist after the collection of tests are no longer
+searched by the garbage collector. The configuration file of the user is not read. Where Python must not write bytecode
+beside the sources, that of the tests, whose assertions pytest rewrites, and of the processes that they start is stored
+in the cache folder of pytest.
 """
 
 from __future__ import annotations
@@ -21,6 +21,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 from unittest import mock
+
+os.environ["OPENBLAS_NUM_THREADS"] = os.environ["OMP_NUM_THREADS"] = "1"  # read by the first import of NumPy
 
 import pytest
 from hypothesis import settings
