@@ -13,10 +13,12 @@ in the cache folder of pytest.
 
 from __future__ import annotations
 
+import contextlib
 import gc
 import os
 import signal
 import sys
+import sysconfig
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -42,9 +44,23 @@ CACHE = Path(__file__).parents[1] / ".pytest_cache"
 LOCKS = CACHE / "compiling"
 signal.signal(signal.SIGINT, signal.default_int_handler)
 os.environ["AIRMUSCLE_CONFIG_DIR"] = os.devnull
+
+
+def link_installed_bytecode(folder: Path) -> None:
+    """The bytecode of Python and of the packages, which is stored beside them, in a folder for that of all."""
+    for path in {sysconfig.get_path(name) for name in ("stdlib", "purelib", "platlib")}:
+        for compiled in Path(path).rglob(f"__pycache__/*.{sys.implementation.cache_tag}.pyc"):
+            link = folder.joinpath(*compiled.parts[1:-2], compiled.name)
+            link.parent.mkdir(parents=True, exist_ok=True)
+            with contextlib.suppress(OSError):  # there already, or a system without links
+                link.symlink_to(compiled)
+
+
 if sys.dont_write_bytecode and sys.pycache_prefix is None:
     sys.dont_write_bytecode = False
     sys.pycache_prefix = str(CACHE / "bytecode")
+    if not os.path.isdir(sys.pycache_prefix):
+        link_installed_bytecode(Path(sys.pycache_prefix))
     os.environ["PYTHONPYCACHEPREFIX"] = sys.pycache_prefix
     os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 settings.register_profile("few", settings(), max_examples=10, deadline=None)
