@@ -82,11 +82,11 @@ class RegulatorLag:
     def pressures(self, pressure: Array, command: Array) -> Array:
         """Pressures (N, R) [Pa] whose first HISTORY + 1 rows are the readings, and the others follow from commands."""
         gain, first, second, to_level, to_pilot, low, high, zero = self.values
-        found = pressure / UNIT
+        found, step = pressure / UNIT, gain * command
         level, pilot, p = found[:, 0], found[:, 0], found[:, 0]
         for k in range(1, found.shape[1]):
-            step = gain * command[:, max(k - self.delay, 0)]
-            level = np.clip(level + step if self.increments else zero + step, low, high)
+            aim = (level if self.increments else zero) + step[:, max(k - self.delay, 0)]
+            level = np.minimum(np.maximum(aim, low), high)  # np.clip takes ten times as long
             pilot = pilot + first * (level - pilot)
             p = p + second * (pilot - p)
             if k <= HISTORY:
