@@ -582,10 +582,11 @@ def test_an_error_of_a_task_keeps_its_field(tmp_path):
 def test_a_worker_ends_with_its_server(tmp_path):
     """Also during a task, so that a killed server leaves no process and no result."""
     script = (
-        "import sys, pathlib; from airmuscle.outlets.studio.fit_routes import FitQueue; from studio_tasks import write_slowly\n"
+        "import sys, pathlib, time\n"
+        "from airmuscle.outlets.studio.fit_routes import FitQueue; from studio_tasks import write_slowly\n"
         "if __name__ == '__main__':\n"
         "    queue = FitQueue(write_slowly, count=1); task = queue.submit('set', pathlib.Path(sys.argv[1]), 600.0)\n"
-        "    while queue.status(task)['fraction'] != 0.5: pass\n"
+        "    while queue.status(task)['fraction'] != 0.5: time.sleep(0.01)\n"
         "    print([worker._worker._process.pid for worker in queue._running.values()][0], flush=True); input()\n"
     )
     (tmp_path / "server.py").write_text(script, encoding="utf-8")

@@ -119,7 +119,7 @@ def started(folder: Path, chunks: int, *options: str) -> subprocess.Popen:
     while len(list((folder / "out" / "chunks").glob("*.npz"))) < chunks:
         assert process.poll() is None, process.stderr.read()
         assert time.monotonic() < end
-        time.sleep(0.002)
+        time.sleep(0.01)
     return process
 
 
