@@ -17,17 +17,14 @@ SIMULATION = """
 import airmuscle as am
 valve = am.Valve(conductance=1e-9, critical_ratio=0.4)
 plant = am.Plant(am.load("dmsp-20-300").muscle, am.FillDischarge(am.Supply(6e5), valve, valve), am.HangingMass(10.0))
-am.simulate(plant, am.Schedule({"fill": ((0.5, 1),)}), duration=2.0, integrator=METHOD)
+for method in (am.Rodas4(), am.RungeKutta4(1e-3)):
+    am.simulate(plant, am.Schedule({"fill": ((0.5, 1),)}), duration=2.0, integrator=method)
 """
 STARTS = {
     "import airmuscle": ("import airmuscle", {*HEAVY, "casadi", "llvmlite", "numpy.ma", "airmuscle.bench.identify"}),
     "simulate": (
-        SIMULATION.replace("METHOD", "am.Rodas4()"),
+        SIMULATION,
         {*HEAVY, "numpy.ma", "airmuscle.bench.identify", "airmuscle.engine.compile.kernels.rodas4"},
-    ),
-    "simulate, fixed steps": (
-        SIMULATION.replace("METHOD", "am.RungeKutta4(1e-3)"),
-        {*HEAVY, "airmuscle.bench.identify"},
     ),
     "airmuscle evaluate": (
         "from airmuscle.outlets.cli import app\n"

@@ -401,7 +401,7 @@ def test_a_name_that_is_taken_leaves_the_folder_as_it_was(tmp_path: Path, blocke
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="only Linux has a device that is always full")
-@pytest.mark.parametrize("option", [(), ("--json",)])
+@pytest.mark.parametrize("option", widened([((),), (("--json",),)], lambda option: not option))
 def test_a_full_disk_is_one_line(option: tuple[str, ...]):
     with Path("/dev/full").open("w") as full:
         command = [sys.executable, "-m", "airmuscle", "list", *option]

@@ -97,7 +97,9 @@ def test_every_command_has_its_summary_and_examples_in_its_help(row):
     assert re.search(rf"^ +airmuscle {row.name}", result.output, re.MULTILINE)
 
 
-@pytest.mark.parametrize("arguments", [["--help"], ["--version"], ["list"]])
+@pytest.mark.parametrize(
+    "arguments", widened([["--help"], ["--version"], ["list"]], lambda arguments: arguments != ["--version"])
+)
 def test_a_command_module_is_imported_only_when_it_is_called(arguments: list[str]):
     called = {row.module for row in COMMANDS if row.name in arguments}
     modules = {row.module for row in COMMANDS} - called

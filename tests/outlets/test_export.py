@@ -79,8 +79,11 @@ CASES = {
 
 
 def every_integrator_once(target, case):
-    """All in C; in JavaScript, whose run has the same text, that of variable steps and one of fixed steps."""
-    return target == C99() or case in ("two muscles on a spool", "fixed steps that the segments are no multiple of")
+    """Each in C; in JavaScript, whose run has the same text, that of variable steps and one of fixed steps."""
+    return (target == C99() and case != "one muscle") or case in (
+        "two muscles on a spool",
+        "fixed steps that the segments are no multiple of",
+    )
 
 
 @pytest.mark.parametrize(
@@ -181,7 +184,7 @@ def test_the_sources_are_c_plus_plus_too(tmp_path):
     assert printed.finished(["./program"], tmp_path) == run_c(tmp_path, "-ffp-contract=off")
 
 
-@pytest.mark.parametrize("language", ["C", "CXX"])
+@pytest.mark.parametrize("language", widened(["C", "CXX"], lambda language: language == "CXX"))
 def test_cmake_builds_the_program(language, tmp_path):
     problem = problem_of("dmsp-20-300", duration=0.2)
     write_program(problem, tmp_path, C99(), name="plant")

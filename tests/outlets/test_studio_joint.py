@@ -7,6 +7,7 @@ import functools
 import numpy as np
 import pytest
 from studio_pages import run_script, scripts
+from widths import widened
 
 from airmuscle.core import with_parameters
 from airmuscle.design import STANDARD_TASKS
@@ -100,7 +101,7 @@ def cases_of(name, beside):
     ]
 
 
-@pytest.mark.parametrize("name", JOINTS)
+@pytest.mark.parametrize("name", widened((*FAST, *SLOW_ONES), lambda name: name.endswith("proportional")))
 def test_a_loop_of_the_page_is_that_of_the_library(name, tmp_path):
     """Every controller, with other gains than those of the sheet, to 1e-9 of the greatest value of each column.
 

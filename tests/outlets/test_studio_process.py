@@ -48,7 +48,7 @@ def running(folder):
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="needs signals of POSIX")
-@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP], ids=["SIGTERM", "SIGHUP"])
+@pytest.mark.parametrize("number", [signal.SIGTERM, pytest.param(signal.SIGHUP, marks=pytest.mark.slow)], ids=str)
 def test_a_server_that_is_ended_removes_its_uploads(tmp_path, number):
     with running(tmp_path) as (server, _, send):
         assert send("POST", "/api/fit/file", b"p [bar]\n1\n", "&name=a.csv&set=") == 200
