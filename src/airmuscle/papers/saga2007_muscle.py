@@ -37,11 +37,8 @@ def interpretation(
 
 def exact_mechanics(rubber: am.characteristic.RubberLine, rings: int = 0) -> am.characteristic.Saga2007:
     """Return the only interpretation that is exact mechanics, except for the parabolic outline itself."""
-    return replace(
-        interpretation(rubber, 1.0, 2.0, rings),
-        fibre_sum=am.geometry.UniformFibreSum(),
-        rubber_integral=am.characteristic.ArcIntegral(),
-    )
+    law, along = interpretation(rubber, 1.0, 2.0, rings), am.characteristic.ArcIntegral()
+    return replace(law, fibre_sum=am.geometry.UniformFibreSum(), rubber_integral=along)
 
 
 def with_rings(law: am.characteristic.Saga2007, rings: int) -> am.characteristic.Saga2007:

@@ -81,9 +81,8 @@ def in_words(chapter: Chapter, words: Callable[[str], str]) -> Chapter:
         return words(value) if isinstance(value, str) else value
 
     def table(each: Table) -> Table:
-        columns = {name: dataclasses.replace(column, values=list(map(cell, column.values)))
-                   for name, column in each.columns.items()}  # fmt: skip
-        return dataclasses.replace(each, columns=columns)
+        worded = {name: dataclasses.replace(c, values=list(map(cell, c.values))) for name, c in each.columns.items()}
+        return dataclasses.replace(each, columns=worded)
 
     return dataclasses.replace(
         chapter,

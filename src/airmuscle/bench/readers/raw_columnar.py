@@ -38,9 +38,7 @@ def read_parquet_tables_here(path: Path, group: str | None = None) -> tuple[RawT
             if not field.name.startswith("__index_level_")
         ]
         metadata = {_text(name): _text(value) for name, value in (table.schema.metadata or {}).items()}
-        constants: dict[str, float | str] = {
-            name: _number(text) for name, text in metadata.items() if name not in ("pandas", "ARROW:schema")
-        }
+        constants = {name: _number(text) for name, text in metadata.items() if name not in ("pandas", "ARROW:schema")}
         return (merge_channels(path.name, channels, constants),)
 
 
@@ -162,11 +160,9 @@ def _unit(attributes: Mapping[str, Any]) -> str:
 
 def _constants(attributes: Mapping[str, Any]) -> dict[str, float | str]:
     """Attributes that are single numbers or texts."""
-    return {
-        name: float(value) if isinstance(value, np.number | int | float) else _text(value)
-        for name, value in attributes.items()
-        if isinstance(value, np.number | int | float | str | bytes) and name.isidentifier()
-    }
+    single = np.number | int | float | str | bytes
+    stated = {name: value for name, value in attributes.items() if name.isidentifier() and isinstance(value, single)}
+    return {name: _text(v) if isinstance(v, str | bytes) else float(v) for name, v in stated.items()}
 
 
 def _text(value: Any) -> str:

@@ -120,20 +120,17 @@ def find_files(source: Source) -> list[Path]:
                 f"read: {abridged(source)} is not a path. Pass a file, a folder, a glob pattern, or a list of them."
             )
         return [path for each in source for path in find_files(each)]
-    path = Path(source)
+    path, files = Path(source), [Path(source)]
+    missing = ""
     if path.is_dir():
         files = sorted(p for p in path.iterdir() if p.suffix.lower() in EXTENSIONS and not p.name.startswith("."))
-        if not files:
-            raise FileError(
-                f"{path}: the folder contains no supported file; supported extensions are {', '.join(EXTENSIONS)}."
-            )
-        return files
-    if glob.has_magic(str(path)) and not path.exists():
-        files = sorted(Path(p) for p in glob.glob(str(path), recursive=True))
-        if not files:
-            raise FileError(f"{path}: no file matches the pattern. Check the pattern and the folder.")
-        return files
-    return [path]
+        missing = f"the folder contains no supported file; supported extensions are {', '.join(EXTENSIONS)}."
+    elif glob.has_magic(str(path)) and not path.exists():
+        files = sorted(map(Path, glob.glob(str(path), recursive=True)))
+        missing = "no file matches the pattern. Check the pattern and the folder."
+    if not files:
+        raise FileError(f"{path}: {missing}")
+    return files
 
 
 def read_tables(

@@ -51,12 +51,8 @@ def find_outliers(recording: Recording, sensors: Mapping[str, Sensor] | None = N
     """The suspected outliers of a recording; empty without time, because rows are then not neighbours in time."""
     if "time" not in recording or len(recording) < 2 * WINDOW + 2:
         return ()
-    return tuple(
-        outlier
-        for name, sensor in (sensors or estimate_sensors(recording)).items()
-        if name in recording.columns
-        for outlier in _column_outliers(name, recording[name], sensor)
-    )
+    known = {n: sensor for n, sensor in (sensors or estimate_sensors(recording)).items() if n in recording.columns}
+    return tuple(each for n, sensor in known.items() for each in _column_outliers(n, recording[n], sensor))
 
 
 def without_outliers(recordings: Sequence[Recording]) -> tuple[Recording, ...]:
