@@ -126,17 +126,18 @@ def test_a_renewed_claim_is_respected_and_its_result_read(tmp_path: Path):
     claim.touch()
 
     def other() -> None:
-        for _ in range(16):  # longer than an unrenewed claim lasts
+        for _ in range(24):  # twice as long as an unrenewed claim lasts
             time.sleep(0.5 / 3)
             claim.touch()
         kept.rename(result)
         claim.unlink()
 
-    process = threading.Thread(target=other)
+    process, begin = threading.Thread(target=other), time.monotonic()
     process.start()
     with shared_folder(tmp_path, 1) as executor:
         assert executor.submit(math.factorial, 20).result() == math.factorial(20)
         (source,) = executor.contributions
+    assert time.monotonic() - begin > 24 * 0.5 / 3, "the claim was taken over"
     process.join()
     assert source.rpartition(":")[2] == str(os.getpid())  # of the first executor, which computed it
     assert len(list(tmp_path.glob("*.result"))) == 1
