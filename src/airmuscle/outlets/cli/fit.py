@@ -15,16 +15,8 @@ from ...core import ParameterError, PhysicsError, check_writable
 from ...files.library import Entry, find_initial_law, list_files, load_law, part_toml, resting_lengths, save, to_toml
 from ...physics.muscle.characteristic import ValidityRange, maxwell_defect, validity_range_of
 from ...recording import Recording
-from ..requests import (
-    FitRequest,
-    ReadingRequest,
-    RequestError,
-    check_one_length,
-    fit_requested,
-    option,
-    optional,
-    request,
-)
+from ..requests import FitRequest, ReadingRequest, check_one_length, fit_requested
+from ..requests.declaration import RequestError, option, optional, request
 from .delivery import Execution, deliver, print_result
 from .measurements import Files, read_recordings, reading_chapters
 from .options import Folder, Json, Name, argument, complete_law, with_requests

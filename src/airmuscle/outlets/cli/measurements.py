@@ -91,8 +91,7 @@ def inspect(files: AnyFiles, reading: ReadingRequest, json: Json = False, out: O
     """
     with reading_progress() as progress:
         recordings = read(files, reading.column_mapping(UNORDERED), progress=progress)
-    chapters = inspection_chapters(inspect_all(recordings))
-    deliver("inspect", chapters, json=json, out=out, title="Inspection")
+    deliver("inspect", inspection_chapters(inspect_all(recordings)), json=json, out=out, title="Inspection")
 
 
 EVERY_ROW = 2**62
@@ -131,8 +130,7 @@ def convert(
         raise typer.BadParameter("--plain belongs to a target that ends in .csv.")
     if target.suffix.lower() not in EXTENSIONS:
         raise FileError(f"{target}: the extension must be one of {', '.join(EXTENSIONS)}.")
-    rows = Decimation(request.max_rows or EVERY_ROW)
-    recordings = read(source, reading.column_mapping(), downsampling=rows)
+    recordings = read(source, reading.column_mapping(), downsampling=Decimation(request.max_rows or EVERY_ROW))
     print_row_notes(recordings)
     numbered = [target.with_name(f"{target.stem}_{i:03d}{target.suffix}") for i in range(1, len(recordings) + 1)]
     paths, sources = numbered if len(recordings) > 1 else [target], {path.resolve() for path in find_files(source)}

@@ -134,8 +134,6 @@ def size(request: SizeRequest, out: OptionalFolder = None, json: Json = False) -
 # While a measurement runs
 
 QUANTITIES = ("pressure", "contraction", "force")
-READING = ("resting_length", "unit", "column", "constant", "displacement_zero", "skip_rows")
-"""Fields of the request that are those of reading."""
 
 
 def same(name: str) -> Any:
@@ -189,7 +187,8 @@ def fit_live(request: LiveRequest, out: OptionalFolder = None, json: Json = Fals
     limits = ValidityRange(*pressures, request.min_contraction, request.max_contraction)
     if out is not None:
         check_writable(out)
-    reading = ReadingRequest(**{name: getattr(request, name) for name in READING})
+    given = {name: value for name, value in vars(request).items() if name in ReadingRequest.__dataclass_fields__}
+    reading = ReadingRequest(**given)
     origin = "standard input" if request.follow == "-" else Path(request.follow).name
     reader = RowReader(origin, reading.column_mapping())
     fit = RecursiveFit(BenchLimits(limits, request.max_force), request.degree, forgetting=request.forgetting)

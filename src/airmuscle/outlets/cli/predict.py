@@ -81,8 +81,7 @@ def _static(model: str, files: list[Path], reading: ReadingRequest) -> tuple[Any
     tables = [path for path in files if path.suffix == ".toml"]
     if tables:
         raise FileError(f"{tables[0]}: a file of records is for a scenario; give measurement files for a muscle.")
-    recordings = read_recordings(files, reading)
-    return entry, [predict_with_entry(entry, recording) for recording in recordings]
+    return entry, [predict_with_entry(entry, recording) for recording in read_recordings(files, reading)]
 
 
 def _transient(

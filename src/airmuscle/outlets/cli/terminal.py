@@ -141,9 +141,7 @@ def print_table(columns: Mapping[str, Sequence[Any]]) -> None:
 
 def terminal_width() -> int:
     """The width of the terminal [characters], or of a file."""
-    if sys.stdout.isatty() or "COLUMNS" in os.environ:
-        return shutil.get_terminal_size().columns
-    return WIDE
+    return shutil.get_terminal_size().columns if sys.stdout.isatty() or "COLUMNS" in os.environ else WIDE
 
 
 def _display(*columns: Any) -> Any:

@@ -74,8 +74,7 @@ class PrintedController:
 
     def source_files(self) -> dict[str, str]:
         """Header and source, by file name."""
-        functions = self.sample_in(CLanguage(self.number, f"{self.name}_"))
-        places = {**self.places, "functions": functions}
+        places = {**self.places, "functions": self.sample_in(CLanguage(self.number, f"{self.name}_"))}
         return {f"{self.name}.{end}": filled(f"controller.{end}", places, self.name) for end in "hc"}
 
     def sample_in(self, language: TargetLanguage) -> str:

@@ -176,8 +176,7 @@ def make_run(
     known = sum(loop.added_columns if loop else (), system.known.column_names)
     check_known("the run has no column", columns, known)
     lines = provenance(title, problem.system, (integrator,), notes)
-    chosen = tuple(c for c in columns if c != "time") or known
-    return ExportedRun(name, system, problem, lines, chosen, loop)
+    return ExportedRun(name, system, problem, lines, tuple(c for c in columns if c != "time") or known, loop)
 
 
 def write_law(

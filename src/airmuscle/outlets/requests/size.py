@@ -11,8 +11,6 @@ from .declaration import RequestError, Where, many, option, optional, request
 
 LIFT, JOINT = ("load", "stroke", "stiffness"), ("torque", "angle", "inertia")
 """Fields of either requirement; the first two are needed."""
-
-
 SORTS = (
     ("air", "air of a cycle"), ("length", "length"), ("count", "number of muscles"), ("reserve", "force reserve"),
     ("diameter", "diameter"),

@@ -30,8 +30,6 @@ MAX_SHEETS, MAX_PAGE = 100, 256 * 1024
 """Number of sheets that the server keeps, and largest size of a request for a self-contained page [bytes] (chosen)."""
 LONG_TASKS = (sheet_of_joint, tasks.size_sheet)
 """Tasks that leave the workers of the other sheets free."""
-
-
 SHEETS: Mapping[str, tuple[str, Callable[[], Any], Callable[[str], dict[str, Any]]]] = {
     "law": ("muscle or law", list_laws, tasks.sheet_of_law),
     "plant": ("plant", list_plants, tasks.sheet_of_library_plant),

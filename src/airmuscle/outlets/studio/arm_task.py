@@ -27,8 +27,6 @@ MAX_UNPACKED, MAX_ENTRIES = 512 * 10**6, 20_000
 """Largest size [bytes] and number of the files of an archive (chosen)."""
 MAX_TEXT = 20_000
 """Largest size of a mapping and of a scenario [characters] (chosen)."""
-
-
 FIELDS = ("mapping", *(each["name"] for each in form_fields(JointFitRequest)))
 """Fields of the page; each is a text, and may be empty."""
 

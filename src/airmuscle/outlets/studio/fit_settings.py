@@ -84,8 +84,7 @@ class FitSettings:
     @property
     def braid(self) -> BraidSize | None:
         """The size of the braid; None if none is stated. Raises RequestError."""
-        texts = {name: self.texts[name] for name in BRAID}
-        return build(BraidRequest, texts, _words).size
+        return build(BraidRequest, {name: self.texts[name] for name in BRAID}, _words).size
 
 
 def _words(name: str) -> str:
