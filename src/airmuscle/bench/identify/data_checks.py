@@ -11,6 +11,7 @@ import numpy as np
 
 from ...core import Hint, HintedText
 from ...recording import Recording
+from ...recording.columns import displayed
 from ...report.chapter import NamedValue
 from ..checks import find_suspicious
 from ..checks.bench_rows import file_list
@@ -158,3 +159,8 @@ def check_data(recordings: Sequence[Recording]) -> Remarks:
         contradictions += two_muscle_notes(match_rows(measured, by_branch=True))
     found = (*contradictions, *outlier_notes(measured), *saturation_notes(measured), *delay_notes(delay))
     return Remarks((*find_suspicious(recordings), *found), Scatter.of(measured, repeatability(matches)), delay)
+
+
+def level_text(name: str, value: float) -> str:
+    """The level [SI] of a quantity as text in its unit of display; a contraction near 0 is 0."""
+    return displayed(name, 0.0 if name == "contraction" and abs(value) < 5e-5 else value, 3)

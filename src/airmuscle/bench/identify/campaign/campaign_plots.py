@@ -8,8 +8,8 @@ import numpy as np
 from ....core import BLACK, BLUE, DASHES, LINES, RED, AirmuscleError, legend_below, new_figure
 from ....report.chapter import Plot
 from ...segment import level_intervals
+from ..data_checks import level_text
 from ..dynamic.dynamic_chapter import draw_residuals, residual_panels, running_extreme
-from ..fit_notes import level_text
 from . import Campaign, CampaignRecord, CreepStage, FillStage, RecordKind, StaticStage
 from .transient import thinned_rows
 

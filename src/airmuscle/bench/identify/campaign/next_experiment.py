@@ -8,10 +8,10 @@ import numpy as np
 from ....core import AirmuscleError, IdentificationError, ShortRepr
 from ....physics.muscle.characteristic.validity_range import ValidityRange
 from ....recording import Recording
+from ..data_checks import level_text
 from ..dynamic import rank_records
 from ..dynamic.record_ranking import MIN_GAIN
 from ..experiment_design import BenchLimits, ExperimentPlan, PlannedRun, optimal_design
-from ..fit_notes import level_text
 from ..matched_rows import match_rows
 from .creep_stage import CreepStage
 from .fill_stage import FillStage

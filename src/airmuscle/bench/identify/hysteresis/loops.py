@@ -11,7 +11,7 @@ from ....physics.muscle.characteristic.base import Characteristic
 from ....recording import Recording
 from ... import segment
 from ...segment.runs import CONTRACTION_BAND, RELATIVE_BAND
-from ..fit_notes import level_text
+from ..data_checks import level_text
 from . import fit as loop_fit
 from .joint_result import preferred_fit
 from .limits import speed_reservation
