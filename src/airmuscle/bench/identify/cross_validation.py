@@ -31,11 +31,6 @@ class HeldLevels(NamedTuple):
     values: Array
     fraction: float
 
-    @property
-    def held(self) -> bool:
-        """Whether the quantity was held, apart from few rows."""
-        return self.fraction >= HELD_FRACTION
-
 
 def held_levels(values: Array) -> HeldLevels:
     """Return the levels of a measured quantity: medians of groups of values, without groups that a ramp fills."""
@@ -63,7 +58,7 @@ def levels_of(values: Array, max_count: int) -> Array:
 
 def is_pressure_ramp(pressure: Array, contraction: Array) -> bool:
     """Whether the pressure was swept at held contractions [Pa, 1], as in isometric tests."""
-    return held_levels(contraction).held and held_levels(pressure).fraction < 0.5
+    return held_levels(contraction).fraction >= HELD_FRACTION and held_levels(pressure).fraction < 0.5
 
 
 Labels = npt.NDArray[np.str_]

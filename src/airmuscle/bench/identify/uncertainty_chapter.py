@@ -136,7 +136,14 @@ def _figure(uncertainty: Uncertainty) -> Any:
             pair = (np.array(by_name[estimate.name]) - estimate.value) / estimate.stderr
             intervals.append((tuple(pair), RED, "profile", -0.25))
         for interval, colour, label, shift in intervals:
-            _draw_interval(axes, interval, row + shift, colour, label)
+            finite = np.nan_to_num(np.array(interval, dtype=float), posinf=AXIS_LIMIT, neginf=-AXIS_LIMIT)
+            low, high = np.clip(finite, -AXIS_LIMIT, AXIS_LIMIT)
+            once = None if label in axes.get_legend_handles_labels()[1] else label
+            style = {"color": colour, "linewidth": 2.2, "solid_capstyle": "butt", "label": once}
+            axes.plot([low, high], [row + shift, row + shift], **style)
+            for end, marker in ((low, "<"), (high, ">")):
+                if abs(end) >= AXIS_LIMIT:
+                    axes.plot([end], [row + shift], marker=marker, color=colour, markersize=5)
     axes.axvline(0.0, color=BLACK, linewidth=0.6)
     axes.set_yticks(range(len(plotted)), [to_mathtext(symbol_formula(estimates[i].label)) for i in plotted])
     axes.invert_yaxis()
@@ -145,18 +152,6 @@ def _figure(uncertainty: Uncertainty) -> Any:
     axes.set_xlim(-1.1 * max(widest, 2.5), 1.1 * max(widest, 2.5))
     legend_below(figure, axes, 3)
     return figure
-
-
-def _draw_interval(axes: Any, interval: Any, row: float, colour: str, label: str) -> None:
-    labels = axes.get_legend_handles_labels()[1]
-    low, high = np.clip(
-        np.nan_to_num(np.array(interval, dtype=float), posinf=AXIS_LIMIT, neginf=-AXIS_LIMIT), -AXIS_LIMIT, AXIS_LIMIT
-    )
-    label_once = None if label in labels else label
-    axes.plot([low, high], [row, row], color=colour, linewidth=2.2, solid_capstyle="butt", label=label_once)
-    for end, marker in ((low, "<"), (high, ">")):
-        if abs(end) >= AXIS_LIMIT:
-            axes.plot([end], [row], marker=marker, color=colour, markersize=5)
 
 
 MAX_CURVES = 5
