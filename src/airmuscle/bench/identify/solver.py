@@ -92,19 +92,12 @@ def solve_iteratively(problem: FitProblem, loss: Loss, start: Array) -> LeastSqu
 
     if np.abs(residuals(start / scale)).max() < 1e-14:  # an exact fit: the gradient vanishes
         return problem.solution(start)
-    options: dict[str, Any] = {
-        "jac": jacobian,
-        "bounds": (low / scale, high / scale),
-        "x_scale": "jac",
-        "loss": "linear" if isinstance(loss, LeastSquares) else loss.rho,
-        "f_scale": loss.scale / spread,
-        "ftol": _TOLERANCE,
-        "xtol": _TOLERANCE,
-        "gtol": None,
-    }
-    scaled = start / scale
+    rho = "linear" if isinstance(loss, LeastSquares) else loss.rho
+    tolerances = {"ftol": _TOLERANCE, "xtol": _TOLERANCE, "gtol": None}
+    options: dict[str, Any] = {"x_scale": "jac", "loss": rho, "f_scale": loss.scale / spread, **tolerances}
+    scaled, bounds = start / scale, (low / scale, high / scale)
     for method, max_evaluations in SEARCH_STAGES:
-        result = least_squares(residuals, scaled, method=method, max_nfev=max_evaluations, **options)
+        result = least_squares(residuals, scaled, jacobian, bounds, method, max_nfev=max_evaluations, **options)
         scaled = result.x
         if result.status > 0 or _is_converged(result):
             break
