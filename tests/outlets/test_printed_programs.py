@@ -19,7 +19,7 @@ from airmuscle.engine.compile import compile_system, derivatives, functions
 from airmuscle.engine.compile.ir.instructions import Operation
 from airmuscle.engine.compile.ir.interpreter import InterpretedBody
 from airmuscle.engine.compile.llvm.jit import engine_of, object_code
-from airmuscle.engine.compile.text.programs import DEFINITION, CLanguage, JavaScriptLanguage, MatlabLanguage
+from airmuscle.engine.compile.text.languages import DEFINITION, CLanguage, JavaScriptLanguage, MatlabLanguage
 from airmuscle.errors import TraceError
 
 SOME = ("dmsp-20-300", "overlap", "shaped joint with friction", "manifold on tank and regulator")

@@ -178,18 +178,14 @@ def check_mapping(kind: str, given: object, example: str = "((5, 1), (15, 0))") 
         raise ParameterError(f"a {kind} is {abridged(given)}; name the inputs: {{'fill': {example}}}.")
 
 
-def as_pairs(kind: str, name: str, given: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
-    """Pairs of time and value as numbers. Raises ParameterError for anything else."""
+def as_pairs(kind: str, noun: str, name: str, given: Sequence[tuple[float, float]]) -> list[tuple[float, float]]:
+    """Pairs of time and value as finite numbers, the times rising. Raises ParameterError for anything else."""
     try:
-        return [(as_float("a time", time), as_float("a value", value)) for time, value in given]
+        points = [(as_float("a time", time), as_float("a value", value)) for time, value in given]
     except (TypeError, ValueError, ParameterError):
         raise ParameterError(
             f"the {kind} of '{name}' is {one_line(given)}; write pairs of time [s] and value, ((5, 1), (15, 0))."
         ) from None
-
-
-def check_points(kind: str, noun: str, name: str, points: Sequence[tuple[float, float]]) -> None:
-    """Raise ParameterError unless all numbers are finite and times rise."""
     if points and not np.isfinite(points).all():
         raise ParameterError(f"the {kind} of '{name}' holds a number that is not finite: {one_line(points)}.")
     for i, (a, b) in enumerate(itertools.pairwise(time for time, _ in points)):
@@ -198,6 +194,7 @@ def check_points(kind: str, noun: str, name: str, points: Sequence[tuple[float, 
                 f"the {kind} of '{name}' must list its {noun} in rising order; number {i + 2}, {b:g} s, follows "
                 f"{a:g} s."
             )
+    return points
 
 
 @dataclasses.dataclass(frozen=True)
@@ -215,8 +212,7 @@ class Schedule(InputSignal):
         check_mapping("schedule", self.changes)
         changes = {}
         for name, given in self.changes.items():
-            pairs = as_pairs("schedule", name, given)
-            check_points("schedule", "instants", name, pairs)
+            pairs = as_pairs("schedule", "instants", name, given)
             changes[name] = [t for t, _ in pairs], [0.0, *(v for _, v in pairs)]
         object.__setattr__(self, "_changes", changes)
         object.__setattr__(self, "_last", ((), 0.0, 0.0, None))

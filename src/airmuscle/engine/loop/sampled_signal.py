@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from ...core import AirmuscleWarning, Array, ParameterError, as_float, one_line
 from ...recording.recording import Recording
-from .inputs import InputSignal, PiecewiseLinear, as_pairs, check_input_names, check_mapping, check_points
+from .inputs import InputSignal, PiecewiseLinear, as_pairs, check_input_names, check_mapping
 
 INITIAL_LINES = 64
 """Straight lines that a sampled function is first approximated by (chosen)."""
@@ -31,12 +31,10 @@ class SampledSignal(InputSignal):
     def __post_init__(self) -> None:
         check_mapping("sampled signal", self.points)
         for name, given in self.points.items():
-            points = as_pairs("sampled signal", name, given)
-            if not points:
+            if not as_pairs("sampled signal", "times", name, given):
                 raise ParameterError(
                     f"the sampled signal of '{name}' has no points; write pairs of time [s] and value."
                 )
-            check_points("sampled signal", "times", name, points)
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -4,7 +4,6 @@ An integrator is bound to a compiled system: its kernel with all arguments, run 
 """
 
 import abc
-import functools
 from collections.abc import Callable
 from typing import Any, ClassVar, NamedTuple
 
@@ -217,15 +216,13 @@ class ExplicitRungeKutta(Integrator):
         return Binding(fixed_step, (address, precomputed), (self.step,), work)
 
 
-@functools.cache
-def _default() -> Integrator:
-    return Rodas4()
+_DEFAULT = Rodas4()
 
 
 def default_integrator(integrator: Integrator | None) -> Integrator:
     """The given integrator, or the default. Raises ParameterError for anything else, such as a name."""
     if integrator is None:
-        return _default()
+        return _DEFAULT
     if not isinstance(integrator, Integrator):
         raise ParameterError(
             f"the integrator is {abridged(integrator)}; give Rodas4(), RungeKutta4(step) or DormandPrince8(step)."

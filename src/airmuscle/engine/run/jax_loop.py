@@ -51,7 +51,7 @@ def loop_in_jax(
 
     def run(plant_parameters: Any, law_parameters: Any) -> dict[str, Any]:
         varied, commanding = tree.unflatten(plant, list(plant_parameters)), tree.unflatten(law, list(law_parameters))
-        return _run(_Sample(varied, commanding, prepared, jnp), start, rows)
+        return _Sample(varied, commanding, prepared, jnp).run(start, rows)
 
     return run
 
@@ -81,24 +81,20 @@ class _Sample:
         after, _ = jax.lax.scan(lambda x, h: (runge_kutta4(self.plant, x, inputs, h), None), state, steps)
         return (after, {name: self._array(later[name]) for name in memory}, held), (state, held)
 
-    def start(self, state: dict[str, Any]) -> Any:
-        """State, memory and commands before the first sample."""
-        memory = {name: self._array(value) for name, value in self.law.initial_memory.items()}
-        return state, memory, {name: self._array(0.0) for name in self.law.inputs}
+    def run(self, start: dict[str, Any], rows: tuple[Any, ...]) -> dict[str, Any]:
+        """The columns of a run from a state of the plant."""
+        import jax
+
+        law, jnp = self.law, self.numpy
+        memory = {name: self._array(value) for name, value in law.initial_memory.items()}
+        before = start, memory, {name: self._array(0.0) for name in law.inputs}
+        (final, _, _), (states, commands) = jax.lax.scan(self, before, rows)
+        columns = {name: jnp.append(states[name], final[name]) for name in start}
+        named = {f"{COMMAND}{name}": values for name, values in commands.items()}
+        return {"time": jnp.asarray(self.prepared.instants), **columns, **named}
 
     def _array(self, value: Any) -> Any:
         return self.numpy.asarray(value, dtype=float)
-
-
-def _run(sample: _Sample, start: dict[str, Any], rows: tuple[Any, ...]) -> dict[str, Any]:
-    """The columns of a run."""
-    import jax
-
-    jnp = sample.numpy
-    (final, _, _), (states, commands) = jax.lax.scan(sample, sample.start(start), rows)
-    columns = {name: jnp.append(states[name], final[name]) for name in start}
-    named = {f"{COMMAND}{name}": values for name, values in commands.items()}
-    return {"time": jnp.asarray(sample.prepared.instants), **columns, **named}
 
 
 def runge_kutta4(plant: System, state: Mapping[str, Any], inputs: Mapping[str, Any], h: Any) -> dict[str, Any]:

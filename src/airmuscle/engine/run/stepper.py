@@ -61,9 +61,8 @@ class Stepper:
         self.outputs, self._found = np.zeros(sizes.outputs), np.zeros(sizes.outputs)
         self._always = np.zeros(1, dtype=np.int64)
         self._initial: Array | None = None
-        self._index = {name: ("state", i) for i, name in enumerate(self.state_names)}
-        self._index |= {name: ("outputs", i) for i, name in enumerate(self.output_names)}
-        self._index |= {name: ("inputs", i) for i, name in enumerate(self.input_names)}
+        kinds = {"state": self.state_names, "outputs": self.output_names, "inputs": self.input_names}
+        self._index = {name: (kind, i) for kind, names in kinds.items() for i, name in enumerate(names)}
         self._bind(compile_system(plant))
         self.reset(initial_state, start_time=start_time)
 
@@ -116,7 +115,10 @@ class Stepper:
                 raise ValueError
             self._given[:] = inputs
         except (TypeError, ValueError):
-            raise self._wrong_inputs(inputs) from None
+            raise ParameterError(
+                f"Stepper: inputs are {one_line(inputs)}; give {self._given.size} numbers in the order of "
+                f"{', '.join(self.input_names)}, or values by name."
+            ) from None
         if self._begin():
             check_inputs(self._compiled, self._given, f"at {self.time:g} s")
         status = self._bound.proceed(dt)
@@ -200,12 +202,6 @@ class Stepper:
         self._always[0] = 0
         return self.outputs
 
-    def _wrong_inputs(self, inputs: Any) -> ParameterError:
-        return ParameterError(
-            f"Stepper: inputs are {one_line(inputs)}; give {self._given.size} numbers in the order of "
-            f"{', '.join(self.input_names)}, or values by name."
-        )
-
     def _by_name(self, inputs: Mapping[str, float]) -> list[Any]:
         """The inputs in their order; those that are not given keep their present values."""
         values: list[Any] = self.inputs.tolist()
@@ -243,16 +239,14 @@ class _Limits:
         self.lower[n + known.positive_outputs] = np.nextafter(0.0, 1.0)
         self.validity: dict[int, ColumnLimit] = {}
         for limit in compiled.system.column_limits if check_validity else ():
-            if limit.column in self.names:
-                self._narrow(self.names.index(limit.column), limit)
+            if limit.column not in self.names:
+                continue
+            i, (low, high) = self.names.index(limit.column), limit.bounds
+            slack = 1e-9 * (high - low if np.isfinite(high - low) else 0.0)
+            if low - slack > self.lower[i] or high + slack < self.upper[i]:
+                self.lower[i], self.upper[i] = max(self.lower[i], low - slack), min(self.upper[i], high + slack)
+                self.validity[i] = limit
         self.arrays = self.lower[:n], self.upper[:n], self.lower[n:], self.upper[n:]
-
-    def _narrow(self, i: int, limit: ColumnLimit) -> None:
-        low, high = limit.bounds
-        slack = 1e-9 * (high - low if np.isfinite(high - low) else 0.0)
-        if low - slack > self.lower[i] or high + slack < self.upper[i]:
-            self.lower[i], self.upper[i] = max(self.lower[i], low - slack), min(self.upper[i], high + slack)
-            self.validity[i] = limit
 
     def meaning(self, i: int, value: npt.ArrayLike) -> str:
         """What it means that column `i` has this value beyond its limits."""

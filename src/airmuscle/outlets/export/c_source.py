@@ -10,7 +10,7 @@ import numpy as np
 
 from ...engine.compile.functions import ArraySizes, Extension
 from ...engine.compile.kernel_text import CKernels
-from ...engine.compile.text.programs import CLanguage
+from ...engine.compile.text.languages import CLanguage
 from ...engine.loop import PiecewiseLinear
 from ...engine.run.integrators import Integrator
 from ...recording.recording import column_heading

@@ -6,7 +6,7 @@ from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement
 
 from ...core import ParameterError
-from ...engine.compile.text.programs import CLanguage
+from ...engine.compile.text.languages import CLanguage
 from ...engine.loop import MEASURED, SETPOINT, Schedule, named_signal_units
 from ...engine.run import Problem, solve
 from ...engine.run.sampled_loop import SampledLoop, prepare_loop

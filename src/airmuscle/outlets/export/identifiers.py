@@ -13,7 +13,7 @@ import numpy as np
 
 from ...core import ParameterError, abridged, cite, leaves, printable
 from ...core.tree import fingerprint
-from ...engine.compile.text.programs import CBody
+from ...engine.compile.text.languages import CBody
 
 LONGEST = 48
 """Characters of an identifier: with a prefix it stays within the 63 that C99 and MATLAB distinguish."""

@@ -14,7 +14,7 @@ from ...engine.compile.ir import emission
 from ...engine.compile.ir.emission import TargetLanguage
 from ...engine.compile.ir.instructions import instructions
 from ...engine.compile.onnx_graph import GraphBody
-from ...engine.compile.text.learning import TorchLanguage, WarpLanguage
+from ...engine.compile.text.languages import TorchLanguage, WarpLanguage
 from ...engine.run.batch import Double, Precision, Single
 from ...files import load_scenario
 from ...files.library.uncertainty import ParameterUncertainty

@@ -13,7 +13,7 @@ from ...engine.compile.ir.emission import TargetLanguage
 from ...engine.compile.ir.instructions import Code, instructions
 from ...engine.compile.ir.interpreter import InterpretedBody
 from ...engine.compile.text.body import Labels
-from ...engine.compile.text.programs import CLanguage
+from ...engine.compile.text.languages import CLanguage
 from ...engine.loop import ControlLaw, ControlLoop
 from ...engine.run import Problem
 from ...engine.run.compiled_law import trace_sample

@@ -10,7 +10,7 @@ import numpy as np
 from ...core import printable
 from ...engine.compile.kernel_text import JavaScriptKernels, MatlabKernels
 from ...engine.compile.kernel_text.printer import KernelPrinter
-from ...engine.compile.text.programs import DEFINITION, JavaScriptLanguage, MatlabBody, MatlabLanguage
+from ...engine.compile.text.languages import DEFINITION, JavaScriptLanguage, MatlabBody, MatlabLanguage
 from .c_source import csv_header
 from .exported_run import BETWEEN, SHAPES, STEP, TABLEAU, ExportedRun, SolverText
 from .identifiers import block_comment, filled, line_comment, template

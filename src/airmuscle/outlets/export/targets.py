@@ -8,7 +8,7 @@ from typing import Any
 from ...core import Leaf, ParameterError, autodiff, leaves, one_line, parts_of
 from ...engine.compile.functions import PARAMETERS, Printer
 from ...engine.compile.ir.emission import TargetLanguage
-from ...engine.compile.text.programs import DEFINITION, CLanguage, JavaScriptLanguage, MatlabLanguage
+from ...engine.compile.text.languages import DEFINITION, CLanguage, JavaScriptLanguage, MatlabLanguage
 from ...physics.muscle.characteristic import Characteristic, ContractionLaw, ForceLaw, PressureLaw
 from .c_source import CSource, main_program
 from .exported_run import ExportedRun

@@ -26,7 +26,7 @@ from ...design.control_benchmark import STANDARD_TASKS, ControlTask
 from ...engine.compile.functions import Printer
 from ...engine.compile.kernel_text import JavaScriptKernels
 from ...engine.compile.program import compile_system
-from ...engine.compile.text.programs import JavaScriptLanguage
+from ...engine.compile.text.languages import JavaScriptLanguage
 from ...engine.run.compiled_law import trace_sample
 from ...files.library import list_plants, plant_tables
 from ...files.scenario.scenario import TABLES, build_scenario

@@ -30,7 +30,7 @@ import airmuscle as am
 
 from ...core import AirmuscleError, Array, Leaf, ParameterError, TraceError, autodiff, cite, conversion, leaves, tree
 from ...engine.compile.functions import Printer
-from ...engine.compile.text.programs import JavaScriptLanguage
+from ...engine.compile.text.languages import JavaScriptLanguage
 from ...files.library import Entry, to_toml
 from ...physics.muscle.characteristic.validity_range import validity_range_of
 from ...physics.muscle.geometry.straight_fibre import FibreTube

@@ -92,7 +92,7 @@ class Kernel:
         """The entry point, and the engine that owns its machine code."""
         code = store.load(self.name, kinds)
         if code is None:
-            announce(self.name)
+            print(f"compiling {self.name}, once on this machine (some seconds) ...", file=sys.stderr, flush=True)
             code = store.save(self.name, kinds, build(self.numba, kinds))
         if not code:
             return None
@@ -197,8 +197,3 @@ evaluate, evaluate_rates = Kernel("evaluate"), Kernel("evaluate_rates", "evaluat
 record, newton, sampled_loop = Kernel("record", "evaluate"), Kernel("newton"), Kernel("sampled_loop")
 begin_step, end_step = Kernel("begin_step", "evaluate"), Kernel("end_step", "evaluate")
 lane_blocks, loop_lanes = Kernel("lane_blocks", "lanes"), Kernel("loop_lanes")
-
-
-def announce(name: str) -> None:
-    """Print to stderr that a kernel is being compiled, which takes some seconds."""
-    print(f"compiling {name}, once on this machine (some seconds) ...", file=sys.stderr, flush=True)

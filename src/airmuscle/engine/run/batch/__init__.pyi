@@ -7,5 +7,5 @@ from .stepper import BatchStepper as BatchStepper
 
 # isort: split
 # For the other packages, not in __all__
+from ..loop_sensitivities import CONTROLLER as CONTROLLER
 from .job import hidden_progress as hidden_progress
-from .loops import CONTROLLER as CONTROLLER

@@ -11,12 +11,10 @@ from ....core import Array, ParameterError, System
 from ...compile.program import CompiledSystem, Pool
 from ...loop import ControlLaw, ControlLoop, designed_loop
 from ..compiled_loop import CompiledLoop, CompiledRun
+from ..loop_sensitivities import CONTROLLER
 from ..problem import Problem
 from ..sampled_loop import first_rows_of, prepare_loop
 from .variations import Variations, variations_of
-
-CONTROLLER = "controller."
-"""Prefix of the paths of a controller's parameters among variations."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
