@@ -10,7 +10,7 @@ import numpy as np
 from ...engine.compile.function import EventIndicators, Partials, event_indicators, partials
 from ...engine.compile.functions import Printer
 from ...engine.run import Problem, solve
-from ...physics.plant.diagnostics import column_limits, describe_limit
+from ...physics.plant.diagnostics import describe_limit
 from ...physics.plant.plant import Plant
 from .c_source import CSource, csv_text
 from .compiler import Platform
@@ -168,7 +168,7 @@ def _limits(system: object, columns: Sequence[str]) -> list[tuple[int, float, fl
     limits: list[tuple[int, float, float, str]] = []
     plant = getattr(system, "plant", system)
     if isinstance(plant, Plant):
-        for limit in column_limits(plant.muscles, plant.prefixes):
+        for limit in plant.column_limits:
             if limit.column in columns:
                 low, high = limit.bounds
                 slack = 1e-9 * max(abs(x) for x in (low, high) if abs(x) < float("inf"))

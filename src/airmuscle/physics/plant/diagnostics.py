@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import Array, ParameterError, Value, describe_model, select_prefix
+from ...core import Array, describe_model
 from ...core.diagnostics import ColumnLimit, Columns, Diagnostic, DiagnosticCode
 from ..muscle import INNER_CONTRACTION, ElasticSeriesElement, Muscle, RatedRange
 from ..muscle.friction import NoFriction
@@ -36,16 +36,6 @@ def friction(muscles: Sequence[Muscle]) -> Diagnostic:
     return Diagnostic(DiagnosticCode.MODEL, "friction", f"friction of the muscles: {text}")
 
 
-def column_limits(muscles: Sequence[Muscle], prefixes: Sequence[str]) -> tuple[ColumnLimit, ...]:
-    """All limits of the columns of muscles: validity ranges of characteristics, ranges of the data of frictions, and
-    contraction ranges of geometries."""
-    return tuple(
-        ColumnLimit(muscle.name, *limit)
-        for prefix, muscle in zip(prefixes, muscles, strict=True)
-        for limit in _limits(muscle, prefix)
-    )
-
-
 def with_tolerance(limits: Sequence[ColumnLimit]) -> tuple[tuple[ColumnLimit, float, float], ...]:
     """Each limit of a column, with the bounds that the column may reach through rounding."""
     widened = []
@@ -70,8 +60,12 @@ def extrapolation(limits: Sequence[tuple[ColumnLimit, float, float]], columns: C
     return diagnostics
 
 
-def _limits(muscle: Muscle, prefix: str) -> Iterator[tuple[DiagnosticCode, str, str, tuple[float, float]]]:
-    """The columns of a muscle that have limits: kind of the limit, column, quantity, lower and upper limit."""
+def limits_of(muscle: Muscle, prefix: str) -> Iterator[tuple[DiagnosticCode, str, str, tuple[float, float]]]:
+    """All limits of the columns of a muscle: kind of the limit, column, quantity, lower and upper limit.
+
+    They are the validity range of the characteristic, the range of the data of the friction, the contraction range of
+    the geometry and the ratings.
+    """
     for rated in muscle.ratings.ranges() if muscle.ratings else ():
         if rated.quantity in ("force", "pressure", "contraction"):
             yield DiagnosticCode.RATING, f"{prefix}{rated.quantity}", rated.quantity, (rated.low, rated.high)
@@ -146,39 +140,6 @@ class Enclosure(NamedTuple):
     contraction: float
     inner_contraction: float
     volume: float
-
-
-def enclosures(
-    muscles: Sequence[Muscle], prefixes: Sequence[str], contractions: Sequence[float], state: Mapping[str, float]
-) -> list[Enclosure]:
-    """Contractions and volumes of all muscles at a state."""
-    result = []
-    for muscle, prefix, contraction in zip(muscles, prefixes, contractions, strict=True):
-        own = select_prefix(prefix, state)
-        inner = muscle.inner_contraction(contraction, own)
-        result.append(Enclosure(muscle, contraction, inner, muscle.volume(inner, own)))
-    return result
-
-
-def check_volumes(muscles: Sequence[Muscle], pressures: Sequence[float], volumes: Sequence[Value]) -> None:
-    """Raise ParameterError for a muscle whose volume [m3] at its gauge pressure [Pa] would not be positive."""
-    for muscle, pressure, volume in zip(muscles, pressures, volumes, strict=True):
-        if not volume > 0.0:
-            raise ParameterError(
-                f"Plant: the volume of {muscle.name} would be {volume:.4g} m3 at {pressure:.4g} Pa; its wall deforms "
-                "too far."
-            )
-
-
-def check_enclosures(given: Sequence[Enclosure]) -> None:
-    """Raise GeometryLimitError for an impossible contraction, ParameterError for a volume that is not positive."""
-    for muscle, contraction, inner, volume in given:
-        muscle.geometry.check_contraction(inner)
-        if not volume > 0.0:
-            raise ParameterError(
-                f"the initial state: the volume of {muscle.name} is {volume:.4g} m3 at a contraction of "
-                f"{100 * contraction:.2f} %; choose a contraction further within its range."
-            )
 
 
 def geometry_limit_hint(enclosure: Enclosure) -> str:

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, ClassVar
 
-from ...core import GeometryLimitError, Value, Values, model
+from ...core import GeometryLimitError, ParameterError, Value, Values, model
 from ...core.diagnostics import ColumnLimit, Columns, Diagnostic, DiagnosticCode
 from ...core.system import Input, StateVariable, add_prefix, select_prefix, with_prefix
 from ..equilibrium.equilibrium import equilibria_at_ambient_pressure, equilibrium_at_ambient_pressure
@@ -150,11 +150,21 @@ class Plant(PlantDisplay, StaticPlant):
 
     def check_state(self, state: Mapping[str, float]) -> None:
         """Raise GeometryLimitError for an impossible contraction, ParameterError for a volume that is not positive."""
-        diagnostics.check_enclosures(self._enclosures(state))
+        for muscle, contraction, inner, volume in self._enclosures(state):
+            muscle.geometry.check_contraction(inner)
+            if not volume > 0.0:
+                raise ParameterError(
+                    f"the initial state: the volume of {muscle.name} is {volume:.4g} m3 at a contraction of "
+                    f"{100 * contraction:.2f} %; choose a contraction further within its range."
+                )
 
     def _enclosures(self, state: Mapping[str, float]) -> list[diagnostics.Enclosure]:
-        contractions = self.mechanism.contractions(state, self.resting_lengths)
-        return diagnostics.enclosures(self.muscles, self.prefixes, contractions, state)
+        enclosures, contractions = [], self.mechanism.contractions(state, self.resting_lengths)
+        for muscle, prefix, contraction in zip(self.muscles, self.prefixes, contractions, strict=True):
+            own = select_prefix(prefix, state)
+            inner = muscle.inner_contraction(contraction, own)
+            enclosures.append(diagnostics.Enclosure(muscle, contraction, inner, muscle.volume(inner, own)))
+        return enclosures
 
     def describe(self) -> tuple[Diagnostic, ...]:
         """The gas and the friction."""
@@ -179,7 +189,8 @@ class Plant(PlantDisplay, StaticPlant):
     @functools.cached_property
     def column_limits(self) -> tuple[ColumnLimit, ...]:
         """Validity ranges and ratings of the muscles, and the ranges of their geometries."""
-        return diagnostics.column_limits(self.muscles, self.prefixes)
+        named = zip(self.prefixes, self.muscles, strict=True)
+        return tuple(ColumnLimit(m.name, *limit) for prefix, m in named for limit in diagnostics.limits_of(m, prefix))
 
     def failure_hint(self, state: Mapping[str, float]) -> str:
         """Remedy for the first muscle that is at, or beyond, a limit of its geometry."""

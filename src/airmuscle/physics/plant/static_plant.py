@@ -5,13 +5,12 @@ from collections.abc import Iterator, Mapping, Sequence
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from ...core import StateVariable, System, Value, Values, check_known, select_prefix, with_prefix
+from ...core import ParameterError, StateVariable, System, Value, Values, check_known, select_prefix, with_prefix
 from ..mechanism import Mechanism
 from ..muscle import Muscle
 from ..muscle.friction import NoFriction
 from ..pneumatics import Air, Ambient, Circuit, CircuitFlows, Flow, Gas, key_by_muscle, key_by_port
 from ..pneumatics.gas import absolute_pressure, gauge_pressure
-from .diagnostics import check_volumes
 from .validation import as_quantity, check_pressures
 
 _TYPICAL_CONTRACTION = 0.05
@@ -177,7 +176,12 @@ class StaticPlant(System):
         for muscle, contraction in zip(self.muscles, contractions, strict=True):
             muscle.geometry.check_contraction(contraction)
         state, volumes = self.settle_muscles(pressures, state)
-        check_volumes(self.muscles, pressures, volumes)
+        for muscle, each, volume in zip(self.muscles, pressures, volumes, strict=True):
+            if not volume > 0.0:
+                raise ParameterError(
+                    f"Plant: the volume of {muscle.name} would be {volume:.4g} m3 at {each:.4g} Pa; its wall deforms "
+                    "too far."
+                )
         state = self.fill_muscles(pressures, volumes, state)
         return {s.name: float(state[s.name]) for s in self.states}
 
