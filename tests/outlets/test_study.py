@@ -330,7 +330,7 @@ def test_a_run_is_what_simulate_gives(folder: Path):
 
 def test_initial_states_computed_together_equal_those_computed_individually(folder: Path):
     study = load_study(folder / "study.toml")
-    states = study.initial_states(range(22))
+    states = study.template.initial_states(*study.varying(range(22)))
     assert [state == study.scenario(run).initial_state for run, state in enumerate(states)] == [True] * 22
     assert study.scenario(3, states[3]).initial_state == states[3]
     assert len({state["air_mass"] for state in states}) == 22
@@ -353,7 +353,7 @@ def test_a_varied_initial_state_is_computed_run_by_run(folder: Path):
     text = (folder / "study.toml").read_text(encoding="utf-8")
     (folder / "study.toml").write_text(re.sub(r'"x" = .*\n', "", text), encoding="utf-8")
     study = load_study(folder / "study.toml")
-    assert study.initial_states(range(4)) == [None] * 4
+    assert study.template.initial_states(*study.varying(range(4))) == [None] * 4
     assert len({study.scenario(run).initial_state["air_mass"] for run in range(4)}) == 4
     assert not run(folder).failed.size
 

@@ -105,8 +105,9 @@ def compute_chunk(study: Study, index: int) -> Chunk:
         {name: np.full((len(runs), series.times.size), np.nan) for name, series in study.time_series.items()},
         np.array([""] * len(runs), dtype=object),
     )
+    states = study.template.initial_states(*study.varying(runs))
     scenarios: dict[int, Scenario] = {}
-    for row, (run, initial_state) in enumerate(zip(runs, study.initial_states(runs), strict=True)):
+    for row, (run, initial_state) in enumerate(zip(runs, states, strict=True)):
         check_running()
         try:
             scenarios[row] = study.scenario(run, initial_state)

@@ -1,8 +1,4 @@
-"""Parameter paths: the numbers of a scenario that a study may vary.
-
-All declared parameters of the plant may vary, with the paths of `airmuscle.core.leaves`: `circuit.fill.conductance`. Of
-the other tables, all numbers may vary: `input.fill[0][1]` (value of the first point; `[0][0]` is its time),
-`run.duration`, `run.initial_state.pressure`, `run.integrator.rtol`.
+"""Parameter paths: the numbers of a scenario that a study may vary; docs/study.md.
 
 The unit of a field of designs, distributions and metrics is that of the varied parameter, or of the evaluated column:
 such a field is declared with `custom_field` and one of the readers, which receive that unit.

@@ -79,23 +79,15 @@ class Study(ShortRepr):
         """The indices of the chunks."""
         return range(-(-len(self) // self.chunk_size))
 
-    @property
-    def varying_parameters(self) -> tuple[ScenarioParameter, ...]:
-        """The varied parameters and those that follow them."""
-        return (*self.parameters, *(parameter for parameter, _ in self.follow))
-
-    def varying_values(self, runs: Sequence[int]) -> npt.NDArray[np.float64]:
-        """The values (R, D) of the D varying parameters in R runs."""
-        values = self.values[runs]
-        return np.hstack([values, values[:, [i for _, i in self.follow]]])
-
-    def initial_states(self, runs: Sequence[int]) -> list[dict[str, float] | None]:
-        """The initial states of some runs, computed together; None if a run must be computed individually."""
-        return self.template.initial_states(self.varying_parameters, self.varying_values(runs))
+    def varying(self, runs: Sequence[int]) -> tuple[tuple[ScenarioParameter, ...], npt.NDArray[np.float64]]:
+        """The D varied parameters and those that follow them, and their values (R, D) in R runs."""
+        values, followers = self.values[runs], [parameter for parameter, _ in self.follow]
+        return (*self.parameters, *followers), np.hstack([values, values[:, [i for _, i in self.follow]]])
 
     def scenario(self, run: int, initial_state: dict[str, float] | None = None) -> Scenario:
         """The scenario of one run. Raises ParameterError or PhysicsError if its parameter values are not valid."""
-        return self.template.with_values(self.varying_parameters, self.varying_values([run])[0].tolist(), initial_state)
+        parameters, values = self.varying([run])
+        return self.template.with_values(parameters, values[0].tolist(), initial_state)
 
     def fingerprint(self) -> str:
         """The fingerprint of everything that the results depend on, except for the program."""

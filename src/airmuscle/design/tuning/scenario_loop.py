@@ -44,7 +44,7 @@ class ScenarioLoop(ShortRepr):
     @property
     def location(self) -> Location:
         """The location of the file, for messages."""
-        return Location(str(self.path), "", self.path.parent)
+        return Location.of_file(self.path)
 
     def family(self, perturbations: Perturbations, seed: int = 0) -> PerturbedFamily:
         """The cases of the perturbed plants, each with the initial state that the scenario gives it."""
@@ -151,7 +151,7 @@ class ScenarioLoop(ShortRepr):
         if path.is_dir():
             raise FileError(f"{path}: is a folder; name a file in it.")
         with located_errors(f"{path} cannot take the place of {self.path}"):
-            build_scenario(tomllib.loads(text or self.text), Location(str(path), "", path.parent))
+            build_scenario(tomllib.loads(text or self.text), Location.of_file(path))
 
 
 def load_scenario_loop(path: str | Path) -> ScenarioLoop:
