@@ -13,7 +13,7 @@ from ...core.system import select_prefix, united, with_prefix
 from ...engine.loop import ControlLaw, Controller, Measurement, Memory, Sampled, SigmaDelta, SplitRange, WithSensors
 from ...engine.run.compiled_law import LawSample
 from ..tuning import load_scenario_loop
-from . import BenchmarkJoint, StuckValve
+from . import BenchmarkJoint
 from .truths import SIDES
 
 ELSEWHERE = (
@@ -59,12 +59,11 @@ class PassedSignals(ControlLaw):
 
 
 class SensedMemory(NamedTuple):
-    """Memories of the sensors, the controller and the actuation, and the number of samples so far."""
+    """Memories of the sensors, the controller and the actuation."""
 
     sensors: Any
     controller: Any
     actuation: Any
-    samples: int
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -76,14 +75,12 @@ class SensedController(Controller):
                 are attained: the controller goes on as if it had commanded those
     ranges      minimum and maximum [SI] of the controller's commands; those of the plant unless given
     sensors     of all columns that controller and actuation measure
-    stuck       a valve that sticks
     """
 
     controller: Controller
     actuation: ControlLaw
     ranges: Mapping[str, tuple[float, float]]
     sensors: WithSensors
-    stuck: StuckValve | None = None
 
     measured_columns = forwarded("sensors.law.measured_columns")
 
@@ -105,7 +102,7 @@ class SensedController(Controller):
 
     def init(self) -> SensedMemory:
         sensors, actuation = self._compiled
-        return SensedMemory(sensors.initial, self.controller.init(), actuation.initial, 0)
+        return SensedMemory(sensors.initial, self.controller.init(), actuation.initial)
 
     def step(
         self, memory: SensedMemory, measurement: Measurement, dt: float
@@ -117,14 +114,12 @@ class SensedController(Controller):
         points = {**measurement.setpoints, **with_prefix(COMMANDED, commands)}
         valves, actuation = act.step(memory.actuation, seen._replace(setpoints=points), dt)
         memories = zip(self.actuation.initial_memory, actuation, strict=True)
-        applied = {f".{key}".rpartition("outer.")[2].removeprefix("."): value for key, value in memories}
+        applied = {key.rpartition("outer.")[2].removeprefix("law."): value for key, value in memories}
         attained = {name: applied[name] for name in commands}
         if any(abs(attained[name] - value) > 1e-9 * abs(value) for name, value in commands.items()):
             only = {**seen.ranges, **{name: (value, value) for name, value in attained.items()}}
             _, own = self.controller.step(memory.controller, seen._replace(ranges=only), dt)
-        if self.stuck is not None and (memory.samples + 1e-6) * dt > self.stuck.time:
-            valves = {**valves, self.stuck.input: self.stuck.opening}
-        return valves, SensedMemory(sensors, own, actuation, memory.samples + 1)
+        return valves, SensedMemory(sensors, own, actuation)
 
     def notes(self, memory: SensedMemory) -> tuple[str, ...]:
         """The remarks of the controller."""

@@ -134,11 +134,11 @@ def task_loop(
     signals: TaskSignals | None = None,
 ) -> ControlLoop:  # fmt: skip
     """The control loop of a task at a plant with drivers of its valves; signals other than those of the task."""
-    if task.stuck is not None and isinstance(law, SensedController):
-        law = dataclasses.replace(law, stuck=task.stuck)
-    elif task.stuck is not None:
-        assert isinstance(law, ControlLaw)
-        law = WithStuckValve(law, task.stuck.input, task.stuck.time, task.stuck.opening)
+    if task.stuck is not None:
+        acting = law.actuation if isinstance(law, SensedController) else law
+        assert isinstance(acting, ControlLaw)
+        faulty = WithStuckValve(acting, task.stuck.input, task.stuck.time, task.stuck.opening)
+        law = dataclasses.replace(law, actuation=faulty) if isinstance(law, SensedController) else faulty
     setpoint = (signals or task_signals(joint, task)).setpoint(law.setpoints)
     return ControlLoop(law, joint.sample_time, setpoint, disturbance(task, plant.inputs), drivers)
 
