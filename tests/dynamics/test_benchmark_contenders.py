@@ -13,6 +13,7 @@ import pytest
 from benchmark_contender import JOINT, MINE, SHORT
 from called_controller import Called
 
+from airmuscle.control import WithStuckValve
 from airmuscle.core import leaves
 from airmuscle.design import (
     STANDARD_TASKS,
@@ -60,9 +61,9 @@ def test_a_controller_that_is_called_meets_the_same_sensors_and_the_same_actuati
 
 @pytest.mark.parametrize(("late", "samples"), [(3.0, 3), (3.2, 4), (3.5, 4)])
 def test_a_valve_sticks_at_the_first_sample_at_or_after_its_time(late, samples):
-    """As `WithStuckValve` does; `late` is the time in samples."""
+    """Also behind a called controller; `late` is the time in samples."""
     law, dt = complete(JOINT, Contender("called", Called(MINE.law))).law, JOINT.sample_time
-    stuck = replace(law, stuck=StuckValve("left.discharge", late * dt, 0.123))
+    stuck = replace(law, actuation=WithStuckValve(law.actuation, "left.discharge", late * dt, 0.123))
     zeros = [dict.fromkeys(names, 0.0) for names in (stuck.measured_columns, stuck.setpoints)]
     measurement, memory, found = Measurement(*zeros, dict.fromkeys(stuck.inputs, (0.0, 1.0))), stuck.init(), []
     for _ in range(6):

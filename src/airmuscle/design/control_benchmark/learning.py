@@ -1,17 +1,15 @@
 """Iterative learning in the control benchmark: a task repeated on the truth, with a learned feed-forward signal."""
 
 import dataclasses
-from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
 
 from ...control.laws.iterative_learning import IterativeLearning
 from ...core import Array, ParameterError, ShortRepr, check_whole, leaves
-from ...engine.loop import Driver, WithSensors
+from ...engine.loop import WithSensors
 from ...engine.run import simulate
-from ...physics.plant.plant import Plant
-from . import ContenderResult, ControlTask
+from . import BenchmarkTruth, ContenderResult, ControlTask
 from .commissioning import on_truth
 from .joints import ENCODER_STEP, BenchmarkJoint
 from .signals import TaskSignals, task_loop, task_signals
@@ -69,7 +67,7 @@ def learn(
     def tried(number: int, signal: Array) -> tuple[Array, float]:
         """The angle (N,) [rad] of a trial with its own noise, and its rms error [degree]."""
         noisy = replace(sensed, seed=float(seed + number))
-        angle = _trial(joint, (true.plant, true.drivers), noisy, task, signals, signal, start)
+        angle = _trial(joint, true, noisy, task, signals, signal, start)
         return angle, float(np.degrees(np.sqrt(np.mean((wanted - angle)[judged] ** 2))))
 
     errors, last = [], signal
@@ -88,12 +86,11 @@ def _learning(
 ) -> IterativeLearning:  # fmt: skip
     """The learning law from the response of the model at rest to a step of the signal."""
     rest = signals._replace(angle=np.zeros_like(signals.angle))
-    start = joint.start(joint.model)
+    known, start = BenchmarkTruth("model", joint.model, joint.drivers), joint.start(joint.model)
     silent = replace(law, sensors=tuple(replace(s, noise=0.0, resolution=0.0) for s in law.sensors))
     quiet = replace(task, torque=(), stiffening=(), stuck=None)
     with_step, without = (
-        _trial(joint, (joint.model, joint.drivers), silent, quiet, rest, np.full(count, value), start)
-        for value in (STEP, 0.0)
+        _trial(joint, known, silent, quiet, rest, np.full(count, value), start) for value in (STEP, 0.0)
     )
     span = joint.pressure_span
     return IterativeLearning.from_step_response(
@@ -103,14 +100,13 @@ def _learning(
 
 
 def _trial(
-    joint: BenchmarkJoint, driven: tuple[Plant, Mapping[str, Driver]], law: WithSensors, task: ControlTask,
-    signals: TaskSignals, signal: Array, start: dict[str, float],
+    joint: BenchmarkJoint, truth: BenchmarkTruth, law: WithSensors, task: ControlTask, signals: TaskSignals,
+    signal: Array, start: dict[str, float],
 ) -> Array:  # fmt: skip
-    """The angle (N,) [rad] one sample after each element of a feed-forward signal (N,) [Pa], of a plant and drivers."""
-    plant, drivers = driven
+    """The angle (N,) [rad] one sample after each element of a feed-forward signal (N,) [Pa]."""
     padded = np.append(signal, np.full(signals.time.size - signal.size, signal[-1]))
     learned = signals._replace(feed_forward=padded, feed_forward_rate=np.zeros_like(padded))
-    loop = task_loop(joint, law, task, plant, drivers, learned)
+    loop = task_loop(joint, law, task, truth.plant, truth.drivers, learned)
     duration = signal.size * joint.sample_time
-    record = simulate(plant, loop, duration=duration, initial_state=start, output_times=joint.sample_time)
+    record = simulate(truth.plant, loop, duration=duration, initial_state=start, output_times=joint.sample_time)
     return np.interp(signals.time[1 : signal.size + 1], record["time"], record["angle"])
