@@ -143,12 +143,12 @@ class ExportedActuator:
     identified: tuple[str, ...]
     root: Array
 
-    def places(self, language: TargetLanguage) -> dict[str, str]:
-        """The places of a template."""
+    def files(self, language: TargetLanguage, templates: Mapping[str, str], **more: str) -> dict[str, str | bytes]:
+        """The filled templates, by the ends of the names of their files."""
         model, (low, high) = self.model, self.model.command_range
         functions, held = model.print_functions(language)
         bounds = np.array([leaf.declared.bounds for leaf in model.parameters], dtype=float).reshape(-1, 2)
-        return {
+        places = more | {
             "provenance": line_comment(self.provenance).replace("%", "#"), "title": self.title,
             "class": "".join(word[:1].upper() + word[1:] for word in self.name.split("_")),
             "file": self.name, "functions": functions, "held": str(max(held, 1)),
@@ -160,10 +160,6 @@ class ExportedActuator:
             "lower": _tuple(bounds[:, 0].tolist()), "upper": _tuple(bounds[:, 1].tolist()),
             "identified": _tuple(self.identified), "spread": _tuple(tuple(row) for row in self.root.tolist()),
         }  # fmt: skip
-
-    def files(self, language: TargetLanguage, templates: Mapping[str, str], **more: str) -> dict[str, str | bytes]:
-        """The filled templates, by the ends of the names of their files."""
-        places = self.places(language) | more
         return {f"{self.name}{end}.py": filled(f"{each}_actuator.pyt", places, self.name)
                 for end, each in templates.items()}  # fmt: skip
 
