@@ -122,7 +122,7 @@ def test_samples_far_along_a_valley_and_on_bounds_are_refitted_without_a_search(
     """Radius and angle of the braid change together by a factor of 10, up to the lower bound of the angle and k = 1."""
     runs = bench()
     fit = am.fit(LAWS["braid"], runs)
-    monkeypatch.setattr(bootstrapping, "_search", lambda *_: pytest.fail("a search of its own"))
+    monkeypatch.setattr(bootstrapping, "solve_iteratively", lambda *_: pytest.fail("a search of its own"))
     drawn = bootstrap(fit, runs, refits=20, by=RunSplit(), seed=1).values
     assert (drawn[:, 1] < 0.0501).mean() > 0.2 < (drawn[:, 2] < 1.0001).mean()
     counts = np.random.default_rng(1).multinomial(8, np.full(8, 1 / 8), size=20)
