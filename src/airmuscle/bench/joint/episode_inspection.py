@@ -1,13 +1,12 @@
 """Inspection of episodes: rates, ranges, which pressure acts on which angle, and what forbids an identification."""
 
 import dataclasses
-import functools
 from collections.abc import Sequence
 
 import numpy as np
 
 from ...core import Array, IdentificationError, counted
-from .episodes import ROWS, Episode, Episodes, long_enough, speed_of
+from .episodes import ROWS, Episodes, long_enough, speed_of
 from .pressures import saturated
 
 MAX_DELAY = 8
@@ -113,10 +112,12 @@ def inspect_episodes(episodes: Episodes, pairs: Sequence[tuple[int, int]] = (), 
     return EpisodeInspection(episodes, delay, actions, tuple(errors), (*short, *ends, *_doubtful(episodes)))
 
 
-def check_episodes(inspection: EpisodeInspection) -> None:
-    """Raise IdentificationError with the first finding that forbids a fit."""
+def checked_inspection(episodes: Episodes, pairs: Sequence[tuple[int, int]], rows: int) -> EpisodeInspection:
+    """The inspection of episodes. Raises IdentificationError with the first finding that forbids a fit."""
+    inspection = inspect_episodes(episodes, pairs, rows)
     if inspection.errors:
         raise IdentificationError(inspection.errors[0])
+    return inspection
 
 
 def _range_line(name: str, values: Array, unit: str) -> str:
@@ -208,27 +209,20 @@ def _sample_time(episodes: Episodes) -> list[str]:
 
 def _actions(episodes: Episodes) -> tuple[int, tuple[PressureAction, ...]]:
     """Delay of the pressures, and what each acts on: regression of accelerations on pressures, angles and speeds."""
-    blocks = [b for b in map(functools.partial(_block, step=episodes.sample_time), episodes.runs) if b is not None]
+    step = episodes.sample_time
+    moved = [(run, speed_of(run.angle, step)) for run in episodes.runs if len(run) >= 2 * MAX_DELAY + 8]
+    blocks = [(speed_of(v, step), np.concatenate([run.angle, v], axis=1), run.pressure) for run, v in moved]
     if not blocks:
         return 0, ()
-    costs = [_regress(blocks, delay)[1] for delay in range(MAX_DELAY + 1)]
-    delay = int(np.argmin(costs))
-    t_values = _regress(blocks, delay)[0]
+    found = [_regress(blocks, delay) for delay in range(MAX_DELAY + 1)]
+    delay = int(np.argmin([residual for _, residual in found]))
     actions = []
-    for m, row in enumerate(t_values, start=1):
-        order = np.argsort(-np.abs(row))
-        following = float(abs(row[order[1]])) if len(row) > 1 else 0.0
-        actions.append(
-            PressureAction(m, int(order[0]) + 1, int(np.sign(row[order[0]])), float(abs(row[order[0]])), following)
-        )
+    for muscle, row in enumerate(found[delay][0], start=1):
+        joint, *others = np.argsort(-np.abs(row)).tolist()
+        following = float(abs(row[others[0]])) if others else 0.0
+        sign, t_value = int(np.sign(row[joint])), float(abs(row[joint]))
+        actions.append(PressureAction(muscle, joint + 1, sign, t_value, following))
     return delay, tuple(actions)
-
-
-def _block(run: Episode, step: float) -> tuple[Array, Array, Array] | None:
-    if len(run) < 2 * MAX_DELAY + 8:
-        return None
-    speed = speed_of(run.angle, step)
-    return speed_of(speed, step), np.concatenate([run.angle, speed], axis=1), run.pressure
 
 
 def _regress(blocks: Sequence[tuple[Array, Array, Array]], delay: int) -> tuple[Array, float]:
@@ -254,14 +248,12 @@ def _regress(blocks: Sequence[tuple[Array, Array, Array]], delay: int) -> tuple[
 
 
 def _exchanged(actions: Sequence[PressureAction], pairs: Sequence[tuple[int, int]]) -> list[str]:
-    by_muscle, found = {a.muscle: a for a in actions}, []
-    for joint, pair in enumerate(pairs, start=1):
-        for muscle, sign in zip(pair, (1, -1), strict=True):
-            action = by_muscle.get(muscle)
-            if action and action.certain and (action.joint != joint or action.sign != sign):
-                said = f"{'raises' if sign > 0 else 'lowers'} angle {joint}"
-                found.append(
-                    f"muscles are exchanged: the mapping says that pressure {muscle} {said}, the record that {action}. "
-                    "Correct pairs in the mapping file."
-                )
-    return found
+    """Pairs that contradict what the pressures do with certainty."""
+    certain = {a.muscle: a for a in actions if a.certain}
+    said = [(m, j, sign) for j, pair in enumerate(pairs, start=1) for m, sign in zip(pair, (1, -1), strict=True)]
+    return [
+        f"muscles are exchanged: the mapping says that pressure {muscle} {'raises' if sign > 0 else 'lowers'} angle "
+        f"{joint}, the record that {certain[muscle]}. Correct pairs in the mapping file."
+        for muscle, joint, sign in said
+        if muscle in certain and (certain[muscle].joint, certain[muscle].sign) != (joint, sign)
+    ]

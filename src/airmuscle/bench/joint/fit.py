@@ -11,9 +11,9 @@ from ...core import Array, ParameterError, tree
 from ...physics import Braid, Muscle, MuscleRoute, PressureDriven, SerialArm, SpatialLink, StickSlip, WithStickSlip
 from ...physics.muscle.characteristic.linear_in_pressure import LinearInPressure
 from .descent import CLIP, Descent, SearchStage, gradients, joint_errors, typical_size, with_values
-from .episode_inspection import EpisodeInspection, check_episodes, inspect_episodes
-from .episodes import HISTORY, ROWS, Episodes, Windows, band, count_fitted, cut, in_pairs, long_enough, rms
-from .free_run import baseline_errors, free_errors, free_run, judged_residual
+from .episode_inspection import checked_inspection
+from .episodes import ROWS, Episodes, Windows, band, count_fitted, cut, in_pairs, long_enough, rms
+from .free_run import baseline_errors, free_errors, judged_residual, run_errors
 from .pressures import fit_regulator_lags, from_commands, unexplained, without_saturated
 from .result import ArmFit, ArmParameter
 
@@ -53,7 +53,12 @@ def fit_joint(
     """
     episodes, short = long_enough(episodes, rows)
     split = count_fitted(episodes, left_out)
-    inspection, found = _inspected(episodes, tuple(pairs), tuple(axes), rows)
+    inspection = checked_inspection(episodes, tuple(pairs), rows)
+    found = tuple(pairs) or inspection.pairs
+    if (axes and len(axes) != episodes.joints) or len(found) != episodes.joints:
+        raise ParameterError(
+            f"fit_joint: {len(found)} pairs and {len(axes)} axes are given for {episodes.joints} joints; give one each."
+        )
     progress(f"delay of the pressures: {inspection.delay} rows")
     ordered = in_pairs(episodes, found)
     fitted, left, delay = ordered[:split], ordered[split:], inspection.delay
@@ -65,30 +70,16 @@ def fit_joint(
     if residual:
         arm, gain, words = judged_residual(arm, fitted, judge, delay, seed, progress)
         remarks.append(words)
-    errors = free_run(arm, judge) - judge.angle[:, HISTORY + 1 :]
+    errors = run_errors(arm, judge)
     regulators = fit_regulator_lags(fitted, rows)
     commanded = from_commands(regulators, left, delay, rows) if regulators else None
     remarks += _contacts(ordered, errors, judge, split) + (unexplained(commanded, judge, found) if commanded else [])
     return ArmFit(
         arm, inspection, found, errors, judge.episode, baseline_errors(fitted, left, rows), band(errors),
-        tuple(e for each, _, _ in separated for e in each), tuple(dict.fromkeys(remarks)), split,
-        regulators, None if commanded is None else free_run(arm, commanded) - judge.angle[:, HISTORY + 1 :],
+        tuple(e for each, _, _ in separated for e in each), tuple(dict.fromkeys(remarks)), split, regulators,
+        None if commanded is None else run_errors(arm, commanded),
         block_diag(*(covariance for *_, covariance in separated)), gain,
     )  # fmt: skip
-
-
-def _inspected(
-    episodes: Episodes, pairs: tuple[tuple[int, int], ...], axes: tuple[tuple[int, int, int], ...], rows: int
-) -> tuple[EpisodeInspection, tuple[tuple[int, int], ...]]:
-    """The inspection of episodes that may be fitted, and the pairs; raises for impossible arguments."""
-    inspection = inspect_episodes(episodes, pairs, rows)
-    check_episodes(inspection)
-    found = pairs or inspection.pairs
-    if (axes and len(axes) != episodes.joints) or len(found) != episodes.joints:
-        raise ParameterError(
-            f"fit_joint: {len(found)} pairs and {len(axes)} axes are given for {episodes.joints} joints; give one each."
-        )
-    return inspection, found
 
 
 SCALE = (
@@ -242,24 +233,20 @@ def reduced_arm(middle: Array, axes: Sequence[tuple[int, int, int]] = (), level:
         for j in range(count)
         for k, sign in enumerate((1.0, -1.0))
     )
-    links = tuple(_link(j, axes[j] if axes else (0, 0, 1), LENGTH if axes and j else 0.0) for j in range(count))
+    links = [SpatialLink(axes[0] if axes else (0, 0, 1), rotor_inertia=INERTIA, damping=0.5)] * count
+    for j in range(1, count) if axes else ():
+        position = (LENGTH if j > 1 else 0.0, 0.0, 0.0)
+        links[j] = SpatialLink(axes[j], position, 1.0, (0.0, 0.0, 0.0), 0.0, INERTIA, 0.5)
     loads = 0.1 * RADIUS * np.kron(np.eye(count), np.ones(2))
     *inner, last = (StickSlip(0.5, tuple(row.tolist()), presliding_angle=4e-3) for row in loads)
     elements = (*inner, replace(last, bearing_arms=(0.0,) if axes else ()))
-    return PressureDriven(muscles, WithStickSlip(SerialArm(links, routes), elements), (0.02,) * (2 * count))
+    return PressureDriven(muscles, WithStickSlip(SerialArm(tuple(links), routes), elements), (0.02,) * (2 * count))
 
 
 def _muscle(name: str, reference: float, level: float) -> Muscle:
     full = LEVEL * AREA
     law = LinearInPressure((AREA * (LEVEL / level), 0.0, 0.0), (-0.05 * full, 0.0, 0.0), 0.3 * full, reference)
     return Muscle(law, Braid(0.01, FIBRE_ANGLE, LENGTH), name=name)
-
-
-def _link(number: int, axis: tuple[int, int, int], distance: float) -> SpatialLink:
-    if not distance:
-        return SpatialLink(axis, rotor_inertia=INERTIA, damping=0.5)
-    position = (distance, 0.0, 0.0) if number > 1 else (0.0, 0.0, 0.0)
-    return SpatialLink(axis, position, 1.0, (0.0, 0.0, 0.0), 0.0, INERTIA, 0.5)
 
 
 def stronger(arm: PressureDriven, joint: int, factor: float) -> PressureDriven:

@@ -24,9 +24,14 @@ def free_run(arm: PressureDriven, windows: Windows) -> Array:
     return np.where(np.isfinite(found) & (np.abs(found - kept) < 2 * np.pi), found, kept)
 
 
+def run_errors(arm: PressureDriven, windows: Windows) -> Array:
+    """Errors (N, rows, J) [rad] of the free run of all joints."""
+    return free_run(arm, windows) - windows.angle[:, HISTORY + 1 :]
+
+
 def free_errors(arm: PressureDriven, joint: int, windows: Windows) -> Array:
     """Errors (N, rows) [rad] of one joint in the free run of all joints."""
-    return np.asarray(_errors(arm, windows)[..., joint])
+    return np.asarray(run_errors(arm, windows)[..., joint])
 
 
 def angles(arm: PressureDriven, pressure: Array, start: Mapping[str, Array], sample_time: float) -> Array:
@@ -111,15 +116,15 @@ def fit_residual(
     found = dataclasses.replace(arm, mechanism=hybrid_mechanism)
     far = distance(found, held)
     for joint in range(episodes.joints):
-        before = _errors(found, held)
-        trials = []
-        paths = _paths(joint, len(residual.energies))
+        before, trials, count = run_errors(found, held), [], len(residual.energies)
+        paths = [f"mechanism.residual.energies[{k}]" for k in range(count)]
+        paths += [f"mechanism.residual.friction_logs[{joint * count + k}]" for k in range(count)]
         values = {leaf.path: float(leaf.value) for leaf in tree.leaves(found)}
         descent = Descent(found, train, joint, paths, seed, {path: values[path] for path in paths})
         for ridge in RIDGES:
             descent.ridge = ridge
             descent.run(SEARCH_OF_RESIDUAL)
-            gain = ResidualGain(before, _errors(descent.arm, held), far)
+            gain = ResidualGain(before, run_errors(descent.arm, held), far)
             trials.append((float(rms(gain.hybrid)[joint]), descent.arm, gain))
             progress(f"residual of joint {joint + 1}, ridge of {ridge:g}: {gain}")
         _, hybrid, gain = min(trials, key=lambda trial: (not trial[2].accepts(joint), trial[0]))
@@ -133,21 +138,12 @@ def judged_residual(
 ) -> tuple[PressureDriven, ResidualGain, str]:
     """The arm with the residual that episodes held back confirm, or as it is; its gain on other windows; in words."""
     hybrid, joints = fit_residual(arm, fitted, delay=delay, rows=judge.rows, seed=seed, progress=progress)
-    gain = ResidualGain(_errors(arm, judge), _errors(hybrid, judge), distance(hybrid, judge))
+    gain = ResidualGain(run_errors(arm, judge), run_errors(hybrid, judge), distance(hybrid, judge))
     if not joints:
         return arm, gain, f"physics suffices: no residual gains {100 * GAIN:g} % on fitted episodes held back"
     names = ", ".join(map(str, joints))
     rest = "" if len(joints) == judge.angle.shape[2] else "; for the other joints physics suffices"
     return hybrid, gain, f"hybrid law, with a residual for joint {names}{rest}: on the episodes left out {gain}"
-
-
-def _errors(arm: PressureDriven, windows: Windows) -> Array:
-    return free_run(arm, windows) - windows.angle[:, HISTORY + 1 :]
-
-
-def _paths(joint: int, count: int) -> list[str]:
-    own = [f"mechanism.residual.friction_logs[{joint * count + k}]" for k in range(count)]
-    return [*(f"mechanism.residual.energies[{k}]" for k in range(count)), *own]
 
 
 def _gaussian_residual(arm: PressureDriven, episodes: Episodes, centres: int, seed: int) -> GaussianResidual:

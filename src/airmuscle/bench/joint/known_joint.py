@@ -8,7 +8,7 @@ import numpy as np
 from ...core import Array, ParameterError, StateVariable, System, Value, Values, model, parameter, suggestion, tree
 from ...physics import PressureDriven
 from .descent import CLIP, OUTLIER, with_slopes, with_values
-from .episode_inspection import check_episodes, inspect_episodes
+from .episode_inspection import checked_inspection
 from .episodes import HISTORY, ROWS, Episodes, Windows, band, count_fitted, cut, lagged, long_enough
 from .fit import not_separated, separated
 from .free_run import baseline_errors
@@ -88,8 +88,7 @@ def fit_known_joint(
             f"fit_known_joint: the mapping states the pairs {list(pairs)}, the joint has {list(own)}; leave pairs out "
             "of the mapping file, or order its columns of pressures as the muscles of the joint."
         )
-    inspection = inspect_episodes(episodes, own, rows)
-    check_episodes(inspection)
+    inspection = checked_inspection(episodes, own, rows)
     system = ReadPressures(arm, (1.0,) * count, (0.0,) * count)
     paths = _paths(system, free)
     progress(f"{len(paths)} parameters; delay of the pressures: {inspection.delay} rows")
