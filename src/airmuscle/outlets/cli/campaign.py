@@ -16,7 +16,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from ...bench.identify.campaign import STAGES, Campaign, LeftOutStage, StaticStage, identify_campaign
-from ...bench.identify.campaign.campaign_chapters import UnreadFile, ValidationRow, campaign_chapters, stage_data
+from ...bench.identify.campaign.campaign_chapters import ValidationRow, campaign_chapters, stage_data
 from ...bench.readers import ColumnMapping
 from ...bench.readers.reader import complete_bench, find_files, read_file
 from ...core import atomic_file, atomic_folder, program_fingerprint
@@ -148,18 +148,18 @@ def campaign(
     deliver("campaign", chapters, json=json, out=out, title="Bench campaign", files=contents, writes=writes)
 
 
-def _read_each(files: Sequence[Path], mapping: ColumnMapping) -> tuple[list[Recording], list[UnreadFile]]:
-    """The recordings of the files, and the files that cannot be read. Raises FileError if none can be read."""
-    recordings, unread = list[Recording](), list[UnreadFile]()
+def _read_each(files: Sequence[Path], mapping: ColumnMapping) -> tuple[list[Recording], list[tuple[str, str]]]:
+    """The recordings, and the files that cannot be read with the reason. Raises FileError if none can be read."""
+    recordings, unread = list[Recording](), list[tuple[str, str]]()
     with reading_progress("reading") as show:
         for i, path in enumerate(files):
             show("files", i / len(files))
             try:
                 recordings += read_file(path, mapping)
             except AirmuscleError as error:
-                unread.append(UnreadFile(path.name, in_options(error.message, "campaign")))
+                unread.append((path.name, in_options(error.message, "campaign")))
     if not recordings:
-        reasons = (x.reason if x.name in x.reason else f"{x.name}: {x.reason}" for x in unread)
+        reasons = (reason if name in reason else f"{name}: {reason}" for name, reason in unread)
         raise FileError(f"no file of the campaign could be read. {' '.join(reasons)}")
     return recordings, unread
 

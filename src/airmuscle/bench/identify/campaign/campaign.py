@@ -163,7 +163,12 @@ def identify_campaign(
     """
     steps = _Steps(progress, finished, known or {})
     records = classify_records(named(recordings))
-    _check_usable(records)
+    if all(record.kind is RecordKind.UNUSED for record in records):
+        reasons = "; ".join(f"{record.origin}: {record.reason}" for record in records) or "there is no recording"
+        raise IdentificationError(
+            f"no record of the campaign can be used ({reasons}). Give records with pressure, length and force, and the "
+            "resting length."
+        )
     check_one_rig(records)
     steps.end("records", records)
     creep = steps.fit("creep", lambda _: fit_creep_stage(_of_kind(records, RecordKind.CREEP)))
@@ -179,10 +184,8 @@ def identify_campaign(
     releases = _of_kind(records, RecordKind.RELEASE)
     muscle = partial.muscle(releases[0].resting_length) if releases else None
     release = steps.fit("release", lambda _: fit_release_stage(releases, muscle))
-    complete = dataclasses.replace(partial, release=release)
-    planned = plan_next([stage for _, stage in complete.stages], static, records)
-    steps.end("plan", planned)
-    return dataclasses.replace(complete, next_experiments=planned)
+    planned = steps.end("plan", plan_next((creep, hysteresis, static, fills, release), static, records))
+    return dataclasses.replace(partial, release=release, next_experiments=planned)
 
 
 def _fit_fills(
@@ -200,16 +203,6 @@ def _fit_fills(
 
 def _of_kind(records: Sequence[CampaignRecord], kind: RecordKind) -> list[CampaignRecord]:
     return [record for record in records if record.kind is kind]
-
-
-def _check_usable(records: Sequence[CampaignRecord]) -> None:
-    if records and any(record.kind is not RecordKind.UNUSED for record in records):
-        return
-    reasons = "; ".join(f"{record.origin}: {record.reason}" for record in records) or "there is no recording"
-    raise IdentificationError(
-        f"no record of the campaign can be used ({reasons}). Give records with pressure, length and force, and the "
-        "resting length."
-    )
 
 
 @dataclasses.dataclass(frozen=True)

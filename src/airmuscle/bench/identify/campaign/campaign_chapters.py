@@ -4,9 +4,9 @@ import dataclasses
 from collections.abc import Sequence
 from typing import Any
 
-from ....core import Array
+from ....core import Array, counted
 from ....physics.muscle import CreepElements
-from ....report.chapter import Chapter, Plot, Table, TableColumn
+from ....report.chapter import Chapter, Table, TableColumn
 from ....report.data import as_data
 from ..compare_chapter import compare_chapter
 from ..dynamic.dynamic_chapter import dynamic_chapters
@@ -17,14 +17,9 @@ from ..static_fit_chapter import MuscleDescription, fit_chapter
 from . import Campaign, CreepStage, FillStage, FrictionStage, LeftOutStage, RecordKind, ReleaseStage, StaticStage
 from .campaign_plots import characteristic_plot, creep_plot, fill_plot, prediction_plot, residual_plot
 
-USES = {
+USES = {kind: "static characteristic" if kind.is_static else kind.value for kind in RecordKind} | {
     RecordKind.ISOBARIC: "static characteristic, hysteresis",
-    RecordKind.ISOMETRIC: "static characteristic",
-    RecordKind.ISOTONIC: "static characteristic",
-    RecordKind.STATIC: "static characteristic",
     RecordKind.FILL: "fills and volume",
-    RecordKind.RELEASE: "release",
-    RecordKind.CREEP: "creep",
     RecordKind.UNUSED: "nothing",
 }
 """Stages for which the records of each kind are used."""
@@ -32,8 +27,14 @@ USES = {
 
 def stage_result(stage: CreepStage | FrictionStage | StaticStage | FillStage | ReleaseStage | LeftOutStage) -> str:
     """Return the result of a stage in one sentence."""
-    if isinstance(stage, FrictionStage):
-        return _friction_result(stage)
+    if isinstance(stage, FrictionStage) and stage.selected is not None:
+        fit, amplitudes = stage.selected, [run.joint_amplitude for run in stage.selected.agreement]
+        return (
+            f"{fit.name}, {min(amplitudes):.3g} to {max(amplitudes):.3g} N in {len(amplitudes)} loops; rms error "
+            f"{fit.rmse_without_friction:.3g} N without and {fit.rmse:.3g} N with friction."
+        )
+    if isinstance(stage, FrictionStage) and stage.joint:
+        return "The loops justify no friction that holds for all of them."
     if isinstance(stage, StaticStage):
         best = stage.comparison.recommended
         return (
@@ -48,39 +49,16 @@ def stage_result(stage: CreepStage | FrictionStage | StaticStage | FillStage | R
     return stage.verdict
 
 
-def _friction_result(stage: FrictionStage) -> str:
-    fit = stage.selected
-    if fit is None:
-        return "The loops justify no friction that holds for all of them." if stage.joint else stage.verdict
-    amplitudes = [run.joint_amplitude for run in fit.agreement]
-    return (
-        f"{fit.name}, {min(amplitudes):.3g} to {max(amplitudes):.3g} N in {len(amplitudes)} loops; rms error "
-        f"{fit.rmse_without_friction:.3g} N without and {fit.rmse:.3g} N with friction."
-    )
-
-
 def _fill_result(stage: FillStage) -> str:
-    circuit, text = stage.circuit, ""
-    if stage.cross_rms:
-        worst = max(stage.cross_rms) / 1e3
-        text = f"Each fill is predicted from the others within {worst:.3g} kPa (rms). "
-    conductance = getattr(circuit.fill, "conductance", None)
-    if conductance is not None:
-        text += f"Conductance {conductance:.3g} m3/(s Pa), "
+    cross, conductance = stage.cross_rms, getattr(stage.circuit.fill, "conductance", None)
+    text = f"Each fill is predicted from the others within {max(cross) / 1e3:.3g} kPa (rms). " if cross else ""
+    text += f"Conductance {conductance:.3g} m3/(s Pa), " if conductance is not None else ""
     volume = f"{text}volume at zero contraction {1e6 * float(stage.geometry.volume(0.0)):.3g} cm3."
     return f"{volume} {stage.misfit}".rstrip()
 
 
 MAX_NEXT = 4
 """Rows of unused records and of further experiments in the brief view (chosen)."""
-
-
-@dataclasses.dataclass(frozen=True)
-class UnreadFile:
-    """A file of the folder that could not be read, with the reason."""
-
-    name: str
-    reason: str
 
 
 @dataclasses.dataclass(frozen=True)
@@ -95,14 +73,16 @@ class ValidationRow:
 
 
 def campaign_chapters(
-    campaign: Campaign, entry: MuscleDescription | None, *, unread: Sequence[UnreadFile] = (),
+    campaign: Campaign, entry: MuscleDescription | None, *, unread: Sequence[tuple[str, str]] = (),
     scenarios: Sequence[tuple[str, str]] = (), validation: Sequence[ValidationRow] = (),
 ) -> list[Chapter]:  # fmt: skip
-    """Return the chapters of a campaign; `scenarios` are pairs of a record and its scenario file or the reason."""
-    stages = [stage for _, stage in campaign.stages]
-    chapters = [_predictions(campaign)]
-    for stage in sorted(stages, key=lambda each: not isinstance(each, StaticStage)):
-        chapters += stage_chapters(stage, entry)
+    """Return the chapters of a campaign.
+
+    `unread` are pairs of a file that could not be read and the reason, `scenarios` of a record and its scenario file or
+    the reason.
+    """
+    stages = sorted((stage for _, stage in campaign.stages), key=lambda stage: not isinstance(stage, StaticStage))
+    chapters = [_predictions(campaign), *(chapter for stage in stages for chapter in stage_chapters(stage, entry))]
     parts = [dataclasses.replace(chapter, brief=False) for chapter in chapters]
     return [_overview(campaign, unread, dict(scenarios), validation), _next(campaign), *parts]
 
@@ -119,10 +99,9 @@ def stage_chapters(stage: object, entry: MuscleDescription | None = None) -> lis
         holds = [f"{origin}: {fit.verdict}" for origin, fit in stage.holds]
         chapter = creep_chapter(stage.verdict, holds, stage.elements, stage.standard_errors)
         return [dataclasses.replace(chapter, plots=(creep_plot(stage),))]
-    if isinstance(stage, FillStage):
-        return [each.among("fill-") for each in dynamic_chapters(stage.fit, "Fills and volume")]
-    if isinstance(stage, ReleaseStage):
-        return [each.among("release-") for each in dynamic_chapters(stage.fit, "Release")]
+    if isinstance(stage, FillStage | ReleaseStage):
+        name, title = ("fill-", "Fills and volume") if isinstance(stage, FillStage) else ("release-", "Release")
+        return [each.among(name) for each in dynamic_chapters(stage.fit, title)]
     return []
 
 
@@ -137,72 +116,56 @@ def stage_data(name: str, stage: object) -> dict[str, Any]:
 
 
 def _overview(
-    campaign: Campaign, unread: Sequence[UnreadFile], scenarios: dict[str, str], validation: Sequence[ValidationRow]
-) -> Chapter:
+    campaign: Campaign, unread: Sequence[tuple[str, str]], scenarios: dict[str, str],
+    validation: Sequence[ValidationRow],
+) -> Chapter:  # fmt: skip
     """Return the chapter of the stages, the bands and the records."""
-    used = sum(record.kind is not RecordKind.UNUSED for record in campaign.records)
-    sentences = [f"{used} of {len(campaign.records)} records are used."]
-    if unread:
-        sentences.append(f"{len(unread)} {'file' if len(unread) == 1 else 'files'} could not be read.")
-    left_out = [(name, stage) for name, stage in campaign.stages if isinstance(stage, LeftOutStage)]
+    stages, records = campaign.stages, campaign.records
+    used = sum(record.kind is not RecordKind.UNUSED for record in records)
+    left_out = [(name, stage) for name, stage in stages if isinstance(stage, LeftOutStage)]
+    sentences = [f"{used} of {len(records)} records are used."]
+    sentences += [f"{counted(len(unread), 'file')} could not be read."] if unread else []
     names = ", ".join(name for name, _ in left_out)
     sentences.append(f"Not identified: {names}." if left_out else "All stages are identified.")
     notes = list(campaign.static.data_notes) if isinstance(campaign.static, StaticStage) else []
     notes += [f"{name}: {stage.reason}; {stage.remedy}" for name, stage in left_out]
     columns: dict[str, Any] = {
-        "stage": [name for name, _ in campaign.stages],
-        "records": [sum(name in USES[record.kind] for record in campaign.records) for name, _ in campaign.stages],
-        "identified": TableColumn([not isinstance(stage, LeftOutStage) for _, stage in campaign.stages], brief=False),
-        "result": [stage_result(stage) for _, stage in campaign.stages],
+        "stage": [name for name, _ in stages],
+        "records": [sum(name in USES[record.kind] for record in records) for name, _ in stages],
+        "identified": TableColumn([not isinstance(stage, LeftOutStage) for _, stage in stages], brief=False),
+        "result": [stage_result(stage) for _, stage in stages],
     }
+    files = {"file": [name for name, _ in unread], "reason": [reason for _, reason in unread]}
     tables = [
-        Table("campaign-stages", "Stages", columns, brief=len(campaign.stages), key="stages"), _band_table(campaign),
-        _validation_table(validation), _record_table(campaign, scenarios), _unread_table(unread),
+        Table("campaign-stages", "Stages", columns, brief=len(stages), key="stages"), _band_table(campaign),
+        _validation_table(validation), _record_table(campaign, scenarios),
+        Table("campaign-unread", "Files that could not be read", files, brief=MAX_NEXT, key="unread"),
     ]  # fmt: skip
-    return Chapter(
-        name="campaign",
-        title="Overview",
-        summary=" ".join(sentences),
-        tables=tuple(table for table in tables if table is not None),
-        notes=tuple(notes),
-    )
+    shown = tuple(table for table in tables if table)
+    return Chapter("campaign", "Overview", " ".join(sentences), tables=shown, notes=tuple(notes))
 
 
 def _predictions(campaign: Campaign) -> Chapter:
     """Return the chapter of the muscle: characteristic, predicted loops and fills, residuals and bands."""
-    plots: list[Plot | None] = [characteristic_plot(campaign), prediction_plot(campaign), residual_plot(campaign)]
-    if isinstance(campaign.fills, FillStage):
-        plots.append(fill_plot(campaign.fills))
-    return Chapter(
-        name="campaign-muscle",
-        title="Muscle and prediction error",
-        summary="The predicted force is that of the static law minus friction and creep along the recorded motion.",
-        plots=tuple(plot for plot in plots if plot is not None),
-    )
+    plots = [characteristic_plot(campaign), prediction_plot(campaign), residual_plot(campaign), fill_plot(campaign)]
+    summary = "The predicted force is that of the static law minus friction and creep along the recorded motion."
+    shown = tuple(plot for plot in plots if plot is not None)
+    return Chapter("campaign-muscle", "Muscle and prediction error", summary, plots=shown)
 
 
 def _next(campaign: Campaign) -> Chapter:
     """Return the chapter of the next experiments."""
-    plan = next((each.plan for each in campaign.next_experiments if each.plan is not None), None)
+    experiments = campaign.next_experiments
     columns = {
-        "measure": [each.measure for each in campaign.next_experiments],
-        "because of": TableColumn([each.purpose for each in campaign.next_experiments], brief=False),
+        "measure": [each.measure for each in experiments],
+        "because of": TableColumn([each.purpose for each in experiments], brief=False),
     }
-    tables = (
-        [Table("campaign-next", "Experiments", columns, brief=MAX_NEXT, key="experiments")]
-        if campaign.next_experiments
-        else []
-    )
-    if plan is not None:
-        tables.append(dataclasses.replace(
-            run_table(plan.runs, "campaign-plan", "D-optimal static runs to measure next"), brief=0
-        ))  # fmt: skip
-    return Chapter(
-        name="campaign-next",
-        title="What to measure next",
-        summary="Missing stages first, then parameters that the records do not determine, then further static runs.",
-        tables=tuple(tables),
-    )
+    tables = [Table("campaign-next", "Experiments", columns, brief=MAX_NEXT, key="experiments")] if experiments else []
+    title = "D-optimal static runs to measure next"
+    plans = [each.plan for each in experiments if each.plan is not None]
+    tables += [dataclasses.replace(run_table(plan.runs, "campaign-plan", title), brief=0) for plan in plans[:1]]
+    summary = "Missing stages first, then parameters that the records do not determine, then further static runs."
+    return Chapter("campaign-next", "What to measure next", summary, tables=tuple(tables))
 
 
 def _band_table(campaign: Campaign) -> Table | None:
@@ -221,9 +184,7 @@ def _band_table(campaign: Campaign) -> Table | None:
     return Table("campaign-bands", "Error of the predicted force", columns, brief=len(bands), key="bands")
 
 
-def _validation_table(rows: Sequence[ValidationRow]) -> Table | None:
-    if not rows:
-        return None
+def _validation_table(rows: Sequence[ValidationRow]) -> Table:
     columns: dict[str, Any] = {
         "record": [row.record for row in rows],
         "rms error": TableColumn([row.rmse for row in rows], "N"),
@@ -251,13 +212,6 @@ def _record_table(campaign: Campaign, scenarios: dict[str, str]) -> Table:
     return Table("campaign-records", "Records and their use", columns, brief=unused[:MAX_NEXT], key="records")
 
 
-def _unread_table(unread: Sequence[UnreadFile]) -> Table | None:
-    if not unread:
-        return None
-    columns = {"file": [file.name for file in unread], "reason": [file.reason for file in unread]}
-    return Table("campaign-unread", "Files that could not be read", columns, brief=MAX_NEXT, key="unread")
-
-
 def creep_chapter(verdict: str, sentences: Sequence[str], elements: CreepElements, standard_errors: Array) -> Chapter:
     """Return the chapter of creep: the verdict, a sentence on each hold, and the Maxwell elements.
 
@@ -270,9 +224,5 @@ def creep_chapter(verdict: str, sentences: Sequence[str], elements: CreepElement
         "relaxation time": TableColumn(elements.relaxation_times, "s"),
         "standard error of the time": TableColumn(standard_errors[count:], "s"),
     }
-    return Chapter(
-        name="creep",
-        title="Creep",
-        summary=(verdict, *sentences),
-        tables=(Table("creep-elements", "Maxwell elements", columns, brief=count),) if count else (),
-    )
+    table = Table("creep-elements", "Maxwell elements", columns, brief=count)
+    return Chapter("creep", "Creep", (verdict, *sentences), tables=(table,) if count else ())

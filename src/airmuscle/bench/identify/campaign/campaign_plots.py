@@ -1,6 +1,5 @@
 """Plots of a campaign: characteristic, loops with their bands, residuals of the stages, fills and creep."""
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -13,13 +12,11 @@ from ..dynamic.dynamic_chapter import draw_residuals, residual_panels, running_e
 from . import Campaign, CampaignRecord, CreepStage, FillStage, RecordKind, StaticStage
 from .transient import thinned_rows
 
-MAX_LOOPS, MAX_PANELS = 6, 6
-"""Maximum number of loops in a figure, and of panels of fills (chosen)."""
-CURVE_POINTS = 161
-LEVEL_TOLERANCE = 0.03
-"""Maximum relative difference of two pressures that have one curve (chosen)."""
-POINT_TOLERANCE = 0.005
-"""Maximum difference of the pressure of a point from that of its curve, relative to the maximum (chosen)."""
+MAX_LOOPS, MAX_PANELS, CURVE_POINTS = 6, 6, 161
+"""Maximum number of loops in a figure, and of panels of fills; points of a curve (chosen)."""
+LEVEL_TOLERANCE, POINT_TOLERANCE = 0.03, 0.005
+"""Maximum relative difference of two pressures that have one curve, and that of the pressure of a point from its curve,
+relative to the maximum (chosen)."""
 
 
 def characteristic_plot(campaign: Campaign) -> Plot | None:
@@ -47,10 +44,8 @@ def characteristic_plot(campaign: Campaign) -> Plot | None:
     axes.set(xlabel="contraction [%]", ylabel="force [N]", ylim=(0.0, None))
     axes.legend(title="gauge pressure", loc="upper right", fontsize=8, title_fontsize=8)
     text = "" if length is None else f" of the muscle of {1e3 * length:.4g} mm"
-    caption = (
-        f"Static characteristic{text}: fitted law with its 95 % band, and measured points freed of friction and creep."
-    )
-    return Plot("campaign-characteristic", caption, figure)
+    contents = "fitted law with its 95 % band, and measured points freed of friction and creep"
+    return Plot("campaign-characteristic", f"Static characteristic{text}: {contents}.", figure)
 
 
 def _isobaric_levels(campaign: Campaign, length: float | None) -> list[float]:
@@ -66,10 +61,12 @@ def _isobaric_levels(campaign: Campaign, length: float | None) -> list[float]:
 
 def prediction_plot(campaign: Campaign) -> Plot | None:
     """Return measured loops, the force predicted with friction and creep, and its 95 % band."""
-    shown = _spread([record for record in campaign.records if record.kind is RecordKind.ISOBARIC], MAX_LOOPS)
-    shown = shown or _spread([record for record in campaign.records if record.kind.is_static], MAX_LOOPS)
-    if not shown or not isinstance(campaign.static, StaticStage):
+    static = [record for record in campaign.records if record.kind.is_static]
+    usable = [record for record in static if record.kind is RecordKind.ISOBARIC] or static
+    if not usable or not isinstance(campaign.static, StaticStage):
         return None
+    ordered = sorted(usable, key=lambda r: (r.resting_length or 0.0, r.level[1] if r.level else 0.0))
+    shown = [ordered[i] for i in thinned_rows(len(ordered), MAX_LOOPS)]
     columns = min(3, len(shown))
     rows = -(-len(shown) // columns)
     figure, panels = new_figure(rows, columns, width=7.4, height=2.3 * rows + 0.4, squeeze=False)
@@ -88,21 +85,18 @@ def prediction_plot(campaign: Campaign) -> Plot | None:
 
 
 def _draw_loop(axes: Any, campaign: Campaign, record: CampaignRecord) -> None:
-    recording = record.recording
-    prediction = campaign.predict(recording)
-    swept = "pressure" if record.kind is RecordKind.ISOMETRIC else "contraction"
-    factor = 1e-3 if swept == "pressure" else 100.0
-    x = factor * recording[swept]
+    recording, prediction = record.recording, campaign.predict(record.recording)
+    is_ramp = record.kind is RecordKind.ISOMETRIC
+    x = 1e-3 * recording["pressure"] if is_ramp else 100.0 * recording["contraction"]
     dots = {"linestyle": "none", "marker": ".", "markersize": 2, "color": BLUE, "alpha": 0.6}
     axes.plot(x, recording["force"], label="measured", **dots)
     order = np.argsort(x, kind="stable")
     low, high = running_extreme(prediction.low[order], np.minimum), running_extreme(prediction.high[order], np.maximum)
     axes.fill_between(x[order], low, high, color=RED, alpha=0.15, linewidth=0, label="95 % band")
     axes.plot(x, prediction.force, color=RED, linewidth=0.9, label="predicted")
-    axes.set_xlabel("pressure [kPa]" if swept == "pressure" else "contraction [%]")
+    axes.set_xlabel("pressure [kPa]" if is_ramp else "contraction [%]")
     length = "" if record.resting_length is None else f", {1e3 * record.resting_length:.4g} mm"
-    level = record.level
-    axes.set_title("" if level is None else f"{level_text(*level)}{length}", fontsize=8)
+    axes.set_title("" if record.level is None else f"{level_text(*record.level)}{length}", fontsize=8)
 
 
 def residual_plot(campaign: Campaign) -> Plot | None:
@@ -135,8 +129,11 @@ def residual_plot(campaign: Campaign) -> Plot | None:
     return Plot("campaign-residuals", caption, figure)
 
 
-def fill_plot(stage: FillStage) -> Plot:
+def fill_plot(campaign: Campaign) -> Plot | None:
     """Return the pressures of all fills with the joint fit, and the residuals below."""
+    stage = campaign.fills
+    if not isinstance(stage, FillStage):
+        return None
     shown = min(len(stage.records), MAX_PANELS)
     figure, panels = residual_panels(shown, width=min(7.6, 2.6 + 1.9 * shown), height=3.9, sharey="row")
     for i, column in enumerate(panels.T):
@@ -162,9 +159,3 @@ def creep_plot(stage: CreepStage) -> Plot:
     axes.set(xlabel="time after the motion [s]", ylabel="change of the force [N]")
     legend_below(figure, axes)
     return Plot("campaign-creep", "Force after the motion of each hold, with the common Maxwell elements.", figure)
-
-
-def _spread(records: Sequence[CampaignRecord], count: int) -> list[CampaignRecord]:
-    """Return at most `count` records, at evenly spaced places in the order of resting length and level."""
-    ordered = sorted(records, key=lambda r: (r.resting_length or 0.0, r.level[1] if r.level else 0.0))
-    return [ordered[i] for i in thinned_rows(len(ordered), count)]

@@ -41,14 +41,15 @@ class CreepStage(ShortRepr):
         """The elements and their agreement with the holds, as sentences."""
         if not self.elements.stiffnesses:
             return "The holds justify no creep."
-        holds = f"{len(self.holds)} holds; rms residual {self.rmse:.3g} N."
-        verdict, slowest = f"{describe_elements(self.elements)}, from {holds}", max(self.elements.relaxation_times)
-        if slowest > self.longest / 2:
-            verdict += (
-                f" The holds of {self.longest:.4g} s are too short for the longest relaxation time; hold for "
-                f"{6 * slowest:.2g} s to determine it."
-            )
-        return verdict
+        holds, slowest = (
+            f"{len(self.holds)} holds; rms residual {self.rmse:.3g} N.",
+            max(self.elements.relaxation_times),
+        )
+        further = (
+            f" The holds of {self.longest:.4g} s are too short for the longest relaxation time; hold for "
+            f"{6 * slowest:.2g} s to determine it."
+        )
+        return f"{describe_elements(self.elements)}, from {holds}{further if slowest > self.longest / 2 else ''}"
 
 
 def describe_elements(elements: CreepElements) -> str:
@@ -70,7 +71,10 @@ def fit_creep_stage(records: Sequence[CampaignRecord]) -> CreepStage | LeftOutSt
             "move the muscle by a few per cent of its length within a second at constant pressure, hold the length for "
             "two minutes or more, and record the force",
         )
-    return fit_held_rows([(record.origin, HeldRows.from_record(record)) for record in records])
+    motions = [(record, find_motion(record.recording)) for record in records]
+    return fit_held_rows(
+        [(each.origin, HeldRows.after(each.recording, motion.end)) for each, motion in motions if motion]
+    )
 
 
 def fit_held_rows(named_holds: "Sequence[tuple[str, HeldRows]]") -> CreepStage | LeftOutStage:
@@ -92,13 +96,6 @@ class HeldRows:
     time: Array
     path: Array
     held: Array
-
-    @classmethod
-    def from_record(cls, record: CampaignRecord) -> "HeldRows":
-        """The rows after the single motion of a record."""
-        motion = find_motion(record.recording)
-        assert motion is not None
-        return cls.after(record.recording, motion.end)
 
     @classmethod
     def after(cls, whole: Recording, end_of_motion: float) -> "HeldRows":
@@ -138,8 +135,7 @@ def creep_force(elements: CreepElements, recording: Recording) -> Array:
     """Force of the elements against contraction [N] along the motion of a recording, relaxed at its start; (N,)."""
     if not elements.stiffnesses or "time" not in recording:
         return np.zeros(len(recording))
-    times = np.array(elements.relaxation_times)
-    stretches = creep_stretches(recording["time"], displacement(recording), times)
+    stretches = creep_stretches(recording["time"], displacement(recording), np.array(elements.relaxation_times))
     return np.asarray(stretches @ np.array(elements.stiffnesses))
 
 
@@ -157,10 +153,8 @@ def _fit_elements(
     steps = np.log(np.concatenate([ordered[:1], np.maximum(ordered[1:] / ordered[:-1], 1.05 * MIN_RATIO)]))
     low, high = np.log([0.1, *[MIN_RATIO] * (count - 1)]), np.log([2.0 * longest, *[2.0 * longest] * (count - 1)])
 
-    def residuals(x: Array) -> Array:
-        return _linear_part(holds, np.exp(np.cumsum(x)))[1]
-
-    result = least_squares(residuals, np.clip(steps, low + 1e-6, high - 1e-6), bounds=(low, high))
+    start = np.clip(steps, low + 1e-6, high - 1e-6)
+    result = least_squares(lambda x: _linear_part(holds, np.exp(np.cumsum(x)))[1], start, bounds=(low, high))
     times = np.exp(np.cumsum(result.x))
     coefficients, rest = _linear_part(holds, times)
     stiffnesses = coefficients[:count]
@@ -177,12 +171,8 @@ def _fit_elements(
 
 def _matrices(holds: Sequence[HeldRows], times: Array) -> list[Array]:
     """Columns of each hold: minus the stretches, then the initial force of each hold."""
-    matrices = []
-    for i, hold in enumerate(holds):
-        own = np.zeros((hold.held.size, len(holds)))
-        own[:, i] = 1.0
-        matrices.append(np.hstack([-hold.stretches(times), own]))
-    return matrices
+    own = np.eye(len(holds))
+    return [np.hstack([-hold.stretches(times), np.tile(own[i], (hold.held.size, 1))]) for i, hold in enumerate(holds)]
 
 
 def _linear_part(holds: Sequence[HeldRows], times: Array) -> tuple[Array, Array]:

@@ -1,4 +1,5 @@
-"""Fills and discharges of a campaign as experiments: valve commands, initial pressure, and the unknowns."""
+"""Fills and discharges of a campaign: their plants, a held muscle behind valves with a supply and perhaps a tube, and
+their experiments with valve commands, initial pressure and unknowns."""
 
 import dataclasses
 import math
@@ -6,19 +7,98 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from ....core import tree
 from ....engine.loop.inputs import Schedule
+from ....physics.mechanism import Isometric
+from ....physics.muscle import Muscle
+from ....physics.muscle.geometry import Vessel
 from ....physics.plant.plant import Plant
-from ....physics.pneumatics import Circuit, Tank, Valve, WithTubes
+from ....physics.pneumatics import Circuit, EnergyBalance, FillDischarge, Supply, Tank, Tube, Valve, WithTubes
 from ...baselines import ARX, PERSISTENCE, TimedRecord, baseline_errors, skill
 from .. import dynamic
-from .fill_plants import HEAT_TRANSFER, HEAT_TRANSFER_BOUNDS, plant_of, sensor_of, valves_of, volume_at_rest
 from .record import CampaignRecord
 from .transient import thin
 
+ASSUMED_CONDUCTANCE = 1e-8
+"""Conductance [m3/(s Pa)] for which the relative volumes are fitted (chosen)."""
+HEAT_TRANSFER, HEAT_TRANSFER_BOUNDS = "gas.heat_transfer", (1e-3, 1e3)
+"""Path of the heat transfer, and its bounds [W/K] (chosen)."""
 CONDUCTANCE, RATIO = "conductance", "critical_ratio"
 TUBE_VOLUME, TUBE_CONDUCTANCE = "circuit.tube.volume", "circuit.tube.orifice.conductance"
 MAX_RATIO_ERROR = 0.1
 """Standard error of a critical ratio from which it counts as not determined (chosen)."""
+TUBE_STARTS, TUBE_AREA = 16, math.pi * 0.002**2
+"""Number of initial guesses of a fit with a tube, which has several optima, and area of a tube of 4 mm of inner
+diameter [m2], which makes a volume comparable (chosen)."""
+FIT_ROWS, MIN_DEVIATION = 250, 100.0
+"""Maximum number of rows of a fill, and least standard deviation of the pressure sensor [Pa] (chosen)."""
+
+
+def held_contraction(record: CampaignRecord) -> float:
+    """The contraction at which the muscle is held."""
+    return float(np.median(record.recording["contraction"]))
+
+
+def vessel_plant(record: CampaignRecord) -> Plant:
+    """The plant of a held muscle, with initial values from the steps of the record and the ambient air it states."""
+    rising = [step for step in record.steps if step.change > 0]
+    top = max(step.final_pressure for step in record.steps) if rising else float(record.recording["pressure"][0])
+    duration = float(np.mean([step.duration for step in record.steps]))
+    volume = ASSUMED_CONDUCTANCE * 1e5 * duration / 1.2
+    vessel = Vessel(min(max(volume, 2e-7), 5e-2), record.resting_length or 0.2)
+    valve, held = Valve(ASSUMED_CONDUCTANCE, 0.35), Isometric(held_contraction(record))
+    circuit, ambient = FillDischarge(Supply(top + 5e3), valve, valve), dynamic.stated_ambient(record.recording)
+    return Plant(Muscle.ideal(vessel), circuit, held, EnergyBalance(1.0), ambient)
+
+
+def plant_of(plant: object) -> Plant:
+    """The plant of a fill, which the records of a fit keep as any system."""
+    assert isinstance(plant, Plant)
+    return plant
+
+
+def valves_of(circuit: object) -> FillDischarge:
+    """The circuit of the valves, without a tube."""
+    valves = circuit.circuit if isinstance(circuit, WithTubes) else circuit
+    assert isinstance(valves, FillDischarge)
+    return valves
+
+
+def rescaled(plant: Plant, scale: float) -> Plant:
+    """The plant with its conductances, heat transfer and volumes of supply and tube multiplied by the scale."""
+    values = {leaf.path: leaf.value for leaf in tree.leaves(plant)}
+    for path, value in values.items():
+        if path == HEAT_TRANSFER:
+            values[path] = float(np.clip(value * scale, *HEAT_TRANSFER_BOUNDS))
+        elif path.startswith("circuit.") and path.endswith(("conductance", "volume")):
+            values[path] = value * scale
+    changed: Plant = tree.with_parameters(plant, list(values.values()))
+    return changed
+
+
+def at_record(plant: Plant, record: CampaignRecord, volume: float) -> Plant:
+    """The plant with this volume [m3], at the held length and in the ambient air of a record."""
+    muscle = Muscle.ideal(Vessel(volume, plant.muscles[0].geometry.resting_length))
+    held, ambient = Isometric(held_contraction(record)), dynamic.stated_ambient(record.recording)
+    return dataclasses.replace(plant, muscle=muscle, mechanism=held, ambient=ambient)
+
+
+def tube_guess(plant: Plant) -> Tube:
+    """Initial guess of a tube for a plant without one (chosen): a tenth of its volume, twice the conductance."""
+    valve = valves_of(plant.circuit).fill
+    assert isinstance(valve, Valve)
+    return Tube(Valve(2.0 * valve.conductance, 0.3), min(max(0.1 * volume_at_rest(plant), 1e-9), 1e-2))
+
+
+def volume_at_rest(plant: Plant) -> float:
+    """Volume of the first muscle of a plant at its resting length [m3]."""
+    return float(plant.muscles[0].geometry.volume(0.0))
+
+
+def sensor_of(plant: Plant) -> str:
+    """The output at the pressure sensor of a plant, which is behind the valves: in the first segment of a tube."""
+    circuit = plant.circuit
+    return f"{circuit.tube.prefixes[0]}pressure" if isinstance(circuit, WithTubes) else "pressure"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -39,7 +119,7 @@ class ValveUnknowns:
         """The valves through which the air of these records flows, with the supply and the tube of a plant."""
         changes, circuit = [step.change for record in records for step in record.steps], plant_of(plant).circuit
         sinks, tube = isinstance(valves_of(circuit).supply, Tank), isinstance(circuit, WithTubes)
-        return cls(any(c > 0 for c in changes), any(c < 0 for c in changes), common_ratio, sinks, tube)
+        return cls(max(changes) > 0, min(changes) < 0, common_ratio, sinks, tube)
 
     @property
     def circuit(self) -> str:
@@ -80,31 +160,18 @@ class ValveUnknowns:
 def poor_ratios(fit: dynamic.DynamicFit) -> str:
     """The critical ratios that a fit does not determine, as a sentence; empty if there are none."""
     poor = []
-    for e in (e for e in fit.estimates if e.name.endswith(RATIO) and "orifice" not in e.name):
-        reason = f"standard error {e.stderr:.2g}" if np.isfinite(e.stderr) else "it has no effect on them"
-        reason = f"on its bound, {e.value:.3g}" if e.on_bound else reason
-        if e.on_bound or not e.stderr <= MAX_RATIO_ERROR:
+    for e in fit.estimates:
+        is_poor = e.on_bound or not e.stderr <= MAX_RATIO_ERROR
+        if is_poor and e.name.endswith(RATIO) and "orifice" not in e.name:
+            reason = f"standard error {e.stderr:.2g}" if np.isfinite(e.stderr) else "it has no effect on them"
+            reason = f"on its bound, {e.value:.3g}" if e.on_bound else reason
             poor.append(f"{e.name.split('.')[-2]} valve ({reason})")
     return f"The records do not determine the critical ratio of the {' and the '.join(poor)}." if poor else ""
-
-
-TUBE_STARTS = 16
-"""Number of initial guesses of a fit with a tube, which has several optima (chosen)."""
-FIT_ROWS = 250
-"""Maximum number of rows of a fill (chosen)."""
-MIN_DEVIATION = 100.0
-"""Least standard deviation of the pressure sensor [Pa] (chosen)."""
 
 
 def pressure_deviation(records: Sequence[CampaignRecord]) -> float:
     """Standard deviation of the pressure sensor [Pa]."""
     return max(float(np.median([r.inspection.sensors["pressure"].std for r in records])), MIN_DEVIATION)
-
-
-def instant_margin(records: Sequence[CampaignRecord]) -> float:
-    """Maximum error of the detected start of a step [s]: a quarter of the shortest step, at least two rows."""
-    sample = max(float(np.median(np.diff(r.recording["time"]))) for r in records)
-    return max(0.25 * min(step.duration for r in records for step in r.steps), 2.0 * sample)
 
 
 def with_supply_volume(experiment: dynamic.Experiment) -> dynamic.Experiment:
@@ -122,10 +189,6 @@ def with_circuit(experiment: dynamic.Experiment, circuit: Circuit) -> dynamic.Ex
     initial = dynamic.InitialConditions.at_rest(plant, experiment.initial_conditions.known["pressure"])
     recording = experiment.recording.with_columns(**{sensor_of(plant): experiment.recording["pressure"]})
     return dataclasses.replace(experiment, recording=recording, plant=plant, initial_conditions=initial)
-
-
-TUBE_AREA = math.pi * 0.002**2
-"""Area of a tube of 4 mm of inner diameter [m2], which makes a volume comparable (chosen)."""
 
 
 def describe_tube(fit: dynamic.DynamicFit) -> str:
@@ -157,25 +220,22 @@ def describe_supply(fit: dynamic.DynamicFit) -> str:
 def valve_commands(record: CampaignRecord) -> dict[str, tuple[tuple[float, float], ...]]:
     """The detected instants [s] and values of the commands of both valves, counted from the start of the first step."""
     start = record.steps[0].start
-    points: dict[str, list[tuple[float, float]]] = {"fill": [], "discharge": []}
+    points: dict[str, tuple[tuple[float, float], ...]] = {"fill": (), "discharge": ()}
     for step in record.steps:
         opened, closed = ("fill", "discharge") if step.change > 0 else ("discharge", "fill")
         instant = max(step.start - start, 0.0)
-        if points[closed]:
-            points[closed].append((instant, 0.0))
-        points[opened].append((instant, 1.0))
-    return {name: tuple(values) for name, values in points.items() if values}
+        points[opened] += ((instant, 1.0),)
+        points[closed] += ((instant, 0.0),) if points[closed] else ()
+    return {name: values for name, values in points.items() if values}
 
 
 def detected_experiment(record: CampaignRecord, plant: Plant) -> dynamic.Experiment:
     """The record with the detected instants of its steps."""
-    recording = thin(record.recording, FIT_ROWS)
-    began = record.steps[0].start
+    began, pressure = record.steps[0].start, record.recording["pressure"]
     before = record.recording["time"] < began
-    pressure = record.recording["pressure"]
     initial = float(np.median(pressure[before])) if before.sum() >= 3 else float(pressure[0])
     conditions = dynamic.InitialConditions.at_rest(plant, initial)
-    recording = recording.with_columns(**{sensor_of(plant): recording["pressure"]})
+    recording = thin(record.recording.with_columns(**{sensor_of(plant): pressure}), FIT_ROWS)
     return dynamic.Experiment(recording, Schedule(valve_commands(record)), conditions, began, plant)
 
 
@@ -189,8 +249,10 @@ def fit_pressure(
     records: Sequence[CampaignRecord], experiments: Sequence[dynamic.Experiment], free: Sequence[str | tuple[str, ...]],
     own: tuple[str, ...] = (),
 ) -> dynamic.DynamicFit:  # fmt: skip
-    """A fit with the heat transfer, and own instants of the valve commands, because the detected ones are inexact."""
-    first, margin = plant_of(experiments[0].plant), instant_margin(records)
+    """A fit with the heat transfer, and own instants of the valve commands, because the detected ones are inexact: by a
+    quarter of the shortest step, and two rows at least."""
+    first, sample = plant_of(experiments[0].plant), max(float(np.median(np.diff(r.recording["time"]))) for r in records)
+    margin = max(0.25 * min(step.duration for r in records for step in r.steps), 2.0 * sample)
     return dynamic.fit_dynamic(
         first, experiments, free=(HEAT_TRANSFER, *free), observed={sensor_of(first): pressure_deviation(records)},
         per_record=(*own, dynamic.StartTime(margin), dynamic.CommandInstants(margin)),

@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 
 import numpy as np
 
@@ -12,7 +13,6 @@ from ....physics.plant.plant import Plant
 from ....physics.pneumatics import FillDischarge, WithTubes
 from ..dynamic import DynamicFit, Experiment, cross_predict, fit_tube
 from ..dynamic.experiment import describe_ambient
-from . import fill_plants as plants
 from . import fill_records as fills
 from .record import CampaignRecord
 from .transient import LeftOutStage
@@ -26,14 +26,12 @@ REMEDY = (
     "record a fill from ambient pressure and a discharge through the valve at a held length, at three lengths with the "
     "same valve and supply, at 100 rows per second or more, until the pressure has settled"
 )
-MAX_NOISE_RATIO = 4.0
-"""Ratio of the residual to the noise of the pressure sensor above which the model does not follow a record (chosen)."""
-MAX_FOLLOWED = 2.0
-"""That ratio up to which it follows them; above it, a supply whose pressure sinks and a tube are tried (chosen)."""
-MAX_VOLUME_ERROR = 0.3
-"""Maximum relative standard error of a volume before the valve (chosen)."""
-MAX_TUBE_VOLUME = 1.5
-"""Maximum volume of a tube in relation to that of the muscle at rest (chosen)."""
+MAX_FOLLOWED, MAX_NOISE_RATIO = 2.0, 4.0
+"""Ratio of the residual to the noise of the pressure sensor up to which the model follows a record, and that above
+which it does not; between them, a supply whose pressure sinks and a tube are tried (chosen)."""
+MAX_VOLUME_ERROR, MAX_TUBE_VOLUME = 0.3, 1.5
+"""Maximum relative standard error of a volume before the valve, and maximum volume of a tube in relation to that of the
+muscle at rest (chosen)."""
 MIN_MISFIT = 0.01
 """Minimum residual that is reported, as a fraction of the greatest change of the pressure (chosen)."""
 
@@ -61,7 +59,7 @@ class FillStage(ShortRepr):
     @property
     def circuit(self) -> FillDischarge:
         """The circuit with the fitted valves and supply, without a tube."""
-        return plants.valves_of(plants.plant_of(self.fit.plant()).circuit)
+        return fills.valves_of(fills.plant_of(self.fit.plant()).circuit)
 
     def commands(self, record: CampaignRecord) -> Mapping[str, Sequence[tuple[float, float]]]:
         """The instants [s] and values of the commands of both valves in a record, with the estimated instants."""
@@ -87,23 +85,21 @@ class FillStage(ShortRepr):
     @property
     def verdict(self) -> str:
         """Cross-prediction, volume and residuals, as sentences."""
-        rms = [each / 1e3 for each in fills.record_rms(self.fit)]
-        text = ""
-        if self.cross_rms:
-            text = (
-                f"Each fill predicted by the parameters of the others: rms error {min(self.cross_rms) / 1e3:.3g} to "
-                f"{max(self.cross_rms) / 1e3:.3g} kPa{fills.describe_skills(self.cross_rms, self.baselines)}. "
+        rms, cross = ([each / 1e3 for each in errors] for errors in (fills.record_rms(self.fit), self.cross_rms))
+        predicted = f"Joint fit of {len(rms)} records: rms residual {min(rms):.3g} to {max(rms):.3g} kPa."
+        if cross:
+            predicted = (
+                f"Each fill predicted by the parameters of the others: rms error {min(cross):.3g} to "
+                f"{max(cross):.3g} kPa{fills.describe_skills(self.cross_rms, self.baselines)}. {predicted}"
             )
-        text += f"Joint fit of {len(rms)} records: rms residual {min(rms):.3g} to {max(rms):.3g} kPa."
+        volume = "The volume is that of the given geometry."
         if self.estimate is not None:
-            text += (
-                f" Volume at zero contraction {1e6 * self.estimate.volume_at_rest:.4g} cm3 (standard error "
+            volume = (
+                f"Volume at zero contraction {1e6 * self.estimate.volume_at_rest:.4g} cm3 (standard error "
                 f"{1e6 * self.estimate.volume_stderr:.2g} cm3), from the change of the volume with contraction by "
                 "virtual work and the fills at several lengths."
             )
-        else:
-            text += " The volume is that of the given geometry."
-        return " ".join(each for each in (text, self.misfit, *self.supposed) if each)
+        return " ".join(filter(None, (predicted, volume, self.misfit, *self.supposed)))
 
 
 def fit_fill_stage(
@@ -131,22 +127,18 @@ def fit_fill_stage(
             if change is not None:
                 estimate = relate_volumes(*relative.volumes, relative.contractions, change)
             if estimate is None or change is None:
-                return LeftOutStage(NAME, _no_volume(relative.contractions, change), REMEDY)
+                ratio, held = "the ratio of conductance and volume only", 100 * relative.contractions
+                reason = f"the fills determine {ratio}, and no static law gives the volume" if change is None else (
+                    f"the fills at contractions of {held.min():.3g} to {held.max():.3g} % determine {ratio}; give the "
+                    "braid of the muscle"
+                )  # fmt: skip
+                return LeftOutStage(NAME, reason, REMEDY)
             geometry, scale = change.geometry(estimate.volume_at_rest), estimate.scale
         else:
             scale = relative.scale_to(geometry)
         return _fit_jointly(records, relative.experiments(records, geometry, scale), geometry, estimate, progress)
     except AirmuscleError as error:
         return LeftOutStage(NAME, str(error.message), REMEDY)
-
-
-def _no_volume(contractions: Array, change: VolumeChange | None) -> str:
-    if change is None:
-        return "the fills determine the ratio of conductance and volume only, and no static law gives the volume"
-    return (
-        f"the fills at contractions of {100 * contractions.min():.3g} to {100 * contractions.max():.3g} % determine "
-        "the ratio of conductance and volume only; give the braid of the muscle"
-    )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -165,13 +157,13 @@ class _RelativeFit:
             free = [*valves.shared, *([f"{valves.circuit}.discharge.{fills.CONDUCTANCE}"] if valves.both else [])]
             return fills.fit_pressure(records, experiments, free, (VOLUME,))
 
-        experiments = [fills.detected_experiment(record, plants.vessel_plant(record)) for record in records]
+        experiments = [fills.detected_experiment(record, fills.vessel_plant(record)) for record in records]
         valves = fills.ValveUnknowns.of(records, experiments[0].plant)
         return cls(_with_supply(records, experiments, valves, fitted)[0], tuple(records))
 
     @property
     def contractions(self) -> Array:
-        return np.array([plants.held_contraction(record) for record in self.records])
+        return np.array([fills.held_contraction(record) for record in self.records])
 
     @property
     def volumes(self) -> tuple[Array, Array]:
@@ -187,9 +179,9 @@ class _RelativeFit:
 
     def experiments(self, records: Sequence[CampaignRecord], geometry: Geometry, scale: float) -> list[Experiment]:
         """All records with the volumes of a geometry, from the valves and instants of this fit."""
-        found, experiments = plants.rescaled(plants.plant_of(self.fit.plant()), scale), []
+        found, experiments = fills.rescaled(fills.plant_of(self.fit.plant()), scale), []
         for record in records:
-            plant = plants.at_record(found, record, float(geometry.volume(plants.held_contraction(record))))
+            plant = fills.at_record(found, record, float(geometry.volume(fills.held_contraction(record))))
             experiment = fills.detected_experiment(record, plant)
             if record in self.records:
                 experiment = fills.with_instants(experiment, self.fit, self.records.index(record))
@@ -203,41 +195,33 @@ def _fit_jointly(
 ) -> FillStage:  # fmt: skip
     """The fit with the volumes of one curve, and the prediction of each record from the others."""
     everything = range(len(records))
+
+    def fitted(experiments: Sequence[Experiment], every: fills.ValveUnknowns, chosen: Sequence[int]) -> DynamicFit:
+        """The fit of the chosen records, with what is supposed of the valves of every record."""
+        own = fills.ValveUnknowns.of([records[i] for i in chosen], experiments[0].plant, every.common_ratio)
+        free = [*own.shared, *own.paths(fills.CONDUCTANCE)]
+        return fills.fit_pressure(records, [experiments[i] for i in chosen], free)
+
     valves = fills.ValveUnknowns.of(records, experiments[0].plant)
-    fit, experiments, valves = _with_supply(
-        records, experiments, valves, lambda changed, free: _fit_common(records, changed, everything, free)
-    )
+    fit, experiments, valves = _with_supply(records, experiments, valves, partial(fitted, chosen=everything))
     if valves.both and (reason := fills.poor_ratios(fit)):
         valves = dataclasses.replace(valves, common_ratio=reason)
-        fit = _fit_common(records, experiments, everything, valves)
+        fit = fitted(experiments, valves, everything)
 
     def fit_to_others(chosen: Sequence[int]) -> DynamicFit:
         progress(0.5 + 0.5 * (sum(everything) - sum(chosen)) / len(records))
-        return _fit_common(records, experiments, chosen, valves)
+        return fitted(experiments, valves, chosen)
 
     predictions = cross_predict(fit, fit_to_others)
     fit = fit.with_scatter_of_records([each.common for each in predictions])
-    contractions = np.array([plants.held_contraction(record) for record in records])
-    supposed = (
-        *([fills.describe_supply(fit)] if valves.sinks else []),
-        *([fills.describe_tube(fit)] if valves.tube else []),
-        *valves.supposed,
-        *describe_ambient([record.recording for record in records]),
-    )
+    contractions = np.array([fills.held_contraction(record) for record in records])
+    described = [(fills.describe_supply, valves.sinks), (fills.describe_tube, valves.tube)]
+    supposed = [describe(fit) for describe, is_used in described if is_used]
+    supposed += [*valves.supposed, *describe_ambient([record.recording for record in records])]
     cross = tuple(rms for each in predictions for rms in each.rms.values())
     others = fills.fill_baselines(fit) if len(cross) == len(records) else ()
-    return FillStage(fit, tuple(records), tuple(experiments), geometry, estimate, contractions, cross, others, supposed)
-
-
-def _fit_common(
-    records: Sequence[CampaignRecord], experiments: Sequence[Experiment], chosen: Sequence[int],
-    every: fills.ValveUnknowns,
-) -> DynamicFit:  # fmt: skip
-    """The fit of the chosen records, with what is supposed of the valves of every record."""
-    valves = fills.ValveUnknowns.of([records[i] for i in chosen], experiments[0].plant, every.common_ratio)
-    return fills.fit_pressure(
-        records, [experiments[i] for i in chosen], [*valves.shared, *valves.paths(fills.CONDUCTANCE)]
-    )
+    parts = (tuple(records), tuple(experiments), geometry, estimate, contractions, cross, others, tuple(supposed))
+    return FillStage(fit, *parts)
 
 
 def _with_supply(
@@ -260,7 +244,7 @@ def _with_supply(
             continue
         estimate = next(each for each in fit.estimates if each.name.endswith(volume))
         determined = not estimate.on_bound and estimate.stderr <= MAX_VOLUME_ERROR * estimate.value
-        muscle = plants.volume_at_rest(plants.plant_of(fit.plant()))
+        muscle = fills.volume_at_rest(fills.plant_of(fit.plant()))
         possible = change is _with_volume or estimate.value <= MAX_TUBE_VOLUME * muscle
         if determined and possible and max(fills.record_rms(fit)) <= limit:
             return fit, changed, unknowns
@@ -275,11 +259,11 @@ def _with_volume(experiments: Sequence[Experiment], valves: fills.ValveUnknowns,
 
 def _with_tube(experiments: Sequence[Experiment], valves: fills.ValveUnknowns, fitted: Fitted) -> Supplied:
     """The fit with a tube between valves and muscle, whose number of segments AICc chooses."""
-    unknowns, plant = dataclasses.replace(valves, tube=True), plants.plant_of(experiments[0].plant)
+    unknowns, plant = dataclasses.replace(valves, tube=True), fills.plant_of(experiments[0].plant)
 
     def divided(changed: Plant) -> list[Experiment]:
         return [fills.with_circuit(each, changed.circuits[0]) for each in experiments]
 
-    guess = dataclasses.replace(plant, circuit=WithTubes(plants.valves_of(plant.circuit), plants.tube_guess(plant)))
+    guess = dataclasses.replace(plant, circuit=WithTubes(fills.valves_of(plant.circuit), fills.tube_guess(plant)))
     fit = fit_tube(guess, lambda changed, _: fitted(divided(changed), unknowns))
-    return fit, divided(plants.plant_of(fit.plant())), unknowns
+    return fit, divided(fills.plant_of(fit.plant())), unknowns

@@ -25,11 +25,8 @@ from .creep_stage import creep_force
 from .record import CampaignRecord, RecordKind
 from .transient import LeftOutStage, displacement, find_motion, held_steady, path_rows, thin, thinned_rows, with_force
 
-NAME = "release"
-FIT_ROWS = 300
-"""Maximum number of rows of a release (chosen)."""
-INITIAL_DAMPING = 100.0
-"""Initial damping of the search [N s/m] (chosen)."""
+FIT_ROWS, INITIAL_DAMPING = 300, 100.0
+"""Maximum number of rows of a release, and initial damping of the search [N s/m] (chosen)."""
 MIN_DEVIATIONS = {"position": 2e-5, "pressure": 100.0}
 """Least standard deviations of the sensors [m], [Pa] (chosen)."""
 SETTLED_SHARE = 0.1
@@ -74,24 +71,26 @@ def fit_release_stage(records: Sequence[CampaignRecord], muscle: Muscle | None) 
     from the force at the end of the record.
     """
     if not records:
-        return LeftOutStage(NAME, "no record is a release", REMEDY)
+        return LeftOutStage("release", "no record is a release", REMEDY)
     if muscle is None:
-        return LeftOutStage(NAME, "the enclosed volume of the muscle is not known", "identify the volume from fills")
+        reason, remedy = "the enclosed volume of the muscle is not known", "identify the volume from fills"
+        return LeftOutStage("release", reason, remedy)
     masses = {record: mass for record in records if (mass := _mass(record)) is not None}
     if not masses:
-        return LeftOutStage(
-            NAME, "the moving mass is neither stated nor determined by a force at the end", "state the mass in the file"
-        )
+        reason = "the moving mass is neither stated nor determined by a force at the end"
+        return LeftOutStage("release", reason, "state the mass in the file")
     try:
-        plants = [_plant(record, muscle, mass) for record, mass in masses.items()]
-        experiments = [_experiment(record, plant) for record, plant in zip(masses, plants, strict=True)]
+        damped = dataclasses.replace(muscle, damper=LinearDamper(INITIAL_DAMPING))
+        experiments = [_experiment(record, damped, mass) for record, mass in masses.items()]
         deviations = {name: _deviation(list(masses), name) for name in ("position", "pressure")}
+        first = experiments[0].plant
+        assert first is not None
         fit = fit_dynamic(
-            plants[0], experiments, free=(DAMPING, "gas.exponent"), observed=deviations,
-            per_record=(StartTime(0.02),), bounds={DAMPING: (0.1, 1e5)},
+            first, experiments, free=(DAMPING, "gas.exponent"), observed=deviations, per_record=(StartTime(0.02),),
+            bounds={DAMPING: (0.1, 1e5)},
         )  # fmt: skip
     except AirmuscleError as error:
-        return LeftOutStage(NAME, str(error.message), REMEDY)
+        return LeftOutStage("release", str(error.message), REMEDY)
     return ReleaseStage(fit, tuple(masses), tuple(masses.values()))
 
 
@@ -114,14 +113,10 @@ def _deviation(records: Sequence[CampaignRecord], name: str) -> float:
     return max([MIN_DEVIATIONS[name], *values])
 
 
-def _plant(record: CampaignRecord, muscle: Muscle, mass: float) -> Plant:
-    mechanism, ambient = WithLatch(HangingMass(mass)), stated_ambient(record.recording)
-    damped = dataclasses.replace(muscle, damper=LinearDamper(INITIAL_DAMPING))
-    return Plant(damped, ClosedChamber(), mechanism, gas=Polytropic(1.2), ambient=ambient)
-
-
-def _experiment(record: CampaignRecord, plant: Plant) -> Experiment:
+def _experiment(record: CampaignRecord, muscle: Muscle, mass: float) -> Experiment:
     whole = record.recording
+    mechanism, ambient = WithLatch(HangingMass(mass)), stated_ambient(whole)
+    plant = Plant(muscle, ClosedChamber(), mechanism, gas=Polytropic(1.2), ambient=ambient)
     motion, path = find_motion(whole), displacement(whole)
     assert motion is not None
     count = max(int((whole["time"] < motion.start).sum()), 3)
@@ -132,11 +127,9 @@ def _experiment(record: CampaignRecord, plant: Plant) -> Experiment:
     return Experiment(recording, command, conditions, max(motion.start - 0.005, float(whole["time"][0])), plant)
 
 
-NAME = "hysteresis"
-PREDICTED_ROWS = 3000
-"""Maximum number of rows of a record for which the friction is computed (chosen)."""
-MAX_LOOPS = 6
-"""Maximum number of loops that are fitted; of more, those at evenly spaced pressures (chosen)."""
+MAX_LOOPS, PREDICTED_ROWS = 6, 3000
+"""Maximum number of loops that are fitted, of more those at evenly spaced pressures, and of rows of a record for which
+the friction is computed (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -180,28 +173,25 @@ def fit_friction_stage(
     loops, failed = _find_loops(records, creep)
     if not loops:
         reason = failed[0] if failed else "no record at constant pressure has a rising and a falling branch"
-        return LeftOutStage(
-            NAME, reason, "shorten and lengthen the muscle slowly at constant pressure, at three pressures or more"
-        )
-    kept = _spread(loops)
+        remedy = "shorten and lengthen the muscle slowly at constant pressure, at three pressures or more"
+        return LeftOutStage("hysteresis", reason, remedy)
+    ordered = sorted(loops, key=lambda loop: loop.run.constant_value or 0.0)
+    kept = [ordered[i] for i in thinned_rows(len(ordered), MAX_LOOPS)]
     fits = DistributedCalls(executor, _fit_loop, None).results(kept, lambda done: progress(0.5 * done / len(kept)))
     laws = itertools.count(1)
     joint = hysteresis.fit_jointly(
         fits, progress=lambda _: progress(0.5 + 0.5 * min(next(laws) / 5.0, 1.0)), workers=executor or 1
     )
     best = hysteresis.preferred_fit(joint)
-    return FrictionStage(_friction(best, fits), tuple(fits), joint, len(loops) - len(kept))
+    runs = () if best is None else best.series
+    if best is None and len(fits) == 1 and (only := fits[0].recommended) is not None:
+        best, runs = only, (only.series,)
+    friction = NoFriction() if best is None else hysteresis.identified_friction(best.friction, runs)
+    return FrictionStage(friction, tuple(fits), joint, len(loops) - len(kept))
 
 
 def _fit_loop(_: None, loop: hysteresis.HysteresisLoop) -> hysteresis.LoopFit:
     return hysteresis.fit_loop(loop)
-
-
-def _friction(best: hysteresis.JointFit | None, fits: Sequence[hysteresis.LoopFit]) -> Friction:
-    if best is not None:
-        return hysteresis.identified_friction(best.friction, best.series)
-    only = fits[0].recommended if len(fits) == 1 else None
-    return NoFriction() if only is None else hysteresis.identified_friction(only.friction, (only.series,))
 
 
 def _find_loops(
@@ -225,12 +215,6 @@ def _find_loops(
                 usable.append(recording)
         loops += hysteresis.find_loops(usable, all_rows=True) if usable else ()
     return loops, failed
-
-
-def _spread(loops: Sequence[hysteresis.HysteresisLoop]) -> list[hysteresis.HysteresisLoop]:
-    """At most `MAX_LOOPS` loops, at evenly spaced places in the order of their pressure."""
-    ordered = sorted(loops, key=lambda loop: loop.run.constant_value or 0.0)
-    return [ordered[i] for i in thinned_rows(len(ordered), MAX_LOOPS)]
 
 
 def friction_along(friction: Friction, recording: Recording) -> Array:

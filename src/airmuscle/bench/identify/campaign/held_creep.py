@@ -12,7 +12,7 @@ from ....recording import Recording
 from ...segment.runs import CONTRACTION_BAND
 from ..hysteresis import Hold, creep_elements, find_holds, fit_creep
 from .creep_stage import CreepStage, HeldRows, creep_force, describe_elements, fit_held_rows
-from .transient import LeftOutStage, with_force
+from .transient import with_force
 
 MAX_MOTION = 0.3
 """Maximum duration of the motion before a hold under a load, by its shortest time constant (chosen)."""
@@ -39,10 +39,10 @@ def fit_held_creep(recordings: Sequence[Recording], *, law: ForceLaw | None = No
     Holds at a constant length are fitted together along the recorded motion; without any, the longest hold under a
     constant load gives the elements. A hold without a motion before it has a course but no stiffness.
     """
-    holds = [(each, max(find_holds(each), key=lambda hold: len(hold.interval), default=None)) for each in recordings]
     sentences, reasons = [], list[str]()
     held, loaded = list[tuple[str, HeldRows]](), list[tuple[float, str, CreepElements]]()
-    for recording, hold in holds:
+    for recording in recordings:
+        hold = max(find_holds(recording), key=lambda each: len(each.interval), default=None)
         sentences.append(_sentence(recording, hold))
         if hold is None:
             continue
@@ -58,7 +58,17 @@ def fit_held_creep(recordings: Sequence[Recording], *, law: ForceLaw | None = No
                 loaded.append(_elements_under_load(recording, hold, law))
         except AirmuscleError as error:
             reasons.append(error.message)
-    return _select(tuple(sentences), held, loaded, reasons)
+    stage = fit_held_rows(held) if held else None
+    if isinstance(stage, CreepStage) and stage.elements.stiffnesses:
+        return HeldCreep(tuple(sentences), stage.elements, stage.verdict, stage.standard_errors)
+    usable = [each for each in loaded if each[2].stiffnesses]
+    if usable:
+        _, origin, elements = max(usable, key=lambda each: each[0])
+        verdict = f"{describe_elements(elements)}, from the hold of {origin} under a constant load."
+        return HeldCreep(tuple(sentences), elements, verdict, np.full(2 * len(elements.stiffnesses), np.nan))
+    causes = [*([stage.verdict] if stage is not None else []), *reasons]
+    none = "The holds under a constant load justify no creep." if loaded else "There is no hold."
+    return HeldCreep(tuple(sentences), CreepElements(), " ".join(causes or [none]), np.zeros(0))
 
 
 def free_of_creep(elements: CreepElements, recordings: Sequence[Recording]) -> list[Recording]:
@@ -76,10 +86,8 @@ def _has_path(recording: Recording) -> bool:
 def _sentence(recording: Recording, hold: Hold | None) -> str:
     """The course of the hold of a recording."""
     if hold is None:
-        return (
-            f"{recording.origin}: no hold phase of 12 rows or more, with constant pressure and constant force or "
-            "length."
-        )
+        needed = "12 rows or more, with constant pressure and constant force or length"
+        return f"{recording.origin}: no hold phase of {needed}."
     rows = f"{hold.interval.start + 1} to {hold.interval.stop}"
     verdict = fit_creep(recording.rows(hold.interval.rows), hold.quantity).verdict
     return f"{recording.origin}, {hold.quantity} in rows {rows}: {verdict}"
@@ -104,8 +112,7 @@ def _elements_under_load(recording: Recording, hold: Hold, law: ForceLaw | None)
             f"{recording.origin}: the creep under a constant load needs the stiffness of the muscle, that is, its "
             "static characteristic; give the muscle, or hold the length."
         )
-    length = float(recording.constants["resting_length"])
-    rows = recording.rows(hold.interval.rows)
+    length, rows = float(recording.constants["resting_length"]), recording.rows(hold.interval.rows)
     fit = fit_creep(rows, hold.quantity)
     step = _single_motion(recording, hold, min(fit.creep.time_constants, default=np.inf)) * length
     pressure, contraction = (float(np.median(rows[name])) for name in ("pressure", "contraction"))
@@ -118,8 +125,7 @@ def _single_motion(recording: Recording, hold: Hold, shortest: float) -> float:
     """Change of the contraction by the one quick motion before a hold. Raises IdentificationError for another one."""
     contraction, start = recording["contraction"], hold.interval.start
     first, last = float(contraction[0]), float(np.median(contraction[start : start + 3]))
-    change = last - first
-    origin = recording.origin
+    change, origin = last - first, recording.origin
     remedy = "Record one quick change of the load or the pressure, then hold both."
     if abs(change) <= CONTRACTION_BAND:
         raise IdentificationError(f"{origin}: the length does not change before the hold. {remedy}")
@@ -133,23 +139,3 @@ def _single_motion(recording: Recording, hold: Hold, shortest: float) -> float:
             f"constant of {shortest:.3g} s. {remedy}"
         )
     return change
-
-
-def _select(
-    sentences: tuple[str, ...],
-    held: Sequence[tuple[str, HeldRows]],
-    loaded: Sequence[tuple[float, str, CreepElements]],
-    reasons: Sequence[str],
-) -> HeldCreep:
-    stage: CreepStage | LeftOutStage | None = fit_held_rows(held) if held else None
-    if isinstance(stage, CreepStage) and stage.elements.stiffnesses:
-        return HeldCreep(sentences, stage.elements, stage.verdict, stage.standard_errors)
-    usable = [each for each in loaded if each[2].stiffnesses]
-    if usable:
-        _, origin, elements = max(usable, key=lambda each: each[0])
-        verdict = f"{describe_elements(elements)}, from the hold of {origin} under a constant load."
-        return HeldCreep(sentences, elements, verdict, np.full(2 * len(elements.stiffnesses), np.nan))
-    causes = [*([stage.verdict] if stage is not None else []), *reasons]
-    if not causes:
-        causes = ["The holds under a constant load justify no creep." if loaded else "There is no hold."]
-    return HeldCreep(sentences, CreepElements(), " ".join(causes), np.zeros(0))

@@ -14,15 +14,13 @@ from ...segment import Inspection, Sensor, estimate_sensors, inspect, inspect_al
 from ...segment.interval import Interval, true_intervals
 from ...segment.runs import AT_REST, CONTRACTION_BAND, ISOBARIC, ISOMETRIC, ISOTONIC, RELATIVE_BAND, Run
 from ..hysteresis.loops import describe_run, rows_of
-from .transient import MIN_STEP, PressureStep, find_motion, find_pressure_steps
+from .transient import MAX_RELEASE, MIN_STEP, PressureStep, find_motion, find_pressure_steps
 
 RowMask = npt.NDArray[np.bool_]
 MIN_HOLD, MIN_HOLD_RATIO = 10.0, 10.0
 """Minimum duration of a hold [s], and its minimum ratio to the duration of the motion before it (chosen)."""
-MIN_RUN_ROWS = 100
-"""Minimum number of rows of a run that is a record of its own (chosen)."""
-MIN_ROWS = 8
-"""Minimum number of rows of a record (chosen)."""
+MIN_RUN_ROWS, MIN_ROWS = 100, 8
+"""Minimum number of rows of a run that is a record of its own, and of any record (chosen)."""
 MIN_SLOW = 0.5
 """Minimum fraction of slow rows of a record that is used for static fits (chosen)."""
 LEVEL_SHARE = 0.05
@@ -48,7 +46,7 @@ class RecordKind(enum.Enum):
     @property
     def is_static(self) -> bool:
         """Whether the rows are used for the static characteristic."""
-        return self in (RecordKind.ISOBARIC, RecordKind.ISOMETRIC, RecordKind.ISOTONIC, RecordKind.STATIC)
+        return self is RecordKind.STATIC or self in _KINDS.values()
 
 
 _KINDS = {ISOBARIC: RecordKind.ISOBARIC, ISOMETRIC: RecordKind.ISOMETRIC, ISOTONIC: RecordKind.ISOTONIC}
@@ -92,10 +90,13 @@ def classify_records(recordings: Sequence[Recording]) -> tuple[CampaignRecord, .
     """
     sensors = estimate_sensors(recordings) if recordings else {}
     records = []
-    for inspection in inspect_all(recordings):
-        record = _classify(inspection)
-        parts = _long_runs(record) if record.kind.is_static else []
-        records += [_classify(inspect(part, sensors)) for part in parts] or _cut_at_levels(record, sensors)
+    for record in map(_classify, inspect_all(recordings)):
+        recording, runs = record.recording, record.inspection.runs
+        long = [run for run in runs if len(run.interval) >= MIN_RUN_ROWS and run.constant_column]
+        if record.kind.is_static and "time" in recording and len(long) > 1:
+            records += [_classify(inspect(rows_of(recording, run.interval), sensors)) for run in long]
+        else:
+            records += _cut_at_levels(record, sensors)
     return tuple(records)
 
 
@@ -108,18 +109,11 @@ def static_levels(record: CampaignRecord) -> list[CampaignRecord]:
     return [dataclasses.replace(record, recording=part, inspection=inspect(part)) for part in parts]
 
 
-def _long_runs(record: CampaignRecord) -> list[Recording]:
-    """The rows of each long run of a record with time; empty unless there are several."""
-    recording = record.recording
-    runs = [run for run in record.inspection.runs if len(run.interval) >= MIN_RUN_ROWS and run.constant_column]
-    return [rows_of(recording, run.interval) for run in runs] if "time" in recording and len(runs) > 1 else []
-
-
 def _cut_at_levels(record: CampaignRecord, sensors: Mapping[str, Sensor]) -> list[CampaignRecord]:
     """The steps between the pressure levels of a held muscle as records of their own, if there are more levels than a
     fill explains: those to the supply and to ambient pressure, and one record of the rows that are not used."""
     recording, levels = record.recording, list[tuple[float, int, int]]()
-    usable = "time" in recording and "pressure" in recording and "contraction" in recording
+    usable = all(name in recording for name in ("time", "pressure", "contraction"))
     if record.kind.is_static or not usable or not np.isfinite(recording["pressure"]).all() or _is_moved(recording):
         return [record]
     for interval in true_intervals(quasi_static_rows(recording, sensors)):
@@ -165,7 +159,7 @@ def _classify(inspection: Inspection) -> CampaignRecord:
             if has_length and rest >= max(MIN_HOLD, MIN_HOLD_RATIO * motion.duration):
                 reason = f"motion within {motion.duration:.3g} s, then held for {rest:.4g} s at constant pressure"
                 return CampaignRecord(recording, RecordKind.CREEP, reason, inspection)
-        if has_length and motion is not None and motion.is_single and motion.is_fast:
+        if has_length and motion is not None and motion.is_single and motion.duration < MAX_RELEASE:
             reason = f"motion of {1e3 * abs(motion.travel):.3g} mm within {motion.duration:.3g} s"
             return CampaignRecord(recording, RecordKind.RELEASE, reason, inspection)
     return _classify_static(inspection)

@@ -6,7 +6,7 @@ from concurrent.futures import Executor
 
 import numpy as np
 
-from ....core import AirmuscleError, Array, ShortRepr
+from ....core import AirmuscleError, Array, ShortRepr, counted
 from ....physics.muscle import CreepElements
 from ....physics.muscle.friction import Friction
 from ....recording import Recording
@@ -54,24 +54,21 @@ class ErrorBand:
     groups: int
 
     def __str__(self) -> str:
+        source = f"{self.rows} rows of {counted(self.groups, 'group')} left out in turn (rms error {self.rmse:.3g} N)."
         if not self.groups:
-            return (
-                f"95 % band of the force for {self.purpose}: ±{self.half_width:.3g} N, from the residuals of the fit "
-                "itself, because there are fewer than three levels; it is too narrow for other levels."
+            source = (
+                "the residuals of the fit itself, because there are fewer than three levels; it is too narrow for "
+                "other levels."
             )
-        return (
-            f"95 % band of the force for {self.purpose}: ±{self.half_width:.3g} N, from {self.rows} rows of "
-            f"{self.groups} {'group' if self.groups == 1 else 'groups'} left out in turn (rms error "
-            f"{self.rmse:.3g} N)."
-        )
+        return f"95 % band of the force for {self.purpose}: ±{self.half_width:.3g} N, from {source}"
 
 
 def calibrate(fit: Fit, points: Sequence[Recording], records: Sequence[CampaignRecord]) -> tuple[ErrorBand, ...]:
     """The band for further runs of the measured muscles, and that for other lengths if there are three or more."""
-    bands: list[ErrorBand] = []
+    bands, lengths = list[ErrorBand](), [run.constants.get("resting_length") for run in points]
     for purpose, levels in (
         ("further pressures and speeds of the measured muscles", [record.level for record in records]),
-        ("other lengths of the same type", [_length(run) for run in points]),
+        ("other lengths of the same type", [None if x is None else ("resting length", float(x)) for x in lengths]),
     ):
         residuals, groups = _left_out_residuals(fit, points, _inner(levels))
         if groups:  # other lengths are further runs, too
@@ -108,11 +105,6 @@ def _band(purpose: str, residuals: Array, groups: int, least: float = 0.0) -> Er
     share = min(np.ceil((size + 1) * LEVEL) / size, 1.0)
     half = max(float(np.quantile(np.abs(residuals), share)), least)
     return ErrorBand(purpose, half, float(np.sqrt(np.mean(residuals**2))), size, groups)
-
-
-def _length(run: Recording) -> tuple[str, float] | None:
-    length = run.constants.get("resting_length")
-    return None if length is None else ("resting length", float(length))
 
 
 def _inner(values: Sequence[tuple[str, float] | None]) -> list[tuple[str, int] | None]:
@@ -206,16 +198,12 @@ def fit_static_stage(
     """
     used = [record for record in records if record.kind.is_static]
     if not used:
-        return LeftOutStage(
-            NAME,
-            "no record is a slow run with force and length",
-            "record the force while the length changes slowly at constant pressure, at three pressures or more",
-        )
-    cleaned = [freed_rows(record, friction, creep) for record in used]
-    used = [record for record, rows in zip(used, cleaned, strict=True) if len(rows)]
-    cleaned = [rows for rows in cleaned if len(rows)]
+        remedy = "record the force while the length changes slowly at constant pressure, at three pressures or more"
+        return LeftOutStage(NAME, "no record is a slow run with force and length", remedy)
+    cleaned = {record: rows for record in used if len(rows := freed_rows(record, friction, creep))}
+    used = list(cleaned)
     try:
-        points = tuple(thin(r, max(FIT_ROWS // len(cleaned), MIN_FIT_ROWS)) for r in cleaned)
+        points = tuple(thin(rows, max(FIT_ROWS // len(used), MIN_FIT_ROWS)) for rows in cleaned.values())
         comparison = compare(points, workers=executor or 1, progress=lambda _, fraction: progress(0.9 * fraction))
         fit, parts = comparison.recommended.fit, _parts_at_levels(used, points, friction, creep)
         bands = calibrate(fit, *parts)
@@ -232,22 +220,20 @@ def _parts_at_levels(
     used: Sequence[CampaignRecord], points: Sequence[Recording], friction: Friction, creep: CreepElements
 ) -> tuple[list[Recording], list[CampaignRecord]]:
     """The rows of the fit and their records, those of static points one for each pressure with tension."""
-    parts = []
+    parts: dict[CampaignRecord, Recording] = {}
     for record, rows in zip(used, points, strict=True):
         levels = static_levels(record)
         own = [rows] if len(levels) == 1 else [freed_rows(level, friction, creep) for level in levels]
-        parts += [(part, level) for part, level in zip(own, levels, strict=True) if len(part)]
-    return [part for part, _ in parts], [level for _, level in parts]
+        parts |= {level: part for level, part in zip(levels, own, strict=True) if len(part)}
+    return list(parts.values()), list(parts)
 
 
 def freed_rows(record: CampaignRecord, friction: Friction, creep: CreepElements) -> Recording:
     """The quasi-static rows with tension of a record, its force freed of friction and creep."""
-    recording = record.recording
-    if record.resting_length is not None and record.inspection.static_points is None:
-        added = creep_force(creep, recording) + friction_along(friction, recording)
-        recording = with_force(recording, added)
-    sensors = record.inspection.sensors
-    rows = slow_rows(record.recording, record.inspection) & (record.recording["force"] > 0.0)
+    measured, sensors = record.recording, record.inspection.sensors
+    rows = slow_rows(measured, record.inspection) & (measured["force"] > 0.0)
     if "force" in sensors:
-        rows &= sensors["force"].censoring(record.recording["force"]) == 0.0
-    return recording.rows(rows)
+        rows &= sensors["force"].censoring(measured["force"]) == 0.0
+    if record.resting_length is None or record.inspection.static_points is not None:
+        return measured.rows(rows)
+    return with_force(measured, creep_force(creep, measured) + friction_along(friction, measured)).rows(rows)

@@ -27,12 +27,9 @@ class LeftOutStage:
 
 MAX_ROWS = 1000
 """Maximum number of rows of a record for a fit of friction (chosen)."""
-NOISE_STEPS = 4.0
-"""Mean step of the displacement between two rows, in standard deviations of its noise (chosen)."""
-NOISE_RANGE = 8.0
-"""Range of the noise of a held contraction, in its standard deviations (chosen)."""
-DEAD_BAND = 4.0
-"""Half width of the dead band of the motion, in standard deviations of the noise of the displacement (chosen)."""
+NOISE_STEPS, NOISE_RANGE, DEAD_BAND = 4.0, 8.0, 4.0
+"""Mean step of the displacement between two rows, range of the noise of a held contraction, and half width of the dead
+band of a motion, in standard deviations of the noise (chosen)."""
 
 
 def thin(recording: Recording, count: int) -> Recording:
@@ -130,23 +127,13 @@ class Motion:
     start: float
     end: float
     travel: float
-    range: float
-    """Range of the displacement in the record [m]."""
+    is_single: bool
+    """Whether the muscle was moved once, and not back."""
 
     @property
     def duration(self) -> float:
         """Duration [s]."""
         return self.end - self.start
-
-    @property
-    def is_single(self) -> bool:
-        """Whether the muscle was moved once, and not back."""
-        return abs(self.travel) > 0.5 * self.range
-
-    @property
-    def is_fast(self) -> bool:
-        """Whether the motion is that of a release, not of a slow run."""
-        return self.duration < MAX_RELEASE
 
 
 def find_pressure_steps(recording: Recording, sensors: Mapping[str, Sensor]) -> tuple[PressureStep, ...]:
@@ -161,27 +148,20 @@ def find_pressure_steps(recording: Recording, sensors: Mapping[str, Sensor]) -> 
         return ()
     fraction = (pressure - low) / (high - low)
     transient = ~quasi_static_rows(recording, sensors)
-    above = _with_dead_band(fraction)
-    crossings = np.flatnonzero(np.diff(above.astype(int)))
-    ends: list[int] = [0, *(int((a + b) // 2) for a, b in itertools.pairwise(crossings.tolist())), time.size - 1]
+    above = [bool(fraction[0] > 0.5)]  # in the upper half, with a dead band of a fifth of the range
+    for value in fraction.tolist():
+        above.append(value > (0.4 if above[-1] else 0.6))
+    crossings = np.flatnonzero(np.diff(above[1:])).tolist()
+    ends: list[int] = [0, *((a + b) // 2 for a, b in itertools.pairwise(crossings)), time.size - 1]
     steps = []
-    for i, crossing in enumerate(crossings):
-        rows = np.arange(ends[i], ends[i + 1] + 1)
-        step = _measure(time[rows], fraction[rows], transient[rows], rising=bool(above[crossing + 1]))
+    for crossing, (a, b) in zip(crossings, itertools.pairwise(ends), strict=True):
+        rows = slice(a, b + 1)
+        step = _measure(time[rows], fraction[rows], transient[rows], rising=above[crossing + 2])
         if step is None:
             return ()
         start, duration, first, last = step
         steps.append(PressureStep(start, duration, (last - first) * (high - low), low + last * (high - low)))
     return tuple(steps)
-
-
-def _with_dead_band(fraction: Array) -> Mask:
-    """Whether the fraction is in its upper half, with a dead band of a fifth of the range."""
-    state, states = bool(fraction[0] > 0.5), []
-    for value in fraction.tolist():
-        state = value > 0.4 if state else value > 0.6
-        states.append(state)
-    return np.array(states)
 
 
 def _measure(time: Array, fraction: Array, transient: Mask, rising: bool) -> tuple[float, float, float, float] | None:
@@ -220,14 +200,14 @@ def find_motion(recording: Recording) -> Motion | None:
     span = float(np.ptp(contraction))
     if span <= CONTRACTION_BAND:
         return None
-    rows = max(1, contraction.size // 50)
+    rows, time = max(1, contraction.size // 50), recording["time"]
     first, last = float(np.median(contraction[:rows])), float(np.median(contraction[-rows:]))
-    travel, time = last - first, recording["time"]
+    travel, begin, end = last - first, 0, time.size - 1
+    if abs(travel) > CONTRACTION_BAND:
+        fraction = (contraction - first) / travel
+        begin = int(np.argmax(fraction > 0.02))
+        outside = np.flatnonzero(np.abs(fraction - 1.0) > 0.05)
+        end = min(int(outside[-1]) + 1 if outside.size else begin, end)
     length = float(recording.constants.get("resting_length", 1.0))
-    if abs(travel) <= CONTRACTION_BAND:
-        return Motion(float(time[0]), float(time[-1]), travel * length, span * length)
-    fraction = (contraction - first) / travel
-    begin = int(np.argmax(fraction > 0.02))
-    outside = np.flatnonzero(np.abs(fraction - 1.0) > 0.05)
-    end = int(outside[-1]) + 1 if outside.size else begin
-    return Motion(float(time[begin]), float(time[min(end, time.size - 1)]), travel * length, span * length)
+    is_single = abs(travel) > 0.5 * span
+    return Motion(float(time[begin]), float(time[end]), travel * length, is_single)
