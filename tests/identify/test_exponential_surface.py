@@ -83,7 +83,7 @@ def test_the_derivatives_by_the_coefficients_are_exact():
     problem = SurfaceProblem.from_recording(CURVES, 0.40, 4, 2)
     start, step = np.linspace(-0.5, 0.5, 15), 1e-6
     differences = [
-        (problem.predict(start + step * e) - problem.predict(start - step * e)) / (2 * step) for e in np.eye(15)
+        (problem.residuals(start + step * e) - problem.residuals(start - step * e)) / (2 * step) for e in np.eye(15)
     ]
     assert problem.jacobian(start) == pytest.approx(np.column_stack(differences), rel=1e-7, abs=1e-8)
 

@@ -265,6 +265,11 @@ def test_the_release_has_the_ambient_air_of_its_record():
         assert abs(fit[name].value - true) < 3.0 * fit[name].stderr
 
 
+def test_a_stage_of_releases_without_a_record_has_its_own_name():
+    left_out = fit_release_stage([], None)
+    assert (left_out.name, left_out.reason) == ("release", "no record is a release")
+
+
 def test_a_record_in_other_ambient_air_than_its_plant_is_refused():
     measured, plant = record(0.1, FILL, 0, ambient=Ambient(8e4)), true_plant(0.1, 0.35, STANDARD)
     experiment = Experiment(measured, Schedule(FILL), InitialConditions.at_rest(plant, 0.0))

@@ -102,7 +102,7 @@ def test_rows_after_a_saturated_reading_do_not_count(short_search):
     fit = fit_joint(changed(WITHOUT_COMMANDS, pressure=lambda p: np.minimum(p, 2.6e5)), left_out=0.2)
     module = importlib.import_module("airmuscle.bench.joint.fit")
     whole = module.cut(made_episodes(20, seed=5), 0, 40)
-    errors = module.free_run(fit.arm, whole) - whole.angle[:, -40:]
+    errors = module.run_errors(fit.arm, whole)
     assert np.degrees(np.sqrt(np.mean(errors**2))) < 0.4
     assert any("1144 of 1920 rows of the fit follow a pressure reading at its upper end" in r for r in fit.remarks)
 

@@ -55,7 +55,7 @@ def test_a_weight_that_is_confirmed_comes_before_one_with_a_smaller_error(monkey
 
     monkeypatch.setattr(module, "Descent", Search)
     monkeypatch.setattr(
-        module, "_errors", lambda arm, w: np.ones((len(w), 40, 2)) * errors.get(1e3 * arm.lags[0], (1.0, 1.0))
+        module, "run_errors", lambda arm, w: np.ones((len(w), 40, 2)) * errors.get(1e3 * arm.lags[0], (1.0, 1.0))
     )
     found, joints = fit_residual(known_arm(2), made_episodes(20, joints=2), centres=2)
     assert (joints, found.lags[0]) == ([1], 0.05)

@@ -74,12 +74,10 @@ def fit_gauss_newton(recording: am.Recording, saturation: float) -> SurfaceFit:
     Raises IdentificationError if the coefficients are not determined.
     """
     problem = SurfaceProblem.from_recording(recording, saturation, 4, 2)
-    targets, weights = problem.linear_targets()
-    design = weights[:, None] * problem.design_matrix
-    coefficients: Array = np.asarray(np.linalg.lstsq(design, weights * targets, rcond=None)[0], dtype=float)
+    coefficients: Array = np.asarray(np.linalg.lstsq(*problem.linear_system(), rcond=None)[0], dtype=float)
     for _ in range(MAX_LINEARISATIONS):
-        error = problem.contraction - problem.predict(coefficients)
-        step = np.asarray(np.linalg.lstsq(problem.jacobian(coefficients), error, rcond=None)[0], dtype=float)
+        error, jacobian = -problem.residuals(coefficients), problem.jacobian(coefficients)
+        step = np.asarray(np.linalg.lstsq(jacobian, error, rcond=None)[0], dtype=float)
         coefficients = coefficients + step
         if np.abs(step).max() <= 1e-12 * np.abs(coefficients).max():
             break

@@ -1,6 +1,7 @@
 """AngleEstimate: the angles of an arm from its pressures alone, by free runs from the poses in which episodes begin."""
 
 import dataclasses
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
@@ -51,13 +52,12 @@ class AngleEstimate(ShortRepr):
         return np.asarray(inside.sum(axis=(0, 1)) / np.isfinite(self.measured).sum(axis=(0, 1)))
 
     def __str__(self) -> str:
+        joints = zip(itertools.count(1), self.rms, self.range, self.coverage, self.unseen, strict=False)
         return "\n".join(
             f"joint {j}: {np.degrees(error):.3g} deg rms from pressures alone, {100 * error / span:.3g} % of its "
             f"range, {100 * inside:.3g} % inside the 95 % band; in {100 * unseen:.3g} % of the rows the angle is not "
             "seen until the joint moves"
-            for j, (error, span, inside, unseen) in enumerate(
-                zip(self.rms, self.range, self.coverage, self.unseen, strict=True), start=1
-            )
+            for j, error, span, inside, unseen in joints
         )
 
 
@@ -124,9 +124,8 @@ def _predicted_errors(seen: Array, errors: Array, further: Array) -> Array:
 def _seen(angle: Array, runs: Sequence[Episode]) -> Array:
     """What a correction sees in every row (N, R, F): angles of the runs, pressures of the row and of an earlier one."""
     pressure = _padded(runs, "pressure", held=True)
-    return np.concatenate(
-        [angle, pressure, pressure[:, np.maximum(np.arange(pressure.shape[1]) - EARLIER, 0)]], axis=-1
-    )
+    earlier = np.maximum(np.arange(pressure.shape[1]) - EARLIER, 0)
+    return np.concatenate([angle, pressure, pressure[:, earlier]], axis=-1)
 
 
 def _runs(
@@ -148,8 +147,8 @@ def _runs(
 def _padded(runs: Sequence[Episode], name: str, held: bool = False) -> Array:
     """One quantity of all episodes (N, R, columns), its last row held or NaN after the end of an episode."""
     columns = [getattr(run, name) for run in runs]
-    longest = max(len(c) for c in columns)
-    ends = [c[-1:] if held else np.full_like(c[-1:], np.nan) for c in columns]
-    return np.stack(
-        [np.concatenate([c, np.repeat(e, longest - len(c), axis=0)]) for c, e in zip(columns, ends, strict=True)]
-    )
+    longest, padded = max(map(len, columns)), []
+    for column in columns:
+        end = column[-1:] if held else np.full_like(column[-1:], np.nan)
+        padded.append(np.concatenate([column, np.repeat(end, longest - len(column), axis=0)]))
+    return np.stack(padded)

@@ -31,19 +31,14 @@ LOW = {"presliding_angle": 1.5e-3, "lags": 2e-3, "rotor_inertia": 1e-3, "stribec
 SIZES = {
     "damping": 0.3, "coulomb_torque": 0.5, "load_arms": 4e-3, "presliding_angle": 2e-3, "lags": 0.01, "mass": 1.0,
     "static_excess": 0.3, "stribeck_speed": 1.0, "zero_angle": 1.0, "rotor_inertia": 0.03, "centre": 0.2,
-    "slack_width": 5.0, "inertia": 0.03, "energies": 1.0, "friction_logs": 0.3,
-    "bearing_arms": 0.05,
+    "slack_width": 5.0, "inertia": 0.03, "energies": 1.0, "friction_logs": 0.3, "bearing_arms": 0.05,
 }  # fmt: skip
 """Typical sizes [SI] of parameters that may start at 0 (chosen)."""
 
 
 def joint_errors(arm: PressureDriven, joint: int, windows: Windows) -> Array:
     """Errors (N, rows) [rad] of the free run of one joint; the other joints move as measured."""
-    system, known = OneJoint(arm, joint), start_of(arm, windows)
-    state = {s.name: known[s.name] for s in system.states}
-    names, inputs = [system.states[0].name], inputs_of(system, windows)
-    found, _ = with_slopes(system, (), inputs, windows.sample_time, state, names)
-    return np.asarray(found[:, 1:, 0] - windows.angle[:, HISTORY + 1 :, joint])
+    return _run_of_joint(arm, joint, (), windows)[0]
 
 
 @dataclasses.dataclass(frozen=True)
@@ -171,6 +166,14 @@ def gradients(arm: PressureDriven, joint: int, paths: Sequence[str], windows: Wi
 
     The other joints move as measured; both are 0 in rows of outliers.
     """
+    error, gradient = _run_of_joint(arm, joint, paths, windows)
+    lost = ~np.isfinite(error) | (np.abs(error) > OUTLIER) | ~np.isfinite(gradient).all(axis=-1)
+    lost |= np.logical_not(windows.counts[:, HISTORY + 1 :])
+    return np.where(lost, 0.0, error), np.where(lost[..., None], 0.0, gradient)
+
+
+def _run_of_joint(arm: PressureDriven, joint: int, paths: Sequence[str], windows: Windows) -> tuple[Array, Array]:
+    """Errors and derivatives as of `gradients`, also those of outliers."""
     system, known = OneJoint(arm, joint), start_of(arm, windows)
     names = [s.name for s in system.states]
     state = {name: known[name] for name in names}
@@ -180,20 +183,14 @@ def gradients(arm: PressureDriven, joint: int, paths: Sequence[str], windows: Wi
             step = 1e-4 * values[path]
             moved = start_of(with_values(arm, [path], [values[path] + step]), windows)
             state |= {sensitivity(name, k): (moved[name] - known[name]) / step for name in names}
-    of_arm, inputs = [f"arm.{path}" for path in paths], inputs_of(system, windows)
+    measured = (windows.angle, windows.rate, windows.acceleration)
+    motion = [column[:, HISTORY:, i, None] for i in system.others for column in measured]
+    inputs, of_arm = (
+        np.concatenate([windows.pressure[:, HISTORY:], *motion], axis=-1),
+        [f"arm.{path}" for path in paths],
+    )
     found, slopes = with_slopes(system, of_arm, inputs, windows.sample_time, state, names[:1])
-    error, gradient = found[:, 1:, 0] - windows.angle[:, HISTORY + 1 :, joint], slopes[:, 1:, 0]
-    lost = ~np.isfinite(error) | (np.abs(error) > OUTLIER) | ~np.isfinite(gradient).all(axis=-1)
-    lost |= np.logical_not(windows.counts[:, HISTORY + 1 :])
-    return np.where(lost, 0.0, error), np.where(lost[..., None], 0.0, gradient)
-
-
-def inputs_of(system: "OneJoint", windows: Windows) -> Array:
-    """The inputs (N, R, m) of one joint in every window: pressures, and the measured motion of the other joints."""
-    motion = [
-        column[:, HISTORY:, i] for i in system.others for column in (windows.angle, windows.rate, windows.acceleration)
-    ]
-    return np.concatenate([windows.pressure[:, HISTORY:], *(m[..., None] for m in motion)], axis=-1)
+    return np.asarray(found[:, 1:, 0] - windows.angle[:, HISTORY + 1 :, joint]), slopes[:, 1:, 0]
 
 
 def with_values(arm: Arm, paths: Sequence[str], values: Sequence[float] | Array) -> Arm:
@@ -261,16 +258,13 @@ class OneJoint(System):
 
     def rates(self, state: Values, inputs: Values) -> dict[str, Value]:
         mechanism, c = self.mechanism, self.mechanism.coordinates[self.joint]
-        place = {**inputs, **state}
+        place, lengths = {**inputs, **state}, self.arm.resting_lengths
         pressures = [
             state[f"{p}pressure"] if i in self.own else inputs[f"{p}measured_pressure"]
             for i, p in enumerate(self.arm.prefixes)
         ]
-        lengths = self.arm.resting_lengths
-        tensions = [
-            muscle.tension(p, eps)
-            for muscle, p, eps in zip(self.arm.muscle, pressures, mechanism.contractions(place, lengths), strict=True)
-        ]
+        acting = zip(self.arm.muscle, pressures, mechanism.contractions(place, lengths), strict=True)
+        tensions = [muscle.tension(p, eps) for muscle, p, eps in acting]
         others = {mechanism.coordinates[i].name: inputs[mechanism.coordinates[i].acceleration] for i in self.others}
         needed = mechanism.inverse_dynamics(place, place, {**others, c.name: 0.0})[c.name]
         outer = cast(WithStickSlip, self.arm.mechanism)

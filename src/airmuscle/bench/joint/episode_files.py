@@ -96,18 +96,18 @@ def read_episode_mapping(path: str | Path) -> EpisodeMapping:
             raise FileError(f"{path}: no table [{name}]; name its columns: [{name}] columns = [...].")
     if ("sample_time" in tables) == ("time" in tables):
         raise FileError(f'{path}: state either sample_time = "10 ms" or time = "name of the column of times [s]".')
-    arm = tables.get("arm", {})
+    arm, step = tables.get("arm", {}), tables.get("sample_time")
     _check_keys(path, "arm.", arm, ("pairs", "axes"))
+    axes = arm.get("axes", ())
+    for name in axes:
+        if not isinstance(name, str) or name not in AXES:
+            raise FileError(f"{path}: arm.axes holds '{name}'; allowed: {', '.join(AXES)}.")
     return EpisodeMapping(
         **{name: _channels(path, name, tables[name]) for name in TABLES[:4] if name in tables},
-        sample_time=quantity(tables["sample_time"], "s", where=f"{path}: sample_time")
-        if "sample_time" in tables
-        else None,
-        time=tables.get("time"),
-        starts=tables.get("starts"),
-        pairs=_pairs(path, arm.get("pairs", ())),
-        axes=tuple(_axis(path, name) for name in arm.get("axes", ())),
-    )
+        sample_time=None if step is None else quantity(step, "s", where=f"{path}: sample_time"),
+        time=tables.get("time"), starts=tables.get("starts"), pairs=_pairs(path, arm.get("pairs", ())),
+        axes=tuple(AXES[name] for name in axes),
+    )  # fmt: skip
 
 
 def _check_keys(path: Path, prefix: str, table: Any, known: tuple[str, ...]) -> None:
@@ -146,12 +146,6 @@ def _pairs(path: Path, pairs: Any) -> tuple[tuple[int, int], ...]:
             "[[1, 2], [3, 4]], first the one that raises the angle."
         )
     return tuple((int(a), int(b)) for a, b in pairs)
-
-
-def _axis(path: Path, name: Any) -> tuple[int, int, int]:
-    if not isinstance(name, str) or name not in AXES:
-        raise FileError(f"{path}: arm.axes holds '{name}'; allowed: {', '.join(AXES)}.")
-    return AXES[name]
 
 
 def read_episodes(source: str | Path, mapping: str | Path | EpisodeMapping) -> Episodes:
@@ -198,15 +192,12 @@ def _split(whole: Episode, arrays: Arrays, mapping: EpisodeMapping, step: float)
             f"{whole.name}: starts, column '{mapping.starts}', must be the first rows of the episodes, from 0, whole "
             f"and rising below {len(whole)} rows, or 1 in these rows and 0 elsewhere."
         )
-    edges = [*(int(row) for row in starts if row < len(whole)), len(whole)]
-    return [
-        Episode(
-            whole.angle[a:b], whole.speed[a:b] if mapping.speeds else speed_of(whole.angle[a:b], step),
-            whole.pressure[a:b], None if whole.command is None else whole.command[a:b],
-            f"{whole.name}, episode {number}",
-        )
-        for number, (a, b) in enumerate(itertools.pairwise(edges), start=1)
-    ]  # fmt: skip
+    edges, runs = [*(int(row) for row in starts if row < len(whole)), len(whole)], []
+    for number, (a, b) in enumerate(itertools.pairwise(edges), start=1):
+        angle, command = whole.angle[a:b], None if whole.command is None else whole.command[a:b]
+        speed = whole.speed[a:b] if mapping.speeds else speed_of(angle, step)
+        runs.append(Episode(angle, speed, whole.pressure[a:b], command, f"{whole.name}, episode {number}"))
+    return runs
 
 
 def _episode(name: str, arrays: Arrays, mapping: EpisodeMapping) -> tuple[Episode, float]:

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from ...core import Array, ColumnError, FileError
+from ..readers.channels import RawTable
 from ..readers.raw_csv import read_csv_table
 from ..readers.raw_timed import read_rosbag_tables
 from ..readers.separate_process import import_lab_package, reading
@@ -36,12 +37,8 @@ def find_episode_files(path: Path) -> list[Path]:
         return [path]
     found = sorted(each for each in path.iterdir() if each.suffix.lower() in SUPPORTED or _is_bag(each))
     if not found:
-        if any(".tfrecord" in each.name for each in path.iterdir()):
-            raise FileError(f"{path}: {TFRECORD}")
-        raise FileError(
-            f"{path}: the folder holds no file of episodes; supported are {', '.join(SUPPORTED)}, "
-            "and folders of ROS 2 bags."
-        )
+        steps = any(".tfrecord" in each.name for each in path.iterdir())
+        raise FileError(f"{path}: {TFRECORD if steps else f'the folder holds no file of episodes; {FORMATS}'}")
     return found
 
 
@@ -60,9 +57,7 @@ def read_arrays(path: Path, sample_time: float | None = None) -> tuple[list[Arra
         raise FileError(f"{path}: {TFRECORD}")
     reader = READERS.get(path.suffix.lower())
     if reader is None:
-        raise FileError(
-            f"{path}: no format of episodes; supported are {', '.join(SUPPORTED)}, and folders of ROS 2 bags."
-        )
+        raise FileError(f"{path}: no format of episodes; {FORMATS}")
     with reading(path, path.suffix[1:].upper()):
         return reader(path), ()
 
@@ -70,15 +65,15 @@ def read_arrays(path: Path, sample_time: float | None = None) -> tuple[list[Arra
 def _read_bag(path: Path, sample_time: float | None) -> tuple[list[Arrays], tuple[str, ...]]:
     file = path if path.is_file() else min(each for each in path.iterdir() if each.suffix in (".db3", ".mcap"))
     (table,) = read_rosbag_tables(file)
-    columns = {n: c for n, c in zip(table.headings, table.columns, strict=True) if isinstance(c, np.ndarray)}
+    columns = _columns_of(table)
     time = columns.pop("time", np.zeros(0))
     intervals = np.diff(time)
     step = sample_time or (float(np.median(intervals)) if len(intervals) else 0.0)
     longest = float(np.max(intervals, initial=0.0))
     if not step > 0.0 or longest > MAX_GAP * max(step, float(np.median(intervals))):
         raise ColumnError(
-            f"{path.name}: {len(time)} rows, with up to {longest:.3g} s between two messages; an "
-            "episode needs messages without a gap. Split the bag there, or leave it out."
+            f"{path.name}: {len(time)} rows, with up to {longest:.3g} s between two messages; an episode needs "
+            "messages without a gap. Split the bag there, or leave it out."
         )
     grid = step * np.arange(int((time[-1] - time[0]) / step + 1e-6) + 1)
     uneven = 1e3 * float(np.ptp(intervals))
@@ -112,26 +107,23 @@ def _read_npz(path: Path) -> list[Arrays]:
 
 
 def _read_json(path: Path) -> list[Arrays]:
-    text = path.read_text(encoding="utf-8")
-    content = (
-        list(map(json.loads, filter(str.strip, text.splitlines()))) if path.suffix == ".jsonl" else json.loads(text)
-    )
-    return _tables(path, content.get("episodes", [content]) if isinstance(content, dict) else content)
-
-
-def _tables(path: Path, tables: Iterable[Any]) -> list[Arrays]:
-    """Each table, or all of a list of steps as one: those have no lists of rows."""
-    tables = list(tables) if isinstance(tables, list) else []
-    if not tables or not all(isinstance(table, dict) for table in tables):
+    text, by_line = path.read_text(encoding="utf-8"), path.suffix == ".jsonl"
+    content = list(map(json.loads, filter(str.strip, text.splitlines()))) if by_line else json.loads(text)
+    tables = content.get("episodes", [content]) if isinstance(content, dict) else content
+    if not isinstance(tables, list) or not tables or not all(isinstance(table, dict) for table in tables):
         raise FileError(f"{path}: an object of lists is expected, or a list of such objects, one for each episode.")
-    if "observation" in tables[0]:
+    if "observation" in tables[0]:  # a list of steps, which have no lists of rows
         tables = [{STEPS: tables}]
     return [{n: _numbers(path, n, v) for n, v in _flat(table) if isinstance(v, list)} for table in tables]
 
 
 def _read_text(path: Path) -> list[Arrays]:
-    table = read_csv_table(path)
-    return [{n: c for n, c in zip(table.headings, table.columns, strict=True) if isinstance(c, np.ndarray)}]
+    return [_columns_of(read_csv_table(path))]
+
+
+def _columns_of(table: RawTable) -> dict[str, Array]:
+    """The columns of numbers of a table."""
+    return {n: c for n, c in zip(table.headings, table.columns, strict=True) if isinstance(c, np.ndarray)}
 
 
 def _read_hdf5(path: Path) -> list[Arrays]:
@@ -159,11 +151,13 @@ READERS = {
 }  # fmt: skip
 """Readers by the extension; each returns the arrays of every episode in the file."""
 SUPPORTED = (*READERS, ".bag")
+FORMATS = f"supported are {', '.join(SUPPORTED)}, and folders of ROS 2 bags."
 
 
 # Proposal of a mapping file, from the names and the sizes of the arrays
 
 ROLES = {
+    "divisors": "divisors",
     "commands": "u command commands cmd action actions setpoint setpoints desired target reference valve",
     "pressures": "p pressure pressures counts",
     "speeds": "v dq qd speed speeds velocity velocities vel omega",
@@ -195,20 +189,14 @@ def propose_mapping(source: str | Path) -> str:
     lines += [f'starts = "{found["starts"][0]}"'] if found["starts"] else []
     for role in ("angles", "speeds", "pressures", "commands"):
         if found[role] or role in ("angles", "pressures"):
-            lines += [
-                "",
-                f"[{role}]",
-                f"columns = {json.dumps(found[role] or ['name the columns'])}",
-                *_scale(role, found, arrays),
-            ]
+            columns = json.dumps(found[role] or ["name the columns"])
+            lines += ["", f"[{role}]", f"columns = {columns}", *_scale(role, found, arrays)]
     return "\n".join(lines) + "\n"
 
 
 def _role(name: str) -> str:
     words = set(re.findall("[a-z]+", name.lower()))
-    return (
-        "divisors" if "divisors" in words else next((r for r, known in ROLES.items() if words & set(known.split())), "")
-    )
+    return next((role for role, known in ROLES.items() if words & set(known.split())), "")
 
 
 def _size(names: Iterable[str], arrays: Arrays) -> float:

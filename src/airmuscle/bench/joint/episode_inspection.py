@@ -108,8 +108,8 @@ def inspect_episodes(episodes: Episodes, pairs: Sequence[tuple[int, int]] = (), 
         errors.append(str(error))
     delay, actions = (0, ()) if errors else _actions(episodes)
     errors += _exchanged(actions, pairs)
-    ends = [text for *_, text in saturated(episodes)]
-    return EpisodeInspection(episodes, delay, actions, tuple(errors), (*short, *ends, *_doubtful(episodes)))
+    remarks = (*short, *saturated(episodes)[1], *_doubtful(episodes))
+    return EpisodeInspection(episodes, delay, actions, tuple(errors), remarks)
 
 
 def checked_inspection(episodes: Episodes, pairs: Sequence[tuple[int, int]], rows: int) -> EpisodeInspection:

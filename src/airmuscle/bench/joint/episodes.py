@@ -206,17 +206,11 @@ def cut(episodes: Episodes, delay: int = 0, rows: int = ROWS, stride: int = ROWS
         long_enough(episodes, rows)  # raises
     runs, at, step = episodes.runs, np.arange(-HISTORY, rows + 1), episodes.sample_time
     rates = {number: speed_of(runs[number].angle, step) for number, _ in found}
-    numbers, counts = np.array(found), np.ones((len(found), at.size), dtype=bool)
-    return Windows(
-        angle=np.array([runs[n].angle[k + at] for n, k in found]),
-        speed=np.array([runs[n].speed[k + at] for n, k in found]),
-        rate=np.array([rates[n][k + at] for n, k in found]),
-        pressure=np.array([runs[n].pressure[k + np.minimum(at + delay, rows)] for n, k in found]),
-        episode=numbers[:, 0],
-        first=numbers[:, 1],
-        sample_time=step,
-        counts=counts,
-    )
+    angle, speed = (np.array([getattr(runs[n], name)[k + at] for n, k in found]) for name in ("angle", "speed"))
+    rate = np.array([rates[n][k + at] for n, k in found])
+    pressure = np.array([runs[n].pressure[k + np.minimum(at + delay, rows)] for n, k in found])
+    (episode, first), counts = np.array(found).T, np.ones(angle.shape[:2], dtype=bool)
+    return Windows(angle, speed, rate, pressure, episode, first, step, counts)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

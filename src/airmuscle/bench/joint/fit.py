@@ -135,18 +135,15 @@ def _contacts(episodes: Episodes, errors: np.ndarray, windows: Windows, split: i
 
 # Separation of the parameters by a record: standard errors of the estimates, and directions that have no value
 
-UNSEPARATED, SHARE, NAMED = 1.0, 0.1, 6
+UNSEPARATED, SHARE, NAMED, WINDOWS = 1.0, 0.1, 6, 300
 """Standard error of a direction, relative to its parameters, from which it is not separated; share of a parameter in
-such directions that is named, and number of names (chosen)."""
-WINDOWS = 300
-"""Windows from which the information is computed (chosen)."""
+such directions that is named, and number of names; windows from which the information is computed (chosen)."""
 WORDS = {
     "area": "effective area", "passive_force": "force without pressure", "slack_width": "width of slackening",
     "lags": "lag of the pressure", "coulomb_torque": "dry friction", "presliding_angle": "presliding angle",
     "load_arms": "growth of friction with tension", "bearing_arms": "growth of friction with the load of the bearing",
-    "static_excess": "stiction", "stribeck_speed": "Stribeck speed",
-    "damping": "viscous friction", "rotor_inertia": "inertia", "inertia": "inertia of a link",
-    "mass": "mass of a link", "centre": "centre of mass",
+    "static_excess": "stiction", "stribeck_speed": "Stribeck speed", "damping": "viscous friction",
+    "rotor_inertia": "inertia", "inertia": "inertia of a link", "mass": "mass of a link", "centre": "centre of mass",
     "zero_angle": "direction of gravity",
 }  # fmt: skip
 
@@ -161,12 +158,10 @@ def separate(
     values = np.array([float(leaves[path].value) for path in paths])
     sizes = np.maximum(np.abs(values), [typical_size(path, leaves) for path in paths])
     error, gradient = gradients(arm, joint, paths, some)
-    scaled = gradient * sizes
-    weight = 1.0 / np.sqrt(1.0 + (error / CLIP) ** 2)
+    scaled, weight = gradient * sizes, 1.0 / np.sqrt(1.0 + (error / CLIP) ** 2)
     scale = np.sqrt(np.mean(error**2) * windows.rows)  # the errors of one window count as one
-    information = (
-        np.einsum("nrp,nr,nrq->pq", scaled, weight, scaled) * (len(windows) / len(some)) / max(scale, 1e-9) ** 2
-    )
+    of_sample = np.einsum("nrp,nr,nrq->pq", scaled, weight, scaled)
+    information = of_sample * (len(windows) / len(some)) / max(scale, 1e-9) ** 2
     estimates, covariance, shares = separated(information, paths, values, sizes)
     return estimates, not_separated(f"joint {joint + 1}: ", [_name(path) for path in paths], shares), covariance
 
@@ -226,13 +221,12 @@ def reduced_arm(middle: Array, axes: Sequence[tuple[int, int, int]] = (), level:
             its own
     level   reading of a high pressure, at which every muscle has the same force
     """
-    count = len(middle)
-    routes = tuple(MuscleRoute((j + 1,), (sign * RADIUS,)) for j in range(count) for sign in (1.0, -1.0))
-    muscles = tuple(
-        _muscle(f"m{2 * j + k}", sign * RADIUS * float(middle[j]) / LENGTH, level)
-        for j in range(count)
-        for k, sign in enumerate((1.0, -1.0))
-    )
+    count, full = len(middle), LEVEL * AREA
+    sides = [(j, sign) for j in range(count) for sign in (1.0, -1.0)]
+    routes = tuple(MuscleRoute((j + 1,), (sign * RADIUS,)) for j, sign in sides)
+    area, passive = (AREA * (LEVEL / level), 0.0, 0.0), (-0.05 * full, 0.0, 0.0)
+    laws = [LinearInPressure(area, passive, 0.3 * full, sign * RADIUS * float(middle[j]) / LENGTH) for j, sign in sides]
+    muscles = tuple(Muscle(law, Braid(0.01, FIBRE_ANGLE, LENGTH), name=f"m{i}") for i, law in enumerate(laws))
     links = [SpatialLink(axes[0] if axes else (0, 0, 1), rotor_inertia=INERTIA, damping=0.5)] * count
     for j in range(1, count) if axes else ():
         position = (LENGTH if j > 1 else 0.0, 0.0, 0.0)
@@ -241,12 +235,6 @@ def reduced_arm(middle: Array, axes: Sequence[tuple[int, int, int]] = (), level:
     *inner, last = (StickSlip(0.5, tuple(row.tolist()), presliding_angle=4e-3) for row in loads)
     elements = (*inner, replace(last, bearing_arms=(0.0,) if axes else ()))
     return PressureDriven(muscles, WithStickSlip(SerialArm(tuple(links), routes), elements), (0.02,) * (2 * count))
-
-
-def _muscle(name: str, reference: float, level: float) -> Muscle:
-    full = LEVEL * AREA
-    law = LinearInPressure((AREA * (LEVEL / level), 0.0, 0.0), (-0.05 * full, 0.0, 0.0), 0.3 * full, reference)
-    return Muscle(law, Braid(0.01, FIBRE_ANGLE, LENGTH), name=name)
 
 
 def stronger(arm: PressureDriven, joint: int, factor: float) -> PressureDriven:

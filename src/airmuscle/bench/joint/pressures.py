@@ -16,30 +16,26 @@ SETTLED, LEAST = 3, 0.2
 """Rows after which a wrong reading is forgotten before the start of a window; least share of rows of a fit (chosen)."""
 
 
-def saturated(episodes: Episodes) -> list[tuple[int, float, str]]:
-    """Muscle, from 0, end of its readings at which they saturate, and a remark on it."""
-    found, pressure = [], episodes.rows("pressure")
-    causes = ("the muscle is empty", "it has the pressure of its supply")
-    for i, values in enumerate(pressure.T):
-        for edge, cause in zip((values.min(), values.max()), causes, strict=True):
+def saturated(episodes: Episodes) -> tuple[Array, list[str]]:
+    """Upper ends (M,) of the readings at which they saturate, infinite without one, and remarks on both ends."""
+    top, remarks = np.full(episodes.muscles, np.inf), []
+    for i, values in enumerate(episodes.rows("pressure").T):
+        ends = ((values.min(), "the muscle is empty"), (values.max(), "it has the pressure of its supply"))
+        for edge, cause in ends if np.ptp(values) > 0.0 else ():
             count = int(np.sum(values == edge))
-            if count > SATURATED * len(values) and np.ptp(values) > 0.0:
-                text = (
+            if count > SATURATED * len(values):
+                remarks.append(
                     f"pressure {i + 1} is {edge:.4g} Pa in {count} of {len(values)} rows "
                     f"({100 * count / len(values):.0f} %): its reading saturates there, or {cause}"
                 )
-                found.append((i, float(edge), text))
-    return found
+                top[i] = edge if edge == values.max() else np.inf
+    return top, remarks
 
 
 def without_saturated(windows: Windows, episodes: Episodes) -> tuple[Windows, list[str]]:
     """The windows of a fit, in which rows after a reading at an upper end at which it saturates do not count, and a
     remark on these; all rows count where less than LEAST would be left."""
-    top = np.full(episodes.muscles, np.inf)
-    for muscle, edge, _ in saturated(episodes):
-        if edge == episodes.rows("pressure")[:, muscle].max():
-            top[muscle] = edge
-    ends = np.any(windows.pressure[:, HISTORY - SETTLED :] >= top, axis=-1)
+    ends = np.any(windows.pressure[:, HISTORY - SETTLED :] >= saturated(episodes)[0], axis=-1)
     hit = np.cumsum(ends, axis=1)[:, SETTLED:] > 0
     few = hit[:, 1:].mean() <= 1.0 - LEAST
     text = (

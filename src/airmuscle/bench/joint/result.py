@@ -126,21 +126,19 @@ class ArmFit(Reported):
             if count >= ENOUGH else f"the greatest errors of {count} episodes (shaded), which are no 95 % band."
         )  # fmt: skip
         caption = f"Root mean square error against the horizon: the model, its baselines, and {band}"
-        return Chapter(
-            name="joint",
-            title="Identified arm",
-            summary=f"Angles are predicted from the state at the start of a window and from the pressures alone: free "
-            f"run over {end:.3g} s on {count} episodes left out, {len(self.errors)} windows. Skill, 1 - error/error of "
-            f"the best baseline: {skill}.",
-            values=(
-                NamedValue("horizon", float(end), "s", digits=3, brief=False),
-                NamedValue("windows", len(self.errors), brief=False),
-                NamedValue("delay in rows", self.inspection.delay, brief=False),
-            ),
-            tables=(self._error_table(), self._joint_table(), self._band_table(), self._parameter_table()),
-            plots=(Plot("horizon", caption, self._horizon_figure),),
-            notes=(*self._doubt(count), *self.remarks),
+        summary = (
+            f"Angles are predicted from the state at the start of a window and from the pressures alone: free run over "
+            f"{end:.3g} s on {count} episodes left out, {len(self.errors)} windows. Skill, 1 - error/error of the best "
+            f"baseline: {skill}."
         )
+        values = (
+            NamedValue("horizon", float(end), "s", digits=3, brief=False),
+            NamedValue("windows", len(self.errors), brief=False),
+            NamedValue("delay in rows", self.inspection.delay, brief=False),
+        )
+        tables = (self._error_table(), self._joint_table(), self._band_table(), self._parameter_table())
+        plots, notes = (Plot("horizon", caption, self._horizon_figure),), (*self._doubt(count), *self.remarks)
+        return Chapter("joint", "Identified arm", summary, values=values, tables=tables, plots=plots, notes=notes)
 
     def _doubt(self, count: int) -> list[str]:
         """What a band of few episodes means, and joints whose baseline is better."""

@@ -172,11 +172,10 @@ def _band_table(campaign: Campaign) -> Table | None:
     if not isinstance(campaign.static, StaticStage):
         return None
     bands = campaign.static.all_bands
+    half_widths = [band.half_width for band in bands]
     columns: dict[str, Any] = {
         "prediction of": [band.purpose for band in bands],
-        "half width of the 95 % band": TableColumn(
-            [band.half_width for band in bands], "N", digits=3, short="95 % band ±"
-        ),
+        "half width of the 95 % band": TableColumn(half_widths, "N", digits=3, short="95 % band ±"),
         "rms error": TableColumn([band.rmse for band in bands], "N", digits=3),
         "groups left out": TableColumn([band.groups for band in bands], brief=False),
         "rows": TableColumn([band.rows for band in bands], brief=False),

@@ -77,11 +77,8 @@ def prediction_plot(campaign: Campaign) -> Plot | None:
     for axes in panels[:, 0]:
         axes.set_ylabel("force [N]")
     legend_below(figure, panels[0, 0], columns=3)
-    caption = (
-        "Slow records with the predicted force: static law minus friction and creep along the recorded motion. "
-        "Shaded: 95 % band."
-    )
-    return Plot("campaign-loops", caption, figure)
+    force = "static law minus friction and creep along the recorded motion"
+    return Plot("campaign-loops", f"Slow records with the predicted force: {force}. Shaded: 95 % band.", figure)
 
 
 def _draw_loop(axes: Any, campaign: Campaign, record: CampaignRecord) -> None:
@@ -120,9 +117,8 @@ def residual_plot(campaign: Campaign) -> Plot | None:
         for axes, x in zip(panels, columns, strict=True):
             axes.plot(x, error, linestyle="none", marker=".", markersize=1.0, color=BLUE, alpha=0.35, rasterized=True)
     for axes, text in zip(panels, ("pressure [kPa]", "contraction [%]", "rows of the record [%]"), strict=True):
-        axes.axhline(0.0, color=BLACK, linewidth=0.8)
-        for limit in (-half, half):
-            axes.axhline(limit, color=RED, linewidth=0.8, linestyle="--")
+        for limit, colour, dashes in ((0.0, BLACK, "-"), (-half, RED, "--"), (half, RED, "--")):
+            axes.axhline(limit, color=colour, linewidth=0.8, linestyle=dashes)
         axes.set_xlabel(text)
     panels[0].set_ylabel("predicted - measured force [N]")
     caption = "Residuals of all slow records. Dashed: limits of the 95 % band for further runs."

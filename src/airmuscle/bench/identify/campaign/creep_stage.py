@@ -65,12 +65,11 @@ def fit_creep_stage(records: Sequence[CampaignRecord]) -> CreepStage | LeftOutSt
     common to all holds, each hold has its own initial force.
     """
     if not records:
-        return LeftOutStage(
-            NAME,
-            "no record is a hold after a motion",
+        remedy = (
             "move the muscle by a few per cent of its length within a second at constant pressure, hold the length for "
-            "two minutes or more, and record the force",
+            "two minutes or more, and record the force"
         )
+        return LeftOutStage(NAME, "no record is a hold after a motion", remedy)
     motions = [(record, find_motion(record.recording)) for record in records]
     return fit_held_rows(
         [(each.origin, HeldRows.after(each.recording, motion.end)) for each, motion in motions if motion]
@@ -159,11 +158,11 @@ def _fit_elements(
     coefficients, rest = _linear_part(holds, times)
     stiffnesses = coefficients[:count]
     if not (stiffnesses > 0).all():
-        return LeftOutStage(
-            NAME,
-            "the force of the holds does not relax towards the value before the motion",
-            "hold the pressure constant during the motion and after it, because a pressure step also changes the force",
+        reason = "the force of the holds does not relax towards the value before the motion"
+        remedy = (
+            "hold the pressure constant during the motion and after it, because a pressure step also changes the force"
         )
+        return LeftOutStage(NAME, reason, remedy)
     elements = CreepElements(tuple(stiffnesses.tolist()), tuple(times.tolist()))
     modelled = [matrix @ coefficients for matrix in _matrices(holds, times)]
     return _build(holds, elements, _standard_errors(holds, times, coefficients, rest), fits, modelled)

@@ -103,11 +103,9 @@ class FillStage(ShortRepr):
 
 
 def fit_fill_stage(
-    records: Sequence[CampaignRecord],
-    geometry: Geometry | None,
-    change: VolumeChange | None,
+    records: Sequence[CampaignRecord], geometry: Geometry | None, change: VolumeChange | None,
     progress: Callable[[float], None],
-) -> FillStage | LeftOutStage:
+) -> FillStage | LeftOutStage:  # fmt: skip
     """Fit conductances, critical ratios, heat transfer and supply pressure to all fills together.
 
     Each record has the ambient air that it states, and its own instants of the valve commands. A valve that no record
@@ -119,74 +117,59 @@ def fit_fill_stage(
     if not records:
         return LeftOutStage(NAME, "no record is a fill or a discharge at a held length", REMEDY)
     try:
-        rising = [record for record in records if any(step.change > 0 for step in record.steps)]
-        relative = _RelativeFit.of(rising or records)
+        rising = [record for record in records if any(step.change > 0 for step in record.steps)] or list(records)
+        relative, held = _fit_relative(rising), np.array([fills.held_contraction(record) for record in rising])
+        own = [each for each in relative.estimates if each.name.startswith(VOLUME)]
+        volumes, errors = np.array([each.value for each in own]), np.array([each.stderr for each in own])
         progress(0.5)
         estimate = None
-        if geometry is None:
-            if change is not None:
-                estimate = relate_volumes(*relative.volumes, relative.contractions, change)
+        if geometry is not None:  # the factor that makes the relative volumes its own
+            known = np.array([float(geometry.volume(contraction)) for contraction in held])
+            scale = float(known @ volumes / (volumes @ volumes))
+        else:
+            estimate = None if change is None else relate_volumes(volumes, errors, held, change)
             if estimate is None or change is None:
-                ratio, held = "the ratio of conductance and volume only", 100 * relative.contractions
-                reason = f"the fills determine {ratio}, and no static law gives the volume" if change is None else (
-                    f"the fills at contractions of {held.min():.3g} to {held.max():.3g} % determine {ratio}; give the "
-                    "braid of the muscle"
-                )  # fmt: skip
+                ratio, ends = "the ratio of conductance and volume only", [100 * held.min(), 100 * held.max()]
+                reason = f"the fills determine {ratio}, and no static law gives the volume"
+                if change is not None:
+                    at = f"at contractions of {ends[0]:.3g} to {ends[1]:.3g} %"
+                    reason = f"the fills {at} determine {ratio}; give the braid of the muscle"
                 return LeftOutStage(NAME, reason, REMEDY)
             geometry, scale = change.geometry(estimate.volume_at_rest), estimate.scale
-        else:
-            scale = relative.scale_to(geometry)
-        return _fit_jointly(records, relative.experiments(records, geometry, scale), geometry, estimate, progress)
+        experiments = _experiments(records, rising, relative, geometry, scale)
+        return _fit_jointly(records, experiments, geometry, estimate, progress)
     except AirmuscleError as error:
         return LeftOutStage(NAME, str(error.message), REMEDY)
 
 
-@dataclasses.dataclass(frozen=True)
-class _RelativeFit:
+def _fit_relative(records: Sequence[CampaignRecord]) -> DynamicFit:
     """A fit of own volumes of the records for an assumed conductance of the valve of their first direction.
 
     The records with a fill have it, because without one the ratio of the other conductance and the volumes remains.
     """
 
-    fit: DynamicFit
-    records: tuple[CampaignRecord, ...]
+    def fitted(experiments: Sequence[Experiment], valves: fills.ValveUnknowns) -> DynamicFit:
+        free = [*valves.shared, *([f"{valves.circuit}.discharge.{fills.CONDUCTANCE}"] if valves.both else [])]
+        return fills.fit_pressure(records, experiments, free, (VOLUME,))
 
-    @classmethod
-    def of(cls, records: Sequence[CampaignRecord]) -> "_RelativeFit":
-        def fitted(experiments: Sequence[Experiment], valves: fills.ValveUnknowns) -> DynamicFit:
-            free = [*valves.shared, *([f"{valves.circuit}.discharge.{fills.CONDUCTANCE}"] if valves.both else [])]
-            return fills.fit_pressure(records, experiments, free, (VOLUME,))
+    experiments = [fills.detected_experiment(record, fills.vessel_plant(record)) for record in records]
+    valves = fills.ValveUnknowns.of(records, experiments[0].plant)
+    return _with_supply(records, experiments, valves, fitted)[0]
 
-        experiments = [fills.detected_experiment(record, fills.vessel_plant(record)) for record in records]
-        valves = fills.ValveUnknowns.of(records, experiments[0].plant)
-        return cls(_with_supply(records, experiments, valves, fitted)[0], tuple(records))
 
-    @property
-    def contractions(self) -> Array:
-        return np.array([fills.held_contraction(record) for record in self.records])
-
-    @property
-    def volumes(self) -> tuple[Array, Array]:
-        """The relative volumes and their standard errors, shape (K,) each."""
-        own = [estimate for estimate in self.fit.estimates if estimate.name.startswith(VOLUME)]
-        return np.array([e.value for e in own]), np.array([e.stderr for e in own])
-
-    def scale_to(self, geometry: Geometry) -> float:
-        """The factor of the relative volumes that makes them those of a geometry."""
-        known = np.array([float(geometry.volume(c)) for c in self.contractions])
-        values, _ = self.volumes
-        return float(known @ values / (values @ values))
-
-    def experiments(self, records: Sequence[CampaignRecord], geometry: Geometry, scale: float) -> list[Experiment]:
-        """All records with the volumes of a geometry, from the valves and instants of this fit."""
-        found, experiments = fills.rescaled(fills.plant_of(self.fit.plant()), scale), []
-        for record in records:
-            plant = fills.at_record(found, record, float(geometry.volume(fills.held_contraction(record))))
-            experiment = fills.detected_experiment(record, plant)
-            if record in self.records:
-                experiment = fills.with_instants(experiment, self.fit, self.records.index(record))
-            experiments.append(experiment)
-        return experiments
+def _experiments(
+    records: Sequence[CampaignRecord], rising: Sequence[CampaignRecord], relative: DynamicFit, geometry: Geometry,
+    scale: float,
+) -> list[Experiment]:  # fmt: skip
+    """All records with the volumes of a geometry, from the valves of the scaled relative fit and its instants."""
+    found, experiments = fills.rescaled(fills.plant_of(relative.plant()), scale), []
+    for record in records:
+        plant = fills.at_record(found, record, float(geometry.volume(fills.held_contraction(record))))
+        experiment = fills.detected_experiment(record, plant)
+        if record in rising:
+            experiment = fills.with_instants(experiment, relative, rising.index(record))
+        experiments.append(experiment)
+    return experiments
 
 
 def _fit_jointly(

@@ -198,23 +198,20 @@ def _find_loops(
     records: Sequence[CampaignRecord], creep: CreepElements
 ) -> tuple[list[hysteresis.HysteresisLoop], list[str]]:
     """The loops of each specimen; loops of different specimens are not repeats of each other."""
-    loops, failed = list[hysteresis.HysteresisLoop](), list[str]()
-    by_length: dict[float | None, list[Recording]] = {}
+    usable: dict[float, list[Recording]] = {}
+    failed = list[str]()
     for record in records:
         if record.kind is RecordKind.ISOBARIC and record.resting_length is not None:
             recording = with_force(record.recording, creep_force(creep, record.recording))
-            by_length.setdefault(record.resting_length, []).append(recording.rows(path_rows(recording)))
-    for recordings in by_length.values():
-        usable = []
-        for recording in recordings:
+            recording, own = recording.rows(path_rows(recording)), usable.setdefault(record.resting_length, [])
             try:
                 hysteresis.find_loops([recording], all_rows=True)
             except AirmuscleError as error:
                 failed.append(error.message)
             else:
-                usable.append(recording)
-        loops += hysteresis.find_loops(usable, all_rows=True) if usable else ()
-    return loops, failed
+                own.append(recording)
+    lengths = [own for own in usable.values() if own]
+    return [loop for own in lengths for loop in hysteresis.find_loops(own, all_rows=True)], failed
 
 
 def friction_along(friction: Friction, recording: Recording) -> Array:

@@ -19,10 +19,9 @@ from .record import CampaignRecord, RecordKind
 from .static_stage import StaticStage
 from .transient import LeftOutStage
 
-MAX_RATIO = 1.5
-"""Maximum ratio of the forces of two records at the same pressure, contraction and length (chosen)."""
-MAX_SCALE = 10.0
-"""Maximum ratio of the maximum forces by pressure of two isobaric records of one length (chosen)."""
+MAX_RATIO, MAX_SCALE = 1.5, 10.0
+"""Maximum ratio of the forces of two records at the same pressure, contraction and length, and of the maximum forces by
+pressure of two isobaric records of one length (chosen)."""
 REMEDY = "Give the files of one muscle and one rig in a folder of their own"
 
 
@@ -35,9 +34,9 @@ def check_one_rig(records: Sequence[CampaignRecord]) -> None:
     for length, own in by_length.items():
         specimens = {str(r.recording.constants["specimen"]) for r in own if "specimen" in r.recording.constants}
         if len(specimens) > 1:
+            names = ", ".join(sorted(specimens))
             raise IdentificationError(
-                f"the records of {1e3 * length:.4g} mm are of several specimens: {', '.join(sorted(specimens))}. "
-                f"{REMEDY}."
+                f"the records of {1e3 * length:.4g} mm are of several specimens: {names}. {REMEDY}."
             )
         isobaric = [record for record in own if record.kind is RecordKind.ISOBARIC]
         _check_scale(isobaric)
@@ -46,24 +45,20 @@ def check_one_rig(records: Sequence[CampaignRecord]) -> None:
 
 def _check_scale(records: Sequence[CampaignRecord]) -> None:
     """Raise IdentificationError where the force by pressure differs by a factor that only a unit explains."""
-    scales = [
-        (float(np.max(record.recording["force"])) / record.level[1], record)
-        for record in records
-        if record.level is not None and record.level[1] > 0
-    ]
+    levels = [(record.recording, record.level[1]) for record in records if record.level is not None]
+    scales = [(float(np.max(each["force"])) / level, each) for each, level in levels if level > 0]
     positive = sorted((pair for pair in scales if pair[0] > 0), key=lambda pair: pair[0])
     if positive and positive[-1][0] > MAX_SCALE * positive[0][0]:
         (low, first), (high, last) = positive[0], positive[-1]
         raise IdentificationError(
-            f"the force by pressure of {last.origin} ({_units(last)}) is {high / low:.3g} times that of {first.origin} "
-            f"({_units(first)}), at the same length: a unit is wrong, or the files are of different muscles. "
-            f"{REMEDY}, or correct the units."
+            f"the force by pressure of {_with_units(last)} is {high / low:.3g} times that of {_with_units(first)}, at "
+            f"the same length: a unit is wrong, or the files are of different muscles. {REMEDY}, or correct the units."
         )
 
 
-def _units(record: CampaignRecord) -> str:
-    units = record.recording.units
-    return ", ".join(f"{name} in {units[name]}" for name in ("pressure", "force") if name in units)
+def _with_units(recording: Recording) -> str:
+    units = [f"{name} in {recording.units[name]}" for name in ("pressure", "force") if name in recording.units]
+    return f"{recording.origin} ({', '.join(units)})"
 
 
 def _check_forces(recordings: Sequence[Recording]) -> None:
@@ -122,8 +117,8 @@ def _undetermined(stages: Sequence[object]) -> list[NextExperiment]:
                 names = ", ".join(name for name, _ in each.shares)
                 experiments.append(NextExperiment(_sentence(each.remedy), f"fills: {names} are not determined"))
             experiments += _separating_record(stage)
-        if isinstance(stage, CreepStage) and stage.elements.relaxation_times:
-            longest = max(stage.elements.relaxation_times)
+        elif isinstance(stage, CreepStage):
+            longest = max(stage.elements.relaxation_times, default=0.0)
             if longest > stage.longest / 2:
                 text = f"Hold the length for {6 * longest:.2g} s instead of {stage.longest:.3g} s."
                 experiments.append(NextExperiment(text, "creep: the longest relaxation time is extrapolated"))
@@ -148,13 +143,9 @@ def _lengths(static: StaticStage | LeftOutStage, records: Sequence[CampaignRecor
     lengths = {r.resting_length for r in records if r.kind.is_static and r.resting_length is not None}
     if isinstance(static, LeftOutStage) or len(lengths) >= MIN_LENGTHS:
         return []
-    return [
-        NextExperiment(
-            "Measure muscles of the same type with three resting lengths, each at three pressures or more.",
-            f"lengths: {len(lengths)} resting {'length is' if len(lengths) == 1 else 'lengths are'} measured, so the "
-            "error for other lengths is not known",
-        )
-    ]
+    measured = f"{len(lengths)} resting {'length is' if len(lengths) == 1 else 'lengths are'} measured"
+    text = "Measure muscles of the same type with three resting lengths, each at three pressures or more."
+    return [NextExperiment(text, f"lengths: {measured}, so the error for other lengths is not known")]
 
 
 def _levels(run: PlannedRun) -> str:
@@ -166,24 +157,14 @@ def _levels(run: PlannedRun) -> str:
 def _static_runs(static: StaticStage | LeftOutStage) -> list[NextExperiment]:
     if isinstance(static, LeftOutStage):
         return []
-    fit = static.fit
-    ranges = fit.data_ranges
-    low = max(ranges["pressure"][0], 0.0)
-    limits = BenchLimits(
-        ValidityRange(low, ranges["pressure"][1], max(ranges["contraction"][0], 0.0), ranges["contraction"][1]),
-        ranges["force"][1],
-    )
+    fit, ranges = static.fit, static.fit.data_ranges
+    (low, high), (least, greatest) = ranges["pressure"], ranges["contraction"]
+    limits = BenchLimits(ValidityRange(max(low, 0.0), high, max(least, 0.0), greatest), ranges["force"][1])
     fixed = tuple(leaf.path for i, leaf in enumerate(fit.problem.leaves) if i not in set(fit.problem.free))
+    sigma = max(fit.sigma, 1e-9)
     try:
-        plan = optimal_design(
-            fit.model, limits, runs=PLANNED_RUNS, points=PLANNED_POINTS, sigma=max(fit.sigma, 1e-9), fixed=fixed
-        )
+        plan = optimal_design(fit.model, limits, runs=PLANNED_RUNS, points=PLANNED_POINTS, sigma=sigma, fixed=fixed)
     except AirmuscleError:
         return []  # the law has no derivative at a corner of the range; the other experiments remain
-    return [
-        NextExperiment(
-            f"Measure {len(plan.runs)} further static runs: {'; '.join(map(_levels, plan.runs))}.",
-            "static characteristic: the D-optimal runs within the range of the records",
-            plan,
-        )
-    ]
+    text = f"Measure {len(plan.runs)} further static runs: {'; '.join(map(_levels, plan.runs))}."
+    return [NextExperiment(text, "static characteristic: the D-optimal runs within the range of the records", plan)]

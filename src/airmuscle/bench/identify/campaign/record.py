@@ -6,17 +6,15 @@ import itertools
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from ....core import Array, ShortRepr
 from ....recording import Recording
-from ...segment import Inspection, Sensor, estimate_sensors, inspect, inspect_all, quasi_static_rows
+from ...segment import Inspection, Mask, Sensor, estimate_sensors, inspect, inspect_all, quasi_static_rows
 from ...segment.interval import Interval, true_intervals
 from ...segment.runs import AT_REST, CONTRACTION_BAND, ISOBARIC, ISOMETRIC, ISOTONIC, RELATIVE_BAND, Run
 from ..hysteresis.loops import describe_run, rows_of
 from .transient import MAX_RELEASE, MIN_STEP, PressureStep, find_motion, find_pressure_steps
 
-RowMask = npt.NDArray[np.bool_]
 MIN_HOLD, MIN_HOLD_RATIO = 10.0, 10.0
 """Minimum duration of a hold [s], and its minimum ratio to the duration of the motion before it (chosen)."""
 MIN_RUN_ROWS, MIN_ROWS = 100, 8
@@ -78,9 +76,8 @@ class CampaignRecord(ShortRepr):
     def level(self) -> tuple[str, float] | None:
         """The constant quantity and its value [SI]; None if no quantity is constant."""
         run = _longest(self.inspection.runs)
-        if run is None or run.constant_column is None or run.constant_value is None:
-            return None
-        return run.constant_column, run.constant_value
+        column, value = (None, None) if run is None else (run.constant_column, run.constant_value)
+        return None if column is None or value is None else (column, value)
 
 
 def classify_records(recordings: Sequence[Recording]) -> tuple[CampaignRecord, ...]:
@@ -114,7 +111,9 @@ def _cut_at_levels(record: CampaignRecord, sensors: Mapping[str, Sensor]) -> lis
     fill explains: those to the supply and to ambient pressure, and one record of the rows that are not used."""
     recording, levels = record.recording, list[tuple[float, int, int]]()
     usable = all(name in recording for name in ("time", "pressure", "contraction"))
-    if record.kind.is_static or not usable or not np.isfinite(recording["pressure"]).all() or _is_moved(recording):
+    if record.kind.is_static or not usable or not np.isfinite(recording["pressure"]).all():
+        return [record]
+    if _span(recording["contraction"]) > CONTRACTION_BAND:
         return [record]
     for interval in true_intervals(quasi_static_rows(recording, sensors)):
         value = float(np.median(recording["pressure"][interval.rows]))
@@ -131,10 +130,10 @@ def _cut_at_levels(record: CampaignRecord, sensors: Mapping[str, Sensor]) -> lis
         if min(abs(value - low), abs(value - high)) <= margin:
             part = _classify(inspect(rows_of(recording, Interval(start, stop)), sensors))
             parts += [part] if part.kind is RecordKind.FILL else []
+    count = len(levels) - 1
     reason = (
-        f"{len(levels) - 1 - len(parts)} of {len(levels) - 1} pressure steps at a held length end between the lowest "
-        "and the highest pressure, or are no fill through an open valve; with a measured force they would be static "
-        "points"
+        f"{count - len(parts)} of {count} pressure steps at a held length end between the lowest and the highest "
+        "pressure, or are no fill through an open valve; with a measured force they would be static points"
     )
     return [*parts, dataclasses.replace(record, kind=RecordKind.UNUSED, reason=reason, steps=())]
 
@@ -148,20 +147,21 @@ def _classify(inspection: Inspection) -> CampaignRecord:
         return CampaignRecord(recording, RecordKind.STATIC, inspection.static_points.description, inspection)
     if "time" in recording:
         steps = find_pressure_steps(recording, inspection.sensors)
-        if steps and not _is_moved(recording):
+        if steps and _span(recording["contraction"]) <= CONTRACTION_BAND:
             step = steps[0]
             reason = f"pressure step of {step.change / 1e3:.4g} kPa within {step.duration:.3g} s at a held length"
             return CampaignRecord(recording, RecordKind.FILL, reason, inspection, steps)
         motion = find_motion(recording)
         has_length = isinstance(recording.constants.get("resting_length"), float | int)
-        if motion is not None and motion.is_single and _is_constant(recording["pressure"]):
-            rest = float(recording["time"][-1]) - motion.end
-            if has_length and rest >= max(MIN_HOLD, MIN_HOLD_RATIO * motion.duration):
+        if has_length and motion is not None and motion.is_single:
+            rest, pressure = float(recording["time"][-1]) - motion.end, recording["pressure"]
+            held = _span(pressure) <= RELATIVE_BAND * max(float(np.max(np.abs(pressure))), 1.0)
+            if held and rest >= max(MIN_HOLD, MIN_HOLD_RATIO * motion.duration):
                 reason = f"motion within {motion.duration:.3g} s, then held for {rest:.4g} s at constant pressure"
                 return CampaignRecord(recording, RecordKind.CREEP, reason, inspection)
-        if has_length and motion is not None and motion.is_single and motion.duration < MAX_RELEASE:
-            reason = f"motion of {1e3 * abs(motion.travel):.3g} mm within {motion.duration:.3g} s"
-            return CampaignRecord(recording, RecordKind.RELEASE, reason, inspection)
+            if motion.duration < MAX_RELEASE:
+                reason = f"motion of {1e3 * abs(motion.travel):.3g} mm within {motion.duration:.3g} s"
+                return CampaignRecord(recording, RecordKind.RELEASE, reason, inspection)
     return _classify_static(inspection)
 
 
@@ -172,10 +172,8 @@ def _classify_static(inspection: Inspection) -> CampaignRecord:
         return CampaignRecord(recording, RecordKind.UNUSED, reason, inspection)
     slow = float(slow_rows(recording, inspection).mean())
     if slow < MIN_SLOW:
-        reason = (
-            f"only {100 * slow:.3g} % of the rows are slow, and the record is neither a fill at a held length nor a "
-            "release"
-        )
+        neither = "the record is neither a fill at a held length nor a release"
+        reason = f"only {100 * slow:.3g} % of the rows are slow, and {neither}"
         return CampaignRecord(recording, RecordKind.UNUSED, reason, inspection)
     kind = _KINDS.get(run.kind, RecordKind.STATIC)
     count = "" if len(inspection.runs) == 1 else f"{len(inspection.runs)} runs, the longest "
@@ -183,7 +181,7 @@ def _classify_static(inspection: Inspection) -> CampaignRecord:
     return CampaignRecord(recording, kind, reason, inspection)
 
 
-def slow_rows(recording: Recording, inspection: Inspection) -> RowMask:
+def slow_rows(recording: Recording, inspection: Inspection) -> Mask:
     """Mask of the rows in which pressure and length change by less than `MAX_CHANGE`, shape (N,)."""
     return quasi_static_rows(recording, inspection.sensors, max_change=MAX_CHANGE)
 
@@ -193,28 +191,20 @@ def _unusable(recording: Recording) -> str:
     if "pressure" not in recording:
         return "no pressure column"
     if "contraction" not in recording and "force" not in recording:
-        return (
-            "only the pressure is recorded; a fill also needs the held length and the resting length, in the file or "
-            "as constants length and resting_length"
-        )
+        needed = "the held length and the resting length, in the file or as constants length and resting_length"
+        return f"only the pressure is recorded; a fill also needs {needed}"
     if "contraction" not in recording:
         return "the contraction is not known: a length column and the resting length are needed"
     if len(recording) < MIN_ROWS:
         return f"{len(recording)} rows; at least {MIN_ROWS} are needed"
-    if not np.isfinite(recording["pressure"]).all():
-        return "values of the pressure are missing"
-    return ""
+    return "" if np.isfinite(recording["pressure"]).all() else "values of the pressure are missing"
 
 
 def _longest(runs: Sequence[Run]) -> Run | None:
     return max(runs, key=lambda run: len(run.interval), default=None)
 
 
-def _is_moved(recording: Recording) -> bool:
-    low, high = np.quantile(recording["contraction"], [0.01, 0.99])
-    return bool(high - low > CONTRACTION_BAND)
-
-
-def _is_constant(values: Array) -> bool:
+def _span(values: Array) -> float:
+    """The range of the values without the extreme rows."""
     low, high = np.quantile(values, [0.01, 0.99])
-    return bool(high - low <= RELATIVE_BAND * max(float(np.max(np.abs(values))), 1.0))
+    return float(high - low)

@@ -127,13 +127,18 @@ class Motion:
     start: float
     end: float
     travel: float
-    is_single: bool
-    """Whether the muscle was moved once, and not back."""
+    range: float
+    """Range of the displacement in the record [m]."""
 
     @property
     def duration(self) -> float:
         """Duration [s]."""
         return self.end - self.start
+
+    @property
+    def is_single(self) -> bool:
+        """Whether the muscle was moved once, and not back."""
+        return abs(self.travel) > 0.5 * self.range
 
 
 def find_pressure_steps(recording: Recording, sensors: Mapping[str, Sensor]) -> tuple[PressureStep, ...]:
@@ -209,5 +214,4 @@ def find_motion(recording: Recording) -> Motion | None:
         outside = np.flatnonzero(np.abs(fraction - 1.0) > 0.05)
         end = min(int(outside[-1]) + 1 if outside.size else begin, end)
     length = float(recording.constants.get("resting_length", 1.0))
-    is_single = abs(travel) > 0.5 * span
-    return Motion(float(time[begin]), float(time[end]), travel * length, is_single)
+    return Motion(float(time[begin]), float(time[end]), travel * length, span * length)

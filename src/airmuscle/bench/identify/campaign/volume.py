@@ -9,10 +9,9 @@ from ....core import Array, PhysicsError
 from ....physics.muscle.characteristic.base import ForceLaw
 from ....physics.muscle.geometry import ChebyshevGeometry
 
-GRID = 25
-"""Number of contractions, and of pressures, at which the slope of the force is evaluated (chosen)."""
-MIN_FORCE = 0.02
-"""Minimum force of a point for the slope, as a fraction of the maximum force (chosen)."""
+GRID, MIN_FORCE = 25, 0.02
+"""Number of contractions, and of pressures, at which the slope of the force is evaluated, and minimum force of a point
+for the slope, as a fraction of the maximum force (chosen)."""
 DEGREE = 4
 """Degree of the polynomial of the volume (chosen)."""
 MIN_RANGE = 0.02
@@ -40,12 +39,10 @@ class VolumeChange:
 
     def geometry(self, volume_at_rest: float) -> ChebyshevGeometry:
         """The geometry with this volume at zero contraction [m3]."""
-        low, high = self.min_contraction, self.max_contraction
+        low, high, degree = self.min_contraction, self.max_contraction, len(self.coefficients)
         middle, half = (low + high) / 2, (high - low) / 2
-        values = np.polynomial.chebyshev.chebinterpolate(
-            lambda x: volume_at_rest + self(middle + half * x), len(self.coefficients)
-        )
-        return ChebyshevGeometry(tuple(float(v) for v in values), low, high, self.resting_length)
+        values = np.polynomial.chebyshev.chebinterpolate(lambda x: volume_at_rest + self(middle + half * x), degree)
+        return ChebyshevGeometry(tuple(values.tolist()), low, high, self.resting_length)
 
 
 def volume_change(

@@ -1,6 +1,7 @@
 """Candidate records of a next experiment: fills and discharges of the same rig that differ from those of a fit."""
 
 import dataclasses
+import itertools
 from collections.abc import Iterator
 
 import numpy as np
@@ -17,20 +18,18 @@ from .experiment import Experiment
 from .initial_conditions import InitialConditions
 from .result import DynamicFit
 
-SUPPLY_FACTORS = (0.6, 1.4)
-"""Absolute supply pressures of candidates, relative to that of the fit (chosen)."""
-CONTRACTION_STEP = 0.08
-"""Difference of the contraction of candidates at another held length (chosen)."""
-THROTTLE = 0.2
-"""Conductance of the fill valve with a throttle, relative to that of the valve (chosen)."""
-LONGER = 4.0
-"""Duration of a longer record, relative to that of the fit (chosen)."""
+SUPPLY_FACTORS, THROTTLE, LONGER = (0.6, 1.4), 0.2, 4.0
+"""Absolute supply pressures of candidates, conductance of a throttled fill valve, and duration of a longer record,
+relative to those of the fit (chosen)."""
+CONTRACTION_STEP, MAX_CONTRACTION = 0.08, 0.2
+"""Difference of the contraction of candidates at another held length, and maximum contraction (chosen)."""
 PULSE_SHARE = 0.5
 """Share of the pressure rise at which a valve is closed again (chosen)."""
 VALVE_PARAMETERS = ("conductance", "critical_ratio")
 """Parameters of a valve that its flow depends on, by the last part of their paths."""
-MAX_CONTRACTION = 0.2
-"""Maximum held contraction of a candidate (chosen)."""
+
+
+FILL = Schedule({"fill": ((0.0, 1.0),)})
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -57,14 +56,13 @@ def candidate_records(fit: DynamicFit) -> tuple[CandidateRecord, ...]:
     """
     plant, model = fit.plant(0), fit.problem.record_models[0]
     assert isinstance(plant, Plant)
-    experiment, start = model.experiment, model.start_time(fit.values)
-    begun = dataclasses.replace(experiment, plant=plant, start_time=0.0)
-    times = model.times - start
+    begun = dataclasses.replace(model.experiment, plant=plant, start_time=0.0)
+    times = model.times - model.start_time(fit.values)
     candidates = [
         CandidateRecord("a repeat of the record", _with_times(begun, times, model.names)),
         CandidateRecord(f"the same record, {LONGER:g} times as long", _with_times(begun, LONGER * times, model.names)),
     ]
-    pressure = float(experiment.initial_conditions.known.get("pressure", 0.0))
+    pressure = float(begun.initial_conditions.known.get("pressure", 0.0))
     identified = frozenset(path for unknown in fit.unknowns for path in unknown.paths)
     context = _Context(plant, begun, times, model.names, pressure, identified)
     candidates += [*context.supplies(), *context.lengths()]
@@ -86,26 +84,24 @@ class _Context:
 
     def supplies(self) -> Iterator[CandidateRecord]:
         """The same record from other supply pressures, which are measured."""
-        ambient = float(self.plant.ambient.pressure)
-        for leaf in tree.leaves(self.plant):
-            if not leaf.path.endswith("supply.pressure"):
-                continue
-            for factor in SUPPLY_FACTORS:
-                changed = factor * (leaf.value + ambient) - ambient
-                values = [changed if each.path == leaf.path else each.value for each in tree.leaves(self.plant)]
-                text = f"the same record from a supply of {changed / 1e3:.3g} kPa, which is measured"
-                yield CandidateRecord(text, self._of(tree.with_parameters(self.plant, values)))
+        ambient, leaves = float(self.plant.ambient.pressure), list(tree.leaves(self.plant))
+        supplies = [leaf for leaf in leaves if leaf.path.endswith("supply.pressure")]
+        for leaf, factor in itertools.product(supplies, SUPPLY_FACTORS):
+            changed = factor * (leaf.value + ambient) - ambient
+            values = [changed if each.path == leaf.path else each.value for each in leaves]
+            text = f"the same record from a supply of {changed / 1e3:.3g} kPa, which is measured"
+            yield CandidateRecord(text, self._of(tree.with_parameters(self.plant, values)))
 
     def lengths(self) -> Iterator[CandidateRecord]:
+        """The same record at other held lengths."""
         mechanism = self.plant.mechanism
         if not isinstance(mechanism, Isometric):
             return
         for contraction in {0.0, min(mechanism.contraction + CONTRACTION_STEP, MAX_CONTRACTION)}:
             if abs(contraction - mechanism.contraction) > 0.25 * CONTRACTION_STEP:
                 changed = dataclasses.replace(self.plant, mechanism=Isometric(contraction))
-                yield CandidateRecord(
-                    f"the same record at a contraction of {100 * contraction:.3g} %", self._of(changed)
-                )
+                text = f"the same record at a contraction of {100 * contraction:.3g} %"
+                yield CandidateRecord(text, self._of(changed))
 
     def valve_records(self, circuit: FillDischarge) -> Iterator[CandidateRecord]:
         """A discharge, a fill that stops halfway, and a fill through a throttle."""
@@ -116,18 +112,13 @@ class _Context:
         yield CandidateRecord("a discharge from the supply pressure", discharge, unknown)
         half = self._time_of_half_rise(high)
         closed = Schedule({"fill": ((0.0, 1.0), (half, 0.0))})
-        yield CandidateRecord(
-            f"a fill whose valve is closed after {half:.2g} s, and the pressure until {end:.2g} s",
-            self._of(self.plant, closed, 0.0),
-        )
+        text = f"a fill whose valve is closed after {half:.2g} s, and the pressure until {end:.2g} s"
+        yield CandidateRecord(text, self._of(self.plant, closed, 0.0))
         if isinstance(circuit.fill, Valve):
             throttled = dataclasses.replace(circuit.fill, conductance=THROTTLE * circuit.fill.conductance)
             plant = dataclasses.replace(self.plant, circuit=dataclasses.replace(circuit, fill=throttled))
-            fill = Schedule({"fill": ((0.0, 1.0),)})
-            slow = dataclasses.replace(self, times=self.times / THROTTLE)
-            yield CandidateRecord(
-                "a slow fill through a throttle", slow._of(plant, fill, 0.0), ("circuit.fill.conductance",)
-            )
+            slow = dataclasses.replace(self, times=self.times / THROTTLE)._of(plant, FILL, 0.0)
+            yield CandidateRecord("a slow fill through a throttle", slow, ("circuit.fill.conductance",))
 
     def tank(self, circuit: FillDischarge) -> Iterator[CandidateRecord]:
         """A fill of a rigid tank whose volume is known, at the valve of the muscle; its wall is another one."""
@@ -138,16 +129,14 @@ class _Context:
         coefficients = {EnergyBalance: ("gas.heat_transfer",), WallHeatTransfer: ("gas.coefficient",)}
         changed = coefficients.get(type(plant.gas), ())
         text = f"a fill of a rigid tank of known volume, about {1e6 * volume:.3g} cm3, through the same valve"
-        yield CandidateRecord(text, self._of(plant, Schedule({"fill": ((0.0, 1.0),)}), 0.0), changed, "muscle.")
+        yield CandidateRecord(text, self._of(plant, FILL, 0.0), changed, "muscle.")
 
     def _time_of_half_rise(self, supply: float) -> float:
         """Duration [s] of a choked fill to half of the supply pressure."""
-        circuit, plant = self.plant.circuit, self.plant
+        circuit, ambient = self.plant.circuit, float(self.plant.ambient.pressure)
         assert isinstance(circuit, FillDischarge)
-        volume = float(plant.muscles[0].geometry.volume(0.0))
-        valve = circuit.fill
-        conductance = valve.conductance if isinstance(valve, Valve) else 1e-8
-        ambient = float(plant.ambient.pressure)
+        volume = float(self.plant.muscles[0].geometry.volume(0.0))
+        conductance = circuit.fill.conductance if isinstance(circuit.fill, Valve) else 1e-8
         rate = conductance * (supply + ambient) * 1e5 / volume  # [Pa/s] at the reference pressure of ISO 8778
         return float(np.clip(PULSE_SHARE * supply / rate, 0.02 * self.times[-1], 0.5 * self.times[-1]))
 

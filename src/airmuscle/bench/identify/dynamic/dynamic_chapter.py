@@ -12,9 +12,8 @@ from ....recording.columns import display_scale, displayed
 from ....report.chapter import BY_ROW, Chapter, Plot, Table, TableColumn
 from ...reported import unit_column
 from ..result import MAX_ROWS
-from ..uncertainty_chapter import NORMAL_QUANTILE
 from . import CrossPrediction, DynamicFit, RegulatorFit, describe_cross_predictions
-from .problem import MIN_IMPROVEMENT, DynamicProfile
+from .problem import MIN_IMPROVEMENT, NORMAL_95, DynamicProfile
 
 MAX_OPTIMA = 8
 """Maximum number of optima in a table; the lowest are shown."""
@@ -46,47 +45,34 @@ def _estimates(fit: DynamicFit, title: str, remarks: Sequence[str], cross: Seque
     estimates, residuals = chapter.tables
     if cross:  # the table of the cross-predictions contains the residuals, too
         residuals = dataclasses.replace(residuals, brief=0)
-    tables = [*_cross_table(cross), estimates, *_undetermined_table(fit), *_optima_table(fit), residuals]
+    names = [e.name for e in fit.estimates]
+    rows = {"unknown": names, **{name: fit.correlations[:, i] for i, name in enumerate(names)}}
+    correlations = Table("correlations", "Correlations", rows, shown=False)
+    tables = (_cross_table(cross), estimates, _undetermined_table(fit), _optima_table(fit), residuals, correlations)
     return dataclasses.replace(
-        chapter,
-        title=title,
-        summary=(*([describe_cross_predictions(cross)] if cross else []), *chapter.paragraphs),
-        tables=(*tables, _correlations(fit)),
-        plots=(),
-        notes=(*chapter.notes, *remarks),
+        chapter, title=title, summary=(describe_cross_predictions(cross), *chapter.paragraphs),
+        tables=tuple(table for table in tables if table), plots=(), notes=(*chapter.notes, *remarks),
         references=tuple(cite(fit.plant())),
-    )
+    )  # fmt: skip
 
 
-def _cross_table(cross: Sequence[CrossPrediction]) -> list[Table]:
-    if not cross:
-        return []
+def _cross_table(cross: Sequence[CrossPrediction]) -> Table:
     pairs = [(each, name) for each in cross for name in each.rms]
+    errors, residuals = [each.rms[name] for each, name in pairs], [each.fitted[name] for each, name in pairs]
     columns: dict[str, Any] = {
         "record": [each.record for each, _ in pairs],
         "quantity": [name for _, name in pairs],
-        "rms error, predicted by the others": TableColumn([each.rms[name] for each, name in pairs], BY_ROW,
-                                                     short="rms error"),
-        "rms residual of the joint fit": TableColumn([each.fitted[name] for each, name in pairs], BY_ROW,
-                                                short="joint fit"),
+        "rms error, predicted by the others": TableColumn(errors, BY_ROW, short="rms error"),
+        "rms residual of the joint fit": TableColumn(residuals, BY_ROW, short="joint fit"),
         "unit": unit_column([name for _, name in pairs]),
-    }  # fmt: skip
-    return [
-        Table(
-            "cross",
-            "Each record predicted by the parameters of the others",
-            columns,
-            brief=MAX_ROWS,
-            key="cross-predictions",
-        )
-    ]
+    }
+    title = "Each record predicted by the parameters of the others"
+    return Table("cross", title, columns, brief=MAX_ROWS, key="cross-predictions")
 
 
-def _undetermined_table(fit: DynamicFit) -> list[Table]:
+def _undetermined_table(fit: DynamicFit) -> Table:
     """Return a table of the combinations that the records do not determine, with the experiment that would."""
     undetermined = fit.identifiability.undetermined
-    if not undetermined:
-        return []
     columns: dict[str, Any] = {
         "combination (relative changes)": [
             ", ".join(f"{name} {share:+.2g}" for name, share in each.shares) for each in undetermined
@@ -94,31 +80,20 @@ def _undetermined_table(fit: DynamicFit) -> list[Table]:
         "relative standard deviation": [each.relative_stderr for each in undetermined],
         "experiment that determines it": [each.remedy for each in undetermined],
     }
-    return [Table("not-determined", "Parameter combinations that the records do not determine", columns)]
+    return Table("not-determined", "Parameter combinations that the records do not determine", columns)
 
 
-def _optima_table(fit: DynamicFit) -> list[Table]:
-    """Return a table of the optima of the searches with their estimates, if there are several."""
-    if len(fit.optima) < 2:
-        return []
-    shown = fit.optima[:MAX_OPTIMA]
-    lowest = max(fit.optima[0].cost, 1e-300)
+def _optima_table(fit: DynamicFit) -> Table:
+    """Return a table of the optima of the searches with their estimates; empty unless there are several."""
+    shown = fit.optima[:MAX_OPTIMA] if len(fit.optima) > 1 else ()
+    lowest = max(fit.costs[0], 1e-300)
     columns: dict[str, Any] = {
         "searches": [each.searches for each in shown],
         "rms residual relative to the lowest": [float(np.sqrt(each.cost / lowest)) for each in shown],
     }
     for i, estimate in enumerate(fit.estimates):
         columns[estimate.name] = TableColumn([float(each.values[i]) for each in shown], estimate.unit)
-    return [Table("optima", "Optima of the searches", columns)]
-
-
-def _correlations(fit: DynamicFit) -> Table:
-    names = [e.name for e in fit.estimates]
-    columns = {name: fit.correlations[:, i] for i, name in enumerate(names)}
-    return Table("correlations", "Correlations", {"unknown": names, **columns}, shown=False)
-
-
-_PROFILE_CAPTION = "Increase of the sum of squares; dashed: limit of the 95 % interval."
+    return Table("optima", "Optima of the searches", columns)
 
 
 def _profiles(profiles: Sequence[DynamicProfile]) -> Chapter:
@@ -134,19 +109,19 @@ def _profiles(profiles: Sequence[DynamicProfile]) -> Chapter:
         "increase of the sum of squares": [float(p.cost_increase[k]) for p, k in rows],
         "unit": [p.unit for p, _ in rows],
     }
-    return Chapter(
-        name="profiles",
-        title="Profile likelihood",
-        summary="One parameter is fixed at a series of values and all others are estimated again. An end is missing "
-        "if the sum of squares does not rise enough within these values: the records do not limit the parameter there.",
-        tables=(
-            Table("profiles", "95 % intervals", columns, brief=MAX_ROWS),
-            Table("profile-courses", "Increase of the sum of squares [residual variances]", courses, shown=False),
-        ),
-        plots=(Plot("profiles", _PROFILE_CAPTION, partial(_profile_figure, profiles)),),
-        notes=tuple(f"{p.name}: a better fit was found on the profile: fit again from there" for p in profiles
-                    if p.cost_increase.min() < -MIN_IMPROVEMENT),
-    )  # fmt: skip
+    summary = (
+        "One parameter is fixed at a series of values and all others are estimated again. An end is missing if the sum "
+        "of squares does not rise enough within these values: the records do not limit the parameter there."
+    )
+    tables = (
+        Table("profiles", "95 % intervals", columns, brief=MAX_ROWS),
+        Table("profile-courses", "Increase of the sum of squares [residual variances]", courses, shown=False),
+    )
+    caption = "Increase of the sum of squares; dashed: limit of the 95 % interval."
+    plots = (Plot("profiles", caption, partial(_profile_figure, profiles)),)
+    better = [p.name for p in profiles if p.cost_increase.min() < -MIN_IMPROVEMENT]
+    notes = tuple(f"{name}: a better fit was found on the profile: fit again from there" for name in better)
+    return Chapter("profiles", "Profile likelihood", summary, tables=tables, plots=plots, notes=notes)
 
 
 def _profile_figure(profiles: Sequence[DynamicProfile]) -> Any:
@@ -155,7 +130,7 @@ def _profile_figure(profiles: Sequence[DynamicProfile]) -> Any:
     figure, axes = new_figure(rows, columns, width=2.5 * columns + 0.6, height=2.4 * rows + 0.4, squeeze=False)
     for axis, profile in zip(axes.ravel(), profiles, strict=False):
         axis.plot(profile.values, profile.cost_increase, "o-", color=BLUE, markersize=3)
-        axis.axhline(NORMAL_QUANTILE**2, color=RED, linewidth=0.8, linestyle="--")
+        axis.axhline(NORMAL_95**2, color=RED, linewidth=0.8, linestyle="--")
         axis.set_title(profile.name, fontsize=8)
         axis.set(
             xlabel="" if profile.unit == "1" else f"[{profile.unit}]",
@@ -179,15 +154,11 @@ def _record(fit: DynamicFit, number: int) -> Chapter:
         columns[f"modelled {name}"] = TableColumn(modelled[name], unit)
         columns[f"residual of {name}"] = TableColumn(errors[name], unit)
     rms = ", ".join(f"{name} {displayed(name, fit.rms(name, number))}" for name in course.names)
+    summary = f"Rms residual: {rms}. The run begins at {course.start_time(fit.values):.4g} s of the record's time."
     stem, caption = f"record-{number + 1}", f"{origin}: measured and modelled values, and residuals."
-    return Chapter(
-        name=stem,
-        title=f"Record {number + 1}: {origin}",
-        summary=f"Rms residual: {rms}. The run begins at {course.start_time(fit.values):.4g} s of the record's time.",
-        tables=(Table(stem, "Measured and modelled values", columns, series=True),),
-        plots=(Plot(stem, caption, partial(_record_figure, fit, number)),),
-        brief=False,
-    )
+    table = Table(stem, "Measured and modelled values", columns, series=True)
+    plot, title = Plot(stem, caption, partial(_record_figure, fit, number)), f"Record {number + 1}: {origin}"
+    return Chapter(stem, title, summary, tables=(table,), plots=(plot,), brief=False)
 
 
 def _record_figure(fit: DynamicFit, number: int) -> Any:

@@ -153,13 +153,13 @@ def make_unknowns(
                 unknowns.append(_record_unknown(experiment, target, i))
             else:
                 unknowns.append(_plant_unknown(experiment.plant or plant, target, i, bounds))
-    names = [u.name for u in unknowns]
     if not unknowns:
         example = Hint("To name one, for example", "free", ("circuit.fill.conductance",))
         raise ParameterError("no parameter is free; at least one is required.", hint=example)
     for name in bounds:
         if name not in {u.name.partition(" of record")[0] for u in unknowns}:
-            raise ParameterError(f"bounds are given for '{name}', which is not free; free are {', '.join(names)}.")
+            free = ", ".join(u.name for u in unknowns)
+            raise ParameterError(f"bounds are given for '{name}', which is not free; free are {free}.")
     return tuple(unknowns)
 
 
@@ -224,10 +224,8 @@ def with_command_instants(command: InputSignal, instants: Mapping[float, float])
     return Schedule(changes)
 
 
-PRESSURE_TOLERANCE = 1e-3
-"""Relative difference of two ambient pressures that is neglected (chosen)."""
-TEMPERATURE_TOLERANCE = 1.0
-"""Difference of two ambient temperatures that is neglected [K] (chosen)."""
+PRESSURE_TOLERANCE, TEMPERATURE_TOLERANCE = 1e-3, 1.0
+"""Relative difference of two ambient pressures, and difference of two temperatures [K], that are neglected (chosen)."""
 CONSTANTS = {"ambient": "pressure", "ambient_temperature": "temperature"}
 """The constants of a recording by the field of `Ambient`."""
 
@@ -248,17 +246,17 @@ def check_ambient(plant: System, experiment: Experiment) -> None:
     if not isinstance(own, Ambient):
         return
     stated, origin = stated_ambient(experiment.recording, own), experiment.recording.origin
-    difference = ""
     if abs(stated.pressure - own.pressure) > PRESSURE_TOLERANCE * own.pressure:
-        pressures = [f"{each.pressure / 1e3:.4g} kPa" for each in (stated, own)]
-        difference = f"an ambient pressure of {pressures[0]}, but its plant has {pressures[1]}"
+        name, values = "pressure", [f"{each.pressure / 1e3:.4g} kPa" for each in (stated, own)]
     elif abs(stated.temperature - own.temperature) > TEMPERATURE_TOLERANCE:
-        difference = f"an ambient temperature of {stated.temperature:.4g} K, but its plant has {own.temperature:.4g} K"
-    if difference:
-        raise ParameterError(
-            f"{origin} states {difference}. The mass flow and the heat depend on it: give the plant of this record the "
-            "ambient air of the record, Plant(..., ambient=Ambient(...)), or correct the record."
-        )
+        name, values = "temperature", [f"{each.temperature:.4g} K" for each in (stated, own)]
+    else:
+        return
+    raise ParameterError(
+        f"{origin} states an ambient {name} of {values[0]}, but its plant has {values[1]}. The mass flow and the heat "
+        "depend on it: give the plant of this record the ambient air of the record, Plant(..., ambient=Ambient(...)), "
+        "or correct the record."
+    )
 
 
 def describe_other_ambient(plant: System, experiment: Experiment) -> list[str]:
@@ -278,12 +276,10 @@ def has_standard_ambient(plant: System) -> bool:
 def describe_ambient(recordings: Sequence[Recording]) -> list[str]:
     """What is supposed of the ambient air of records that state no pressure, as sentences."""
     silent = [recording.origin for recording in recordings if "ambient" not in recording.constants]
-    if not silent:
-        return []
-    standard = f"{Ambient().pressure / 1e3:.4g} kPa"
     some = f"{', '.join(silent)} {'does' if len(silent) == 1 else 'do'} not state"
-    which = "No record states" if len(silent) == len(recordings) else some
-    return [
-        f"{which} the ambient pressure: {standard} are supposed; an error of 5 % of it changes a fitted heat "
-        "transfer by about 20 %."
-    ]
+    text = (
+        f"{'No record states' if len(silent) == len(recordings) else some} the ambient pressure: "
+        f"{Ambient().pressure / 1e3:.4g} kPa are supposed; an error of 5 % of it changes a fitted heat transfer by "
+        "about 20 %."
+    )
+    return [text] if silent else []

@@ -32,10 +32,8 @@ from .result import DynamicFit
 
 MAX_AUTOCORRELATION = 0.3
 """Lag-1 autocorrelation of the residuals above which they are attributed to model error, not noise; chosen."""
-
 SEGMENTS = (1, 2, 3, 4, 5)
 """Numbers of segments of a tube that are compared (chosen)."""
-
 SCREENING_RUNS, SCREENING_RATIO = 20, 1000.0
 """After this many simulations a search whose sum of squares exceeds the lowest one by this factor is abandoned; chosen.
 
@@ -76,7 +74,13 @@ def fit_dynamic(
     method = method or Rodas4()
     models = tuple(RecordModel(plant, e, i, unknowns, observed, method) for i, e in enumerate(experiments))
     problem = DynamicFitProblem(models, unknowns, np.array(list(observed.values()), dtype=float))
-    _check_row_count(problem)
+    count = count_readings(models)
+    if count <= len(unknowns):
+        raise IdentificationError(
+            f"{count} observations cannot determine {len(unknowns)} unknowns. Give more rows, or free fewer parameters."
+        )
+    if not (problem.sensor_deviations > 0).all():
+        raise ParameterError("the standard deviation of an observed quantity must be positive, in SI.")
     check_whole("fit_dynamic", "seed", seed, 0)
     outcomes = sorted(_solve_all(problem, initial_guesses(problem, starts, seed)), key=lambda outcome: outcome[1])
     if not np.isfinite(outcomes[0][1]):
@@ -138,17 +142,6 @@ def _solve_all(problem: DynamicFitProblem, guesses: Sequence[Array]) -> list[tup
         return [(search.x, search.cost) for search in searches]
     finally:
         pool.shutdown(cancel_futures=True)
-
-
-def _check_row_count(problem: DynamicFitProblem) -> None:
-    count = count_readings(problem.record_models)
-    if count <= len(problem.unknowns):
-        raise IdentificationError(
-            f"{count} observations cannot determine {len(problem.unknowns)} unknowns. Give more rows, or free fewer "
-            "parameters."
-        )
-    if not (problem.sensor_deviations > 0).all():
-        raise ParameterError("the standard deviation of an observed quantity must be positive, in SI.")
 
 
 def initial_guesses(problem: DynamicFitProblem, count: int, seed: int) -> list[Array]:
@@ -257,13 +250,14 @@ def cross_predict(fit: DynamicFit, refit: Callable[[Sequence[int]], DynamicFit])
             part = refit([k for k in range(count) if k != i])
         except AirmuscleError:
             continue
-        names = fit.problem.record_models[i].names
-        common = {e.name: e.value for e in part.estimates if OF_RECORD not in e.name}
+        model, common = (
+            fit.problem.record_models[i],
+            {e.name: e.value for e in part.estimates if OF_RECORD not in e.name},
+        )
         estimates = tuple(dataclasses.replace(e, value=common.get(e.name, e.value)) for e in fit.estimates)
         other = dataclasses.replace(fit, estimates=estimates)
-        origin = fit.problem.record_models[i].experiment.recording.origin
-        rms, fitted = ({name: each.rms(name, i) for name in names} for each in (other, fit))
-        predictions.append(CrossPrediction(origin, rms, fitted, common))
+        rms, fitted = ({name: each.rms(name, i) for name in model.names} for each in (other, fit))
+        predictions.append(CrossPrediction(model.experiment.recording.origin, rms, fitted, common))
     return tuple(predictions)
 
 
@@ -272,12 +266,10 @@ def describe_cross_predictions(predictions: Sequence[CrossPrediction]) -> str:
     if not predictions:
         return ""
     worst = max(predictions, key=lambda each: each.ratio)
+    times = f"{worst.ratio:.3g} times the residual of the joint fit"
     if worst.ratio <= MAX_RATIO:
-        return (
-            f"The records predict each other: the maximum rms error is {worst.ratio:.3g} times the residual of the "
-            "joint fit."
-        )
+        return f"The records predict each other: the maximum rms error is {times}."
     return (
-        f"The records do not predict each other: the rms error of {worst.record} is {worst.ratio:.3g} times the "
-        "residual of the joint fit, so that the parameters describe the records but do not identify the plant."
+        f"The records do not predict each other: the rms error of {worst.record} is {times}, so that the parameters "
+        "describe the records but do not identify the plant."
     )

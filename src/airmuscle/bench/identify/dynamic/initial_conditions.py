@@ -64,12 +64,11 @@ class InitialConditions:
 
     def check_plant(self, system: System, values: Mapping[str, Any]) -> None:
         """Raise ParameterError for a name that the system lacks, or where the number of conditions is wrong."""
-        names = [s.name for s in system.states]
-        for name in (*self.known, *self.stationary, *(n for pair in self.equal for n in pair), *self.settled):
-            allowed = names if name in (*self.stationary, *self.settled) else values
+        names, of_states = [s.name for s in system.states], (*self.stationary, *self.settled)
+        for name in (*self.known, *of_states, *itertools.chain(*self.equal)):
+            allowed = names if name in of_states else values
             check_known("the initial conditions name", name, allowed, "the system has")
-        count = len(self.known) + len(self.stationary) + len(self.equal) + len(self.settled)
-        if count != len(names) or set(self.guess) != set(names):
+        if len(self.known) + len(of_states) + len(self.equal) != len(names) or set(self.guess) != set(names):
             raise ParameterError(
                 f"the initial conditions must give as many conditions as there are states ({', '.join(names)}), and a "
                 f"guess of each state; known are {', '.join(self.known) or 'none'}, stationary are "
@@ -219,17 +218,11 @@ def _split(segments: PiecewiseLinear, rows: Array, switches: Mapping[float, int]
     cuts = [i + 1 for i, end in enumerate(inner) if end in switches]
     if not cuts:
         return (CommandInterval(0.0, segments, rows, None),)
-    begins = [0.0, *(inner[i - 1] for i in cuts)]
-    first_rows = [0, *np.searchsorted(rows, begins[1:]).tolist(), rows.size]
-    edges = [0, *cuts, segments.ends.size]
-    return tuple(
-        CommandInterval(
-            begin,
-            PiecewiseLinear(segments.ends[a:b], segments.values[a:b], segments.slopes[a:b]),
-            rows[first:last],
-            switches.get(begin) if number else None,
-        )
-        for number, (begin, (a, b), (first, last)) in enumerate(
-            zip(begins, itertools.pairwise(edges), itertools.pairwise(first_rows), strict=True)
-        )
-    )
+    begins = [inner[i - 1] for i in cuts]
+    first_rows = [0, *np.searchsorted(rows, begins).tolist(), rows.size]
+    columns, intervals = [None, *(switches[begin] for begin in begins)], []
+    parts = itertools.pairwise([0, *cuts, segments.ends.size]), itertools.pairwise(first_rows)
+    for begin, column, (a, b), (first, last) in zip([0.0, *begins], columns, *parts, strict=True):
+        part = PiecewiseLinear(segments.ends[a:b], segments.values[a:b], segments.slopes[a:b])
+        intervals.append(CommandInterval(begin, part, rows[first:last], column))
+    return tuple(intervals)

@@ -93,40 +93,33 @@ class DynamicFitProblem:
         return solution, search.cost
 
     def search(self, scaled: Array, free: Sequence[int]) -> LevenbergMarquardt:
-        """The search over the free unknowns from an initial guess (P,), which can be interrupted and continued."""
-        (low, high), residuals = self.bounds, _GuardedResiduals(self, scaled, free)
-        return LevenbergMarquardt(residuals, scaled[free], low[free], high[free])
+        """The search over the free unknowns from an initial guess (P,), which can be interrupted and continued.
 
+        Simulations with far more steps than the best one so far, which occur far from physical parameters, are aborted.
+        """
+        min_cost, max_steps, tried = np.inf, MAX_STEPS, scaled.copy()
 
-class _GuardedResiduals:
-    """Residuals of a problem as a function of its free unknowns, None where they cannot be computed.
+        def guarded(x: Array) -> tuple[Array, Array] | None:
+            nonlocal min_cost, max_steps
+            tried[free] = x
+            try:
+                residuals, jacobian, steps = self.run(tried, max_steps)
+            except AirmuscleError:
+                return None
+            cost = float(residuals @ residuals)
+            if cost < min_cost:
+                min_cost = cost
+                max_steps = int(min(MAX_STEPS, max(MIN_STEP_BUDGET, STEP_BUDGET_FACTOR * steps)))
+            return residuals, jacobian if len(free) == scaled.size else jacobian[:, free]
 
-    This includes simulations with far more steps than the best one so far, which occur far from physical parameters.
-    """
-
-    def __init__(self, problem: DynamicFitProblem, scaled: Array, free: Sequence[int]) -> None:
-        self._problem, self._scaled, self._free = problem, scaled, free
-        self._min_cost, self._max_steps = np.inf, MAX_STEPS
-
-    def __call__(self, x: Array) -> tuple[Array, Array] | None:
-        problem, scaled = self._problem, self._scaled.copy()
-        scaled[self._free] = x
-        try:
-            residuals, jacobian, steps = problem.run(scaled, self._max_steps)
-        except AirmuscleError:
-            return None
-        cost = float(residuals @ residuals)
-        if cost < self._min_cost:
-            self._min_cost = cost
-            self._max_steps = int(min(MAX_STEPS, max(MIN_STEP_BUDGET, STEP_BUDGET_FACTOR * steps)))
-        return residuals, jacobian if len(self._free) == scaled.size else jacobian[:, self._free]
+        low, high = self.bounds
+        return LevenbergMarquardt(guarded, scaled[free], low[free], high[free])
 
 
 NORMAL_95 = 1.96
 """Square root of the cost increase, in residual variances, at the limits of a 95 % confidence interval."""
 MAX_STANDARD_ERRORS = 4.0
 """Range of a profile in standard errors to either side, at most twice the estimate of a parameter."""
-
 MIN_IMPROVEMENT = 0.1
 """Reduction of the sum of squares, in residual variances, that shows that the fit was not converged; chosen."""
 
@@ -162,17 +155,12 @@ class DynamicProfile:
 
     def __str__(self) -> str:
         low, high = (f"{end:.4g}" if np.isfinite(end) else "unbounded" for end in self.interval)
-        rows = "".join(f"\n  {v:.4g}: {c:.3g}" for v, c in zip(self.values, self.cost_increase, strict=True))
-        better = (
-            "\n  a better fit was found on the profile: fit again from there"
-            if self.cost_increase.min() < -MIN_IMPROVEMENT
-            else ""
-        )
+        rows = [f"\n  {v:.4g}: {c:.3g}" for v, c in zip(self.values, self.cost_increase, strict=True)]
+        if self.cost_increase.min() < -MIN_IMPROVEMENT:
+            rows.append("\n  a better fit was found on the profile: fit again from there")
         unit = "" if self.unit == "1" else f" [{self.unit}]"
-        return (
-            f"{self.name}{unit}, 95 % confidence interval {low} to {high}; increase of the sum of squares in residual "
-            f"variances:{rows}{better}"
-        )
+        text = "increase of the sum of squares in residual variances"
+        return f"{self.name}{unit}, 95 % confidence interval {low} to {high}; {text}:{''.join(rows)}"
 
 
 def compute_profile(

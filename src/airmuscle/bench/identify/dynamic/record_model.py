@@ -83,16 +83,11 @@ class RecordModel:
 
     def initial_state(self, values: Array) -> tuple[Array, Array]:
         """The initial state (n,) and its derivatives by every sensitivity column (n, K)."""
-        known = self._known.copy()
+        known, conditions = self._known.copy(), self.experiment.initial_conditions
         for j, i in self._initial_values:
             known[i] = values[self.sensitivity_indices[j]]
         state, by_known, by_leaf = solve_initial_state(
-            self._conditions,
-            self.experiment.initial_conditions,
-            self.leaves(values),
-            known,
-            self._guess,
-            self._state_nominal,
+            self._conditions, conditions, self.leaves(values), known, self._guess, self._state_nominal
         )
         derivatives = by_leaf @ self._leaf_by_column
         for j, i in self._initial_values:

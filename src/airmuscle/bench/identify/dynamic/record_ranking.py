@@ -2,7 +2,7 @@
 
 import dataclasses
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -28,8 +28,7 @@ MIN_GAIN = 1.5
 (chosen); a repeat reduces it by 1.41."""
 
 
-@dataclasses.dataclass(frozen=True)
-class PairPrecision:
+class PairPrecision(NamedTuple):
     """Relative standard errors of two parameters and their correlation."""
 
     standard_errors: tuple[float, float]
@@ -64,20 +63,19 @@ class RecordRanking(Reported):
     @property
     def verdict(self) -> str:
         """What the records determine now, and which record would separate the pair, as sentences."""
-        first, second = self.pair
-        now = (
-            f"{first} and {second} have a correlation of {self.now.correlation:.2f} and relative standard errors of "
-            f"{_percent(self.now.standard_errors[0])} and {_percent(self.now.standard_errors[1])}."
-        )
         best = self.ranking[0]
-        if best.gain < MIN_GAIN:
-            return f"{now} None of the {len(self.ranking)} compared records would separate them."
-        after = best.precision
-        return (
-            f"{now} To separate them, measure {best.description}: with it, the correlation is expected to be "
-            f"{after.correlation:.2f} and the relative standard errors {_percent(after.standard_errors[0])} and "
-            f"{_percent(after.standard_errors[1])}."
+        before, after = (
+            [f"{each.correlation:.2f}", " and ".join(f"{100.0 * error:.2g} %" for error in each.standard_errors)]
+            for each in (self.now, best.precision)
         )
+        now = f"have a correlation of {before[0]} and relative standard errors of {before[1]}."
+        then = f"None of the {len(self.ranking)} compared records would separate them."
+        if best.gain >= MIN_GAIN:
+            then = (
+                f"To separate them, measure {best.description}: with it, the correlation is expected to be {after[0]} "
+                f"and the relative standard errors {after[1]}."
+            )
+        return f"{' and '.join(self.pair)} {now} {then}"
 
     def chapter(self) -> Chapter:
         """The description of the ranking: verdict, and gain, correlation and standard errors with each record."""
@@ -91,13 +89,9 @@ class RecordRanking(Reported):
             errors = [each.standard_errors[i] for each in precisions]
             columns[f"standard error of {name}"] = TableColumn(errors, "1", "%", digits=3, short=f"error of {i + 1}")
         title = f"Expected precision of 1, {self.pair[0]}, and 2, {self.pair[1]}, with one further record"
-        return Chapter(
-            name="ranking",
-            title="Next record",
-            summary=self.verdict,
-            tables=(Table("ranking", title, columns, brief=len(precisions)),),
-            notes=tuple(f"left out: {reason}" for reason in self.failed),
-        )
+        tables = (Table("ranking", title, columns, brief=len(precisions)),)
+        notes = tuple(f"left out: {reason}" for reason in self.failed)
+        return Chapter("ranking", "Next record", self.verdict, tables=tables, notes=notes)
 
 
 def rank_records(fit: DynamicFit, pair: tuple[str, str] | None = None) -> RecordRanking:
@@ -131,37 +125,28 @@ def rank_records(fit: DynamicFit, pair: tuple[str, str] | None = None) -> Record
     return RecordRanking(chosen, now, tuple(sorted(ranked, key=lambda each: -each.gain)), tuple(failed))
 
 
-def _percent(value: float) -> str:
-    return f"{100.0 * value:.2g} %"
-
-
-def _relative(fit: DynamicFit, index: int) -> float:
-    """The magnitude by which an unknown is made relative: the estimate of a parameter, or its scale if that is zero;
-    the margin of a start time or an initial value, whose zero is arbitrary."""
-    unknown = fit.unknowns[index]
-    return (abs(fit.estimates[index].value) if unknown.paths else 0.0) or unknown.scale
-
-
 def _fit_information(fit: DynamicFit, common: Sequence[int]) -> Array:
-    """The Fisher information of the relative common unknowns from the records of the fit, with the prior."""
+    """The Fisher information of the relative common unknowns from the records of the fit, with the prior.
+
+    A parameter is relative to its estimate, or to its scale if that is zero; a start time or an initial value, whose
+    zero is arbitrary, to its margin.
+    """
     _, jacobian = fit.problem.residuals(fit.problem.scaled(fit.values))
-    factors = np.array([_relative(fit, i) for i in range(len(fit.unknowns))]) / fit.problem.scales
+    pairs = zip(fit.estimates, fit.unknowns, strict=True)
+    magnitudes = [(abs(estimate.value) if unknown.paths else 0.0) or unknown.scale for estimate, unknown in pairs]
+    factors = np.array(magnitudes) / fit.problem.scales
     matrix = jacobian * factors / max(fit.residual_std, 1e-12)
     others = [i for i, e in enumerate(fit.estimates) if i not in common and not e.on_bound]
     return _without(matrix[:, list(common)], matrix[:, others]) + np.eye(len(common)) / PRIOR**2
 
 
-def _without(matrix: Array, nuisance: Array, prior: Array | None = None) -> Array:
-    """The information of the columns of a matrix, with the columns of nuisance unknowns estimated as well.
-
-    `prior` are their standard deviations in the unit of the columns; `PRIOR` by default.
-    """
-    own = matrix.T @ matrix
+def _without(matrix: Array, nuisance: Array, prior: Array | float = PRIOR) -> Array:
+    """The information of the columns of a matrix, with the columns of nuisance unknowns estimated as well; `prior` are
+    their standard deviations in the unit of the columns."""
+    own, cross = matrix.T @ matrix, matrix.T @ nuisance
     if not nuisance.shape[1]:
         return np.asarray(own)
-    deviations = np.full(nuisance.shape[1], PRIOR) if prior is None else prior
-    cross = matrix.T @ nuisance
-    weight = nuisance.T @ nuisance + np.diag(1.0 / deviations**2)
+    weight = nuisance.T @ nuisance + np.diag(1.0 / np.broadcast_to(prior, nuisance.shape[1]) ** 2)
     return np.asarray(own - cross @ np.linalg.solve(weight, cross.T))
 
 

@@ -148,7 +148,11 @@ class _Search:
         records = [_experiment(plant, each, zero) for each, zero in zip(self.recordings, zeros, strict=True)]
         limits = {path: LIMITS[name] for path in self.paths if (name := path.removeprefix("circuit.")) in LIMITS}
         fit = fit_dynamic(plant, records, free=self.paths, observed={"pressure": self.noise}, bounds=limits)
-        return RegulatorFit(fit, zeros, tuple(_remarks(fit)))
+        weak = [name for each in fit.identifiability.undetermined for name, _ in each.shares]
+        weak += [estimate.name for estimate in fit.estimates if estimate.on_bound]
+        commands = {name: COMMANDS[name.removeprefix("circuit.")] for name in weak}
+        remarks = tuple(f"{name} is not determined; give {command}" for name, command in commands.items())
+        return RegulatorFit(fit, zeros, remarks)
 
     def refined(self, best: RegulatorFit, rng: np.random.Generator) -> RegulatorFit:
         """The best of repetitions, the first of which only corrects the zeros of the sensors."""
@@ -166,13 +170,12 @@ class _Search:
 
 def _perturbed(plant: Plant, paths: Sequence[str], deviations: Array) -> Plant:
     """A plant with the parameters of these paths multiplied by exp(deviation), within their bounds."""
-    factors = dict(zip(paths, np.exp(deviations).tolist(), strict=True))
-    return tree.with_parameters(plant, [_scaled(leaf, factors.get(leaf.path, 1.0)) for leaf in tree.leaves(plant)])
-
-
-def _scaled(leaf: tree.Leaf, factor: float) -> float:
-    low, high = LIMITS.get(leaf.path.removeprefix("circuit."), leaf.declared.bounds)
-    return float(leaf.value) if factor == 1.0 else float(np.clip(leaf.value * factor, low, high))
+    factors, values = dict(zip(paths, np.exp(deviations).tolist(), strict=True)), []
+    for leaf in tree.leaves(plant):
+        low, high = LIMITS.get(leaf.path.removeprefix("circuit."), leaf.declared.bounds)
+        factor = factors.get(leaf.path, 1.0)
+        values.append(float(leaf.value if factor == 1.0 else np.clip(leaf.value * factor, low, high)))
+    return tree.with_parameters(plant, values)
 
 
 def _check_excitation(recording: Recording, noise: float) -> None:
@@ -209,31 +212,21 @@ def _settled_difference(recording: Recording) -> float:
 def _initial_regulator(recordings: Sequence[Recording], supply_pressure: float, volume: float) -> PressureRegulator:
     """A regulator whose orifices give about the greatest slopes of the records; the rest is chosen."""
     slopes = np.concatenate([np.gradient(r["pressure"], r["time"]) for r in recordings])
-    rise, fall = np.percentile(slopes, 99.5), -np.percentile(slopes, 0.5)
+    rise, fall = float(np.percentile(slopes, 99.5)), -float(np.percentile(slopes, 0.5))
     top = max(float(r["pressure"].max()) for r in recordings) + 1e5
-    fill = max(2.0 * volume * float(rise) / (1e5 * (supply_pressure + 1e5)), 1e-12)
-    discharge = max(2.0 * volume * float(fall) / (1e5 * top), 1e-12)
-    return PressureRegulator(
-        Supply(supply_pressure), Valve(fill, 0.2), Valve(discharge, 0.2), 2.0 * float(rise) / GAIN, 0.04, 0.2,
-        leak=1e-3, integral_rate=0.1,
-    )  # fmt: skip
+    fill = Valve(max(2.0 * volume * rise / (1e5 * (supply_pressure + 1e5)), 1e-12), 0.2)
+    discharge = Valve(max(2.0 * volume * fall / (1e5 * top), 1e-12), 0.2)
+    supply, band = Supply(supply_pressure), 2.0 * rise / GAIN
+    return PressureRegulator(supply, fill, discharge, band, 0.04, 0.2, leak=1e-3, integral_rate=0.1)
 
 
 def _experiment(plant: Plant, recording: Recording, zero: float) -> Experiment:
     times, values = _changes(recording)
     command = Schedule({"setpoint": tuple(zip(times.tolist(), np.maximum(values, 0.0).tolist(), strict=True))})
-    pressure = recording["pressure"] - zero
-    shifted = Recording({**recording.columns, "pressure": pressure}, recording.origin)
+    shifted = Recording({**recording.columns, "pressure": recording["pressure"] - zero}, recording.origin)
     level = max(float(recording["setpoint"][0]), 0.0)
     guess = plant.state_at(pressure=level)
     resting = tuple(name for name in guess if name.endswith("_position"))
     known = {name: value for name, value in guess.items() if name not in (*resting, "air_mass")}
     start = InitialConditions({"pressure": level, **known}, guess, resting)
     return Experiment(shifted, command, start, float(recording["time"][0]))
-
-
-def _remarks(fit: DynamicFit) -> list[str]:
-    """What the records do not determine, each parameter once, with the command that determines it."""
-    weak = [name for each in fit.identifiability.undetermined for name, _ in each.shares]
-    weak += [estimate.name for estimate in fit.estimates if estimate.on_bound]
-    return [f"{name} is not determined; give {COMMANDS[name.removeprefix('circuit.')]}" for name in dict.fromkeys(weak)]

@@ -14,10 +14,8 @@ import numpy.typing as npt
 from ....core import Array, counted
 from ..result import Estimate
 
-SAME_COST = 1e-3
-"""Relative difference of the sums of squares of one optimum (chosen)."""
-SAME_VALUE = 0.02
-"""Relative difference of the unknowns of one optimum (chosen)."""
+SAME_COST, SAME_VALUE = 1e-3, 0.02
+"""Relative difference of the sums of squares, and of the unknowns, of one optimum (chosen)."""
 SIMILAR_RMS = 0.05
 """Relative increase of the rms residual up to which another optimum is named (chosen)."""
 MIN_STANDARD_ERRORS = 3.0
@@ -30,11 +28,8 @@ BOUND_SHIFT = 0.1
 MIN_RECORDS, MAX_SCATTER = 3, 2.0
 """Records from which their scatter is known, and its ratio to the standard error of the rows from which it counts
 (chosen): with three records, the scatter is that far above a true standard error in about 2 % of cases."""
-MIN_SEARCHES = 3
-"""Number of searches from which a single one at the optimum is named (chosen)."""
-MAX_NAMES = 3
-"""Maximum number of unknowns in a sentence."""
-
+MIN_SEARCHES, MAX_NAMES = 3, 3
+"""Number of searches from which a single one at the optimum is named; number of unknowns in a sentence (chosen)."""
 CONSEQUENCES: tuple[tuple[tuple[str, ...], str], ...] = (
     (("critical_ratio",),
      "The flow law does not describe the records near equal pressures, or they do not reach that range; the "
@@ -68,9 +63,7 @@ def distinct_optima(values: Array, costs: Array, scales: Array, margins: Array) 
     for parameters. Searches without a result are left out.
     """
     optima: list[Optimum] = []
-    for point, cost in zip(values, costs, strict=True):
-        if not np.isfinite(cost):
-            continue
+    for point, cost in zip(values[np.isfinite(costs)], costs[np.isfinite(costs)], strict=True):
         for i, optimum in enumerate(optima):
             reference = np.maximum(np.abs(optimum.values), 1e-3 * scales)
             near = np.abs(point - optimum.values) <= SAME_VALUE * np.where(np.isnan(margins), reference, margins)
@@ -98,14 +91,13 @@ def describe_optima(
     for other in optima[1:]:
         increase = float(np.sqrt(other.cost / max(best.cost, 1e-300))) - 1.0
         differences = _differences(other, estimates, _magnitudes(estimates, margins))
-        if increase > SIMILAR_RMS or not differences:
-            continue
-        notes.append(
-            f"the problem has several optima: {counted(other.searches, 'search')} of {costs.size} ended where the rms "
-            f"residual is only {100 * increase:.1f} % greater, with {', '.join(differences)}; the standard errors "
-            "describe one optimum and do not contain this difference"
-        )
-        break
+        if increase <= SIMILAR_RMS and differences:
+            notes.append(
+                f"the problem has several optima: {counted(other.searches, 'search')} of {costs.size} ended where the "
+                f"rms residual is only {100 * increase:.1f} % greater, with {', '.join(differences)}; the standard "
+                "errors describe one optimum and do not contain this difference"
+            )
+            break
     if searches_at_lowest(costs) == 1 and costs.size >= MIN_SEARCHES:
         notes.append(
             f"only one of {costs.size} searches reached this optimum, so a lower one may exist and the standard errors "
@@ -123,11 +115,11 @@ def _magnitudes(estimates: Sequence[Estimate], margins: Array) -> Array:
 def _differences(other: Optimum, estimates: Sequence[Estimate], magnitudes: Array) -> list[str]:
     """The unknowns that differ by more than their standard errors contain, the largest relative difference first."""
     differences = []
-    for estimate, value, magnitude in zip(estimates, other.values, magnitudes, strict=True):
-        change = abs(value - estimate.value)
-        contained = MIN_STANDARD_ERRORS * estimate.stderr if np.isfinite(estimate.stderr) else 0.0
+    for e, value, magnitude in zip(estimates, other.values, magnitudes, strict=True):
+        change = abs(value - e.value)
+        contained = MIN_STANDARD_ERRORS * e.stderr if np.isfinite(e.stderr) else 0.0
         if change > contained and change / magnitude > SAME_VALUE:
-            text = f"{estimate.name} {value:.3g} instead of {estimate.value:.3g} {estimate.display_unit}".rstrip()
+            text = f"{e.name} {value:.3g} instead of {e.value:.3g} {e.display_unit}".rstrip()
             differences.append((change / magnitude, text))
     return _greatest(differences)
 
@@ -175,9 +167,8 @@ def describe_bounds(
         shifts = -inverse @ (jacobian[:, inner].T @ jacobian[:, k]) * scales[inner] / scales[k]
         change = BOUND_SHIFT * (abs(bound.value - origins[k]) or scales[k])
         moved = _moved([estimates[int(i)] for i in inner], shifts * change)
-        relative, absolute = f"{100 * BOUND_SHIFT:.0f} % greater", f"{change:.2g} {bound.display_unit} greater"
-        greater = absolute if origins[k] else relative
-        effect = f" If the bound were {greater}, it would move {', '.join(moved)}." if moved else ""
+        greater = f"{change:.2g} {bound.display_unit}" if origins[k] else f"{100 * BOUND_SHIFT:.0f} %"
+        effect = f" If the bound were {greater} greater, it would move {', '.join(moved)}." if moved else ""
         value = f"{bound.value:.4g} {bound.display_unit}".rstrip()
         notes.append(
             f"{bound.name} is on its bound, {value}, and has no standard error; the standard errors of the others hold "
@@ -188,13 +179,14 @@ def describe_bounds(
 
 def _moved(estimates: Sequence[Estimate], shifts: Array) -> list[str]:
     """The unknowns that a shift of a bound moves by more than a standard error, the largest relative change first."""
-    described_shifts = []
-    for estimate, shift in zip(estimates, shifts, strict=True):
-        if np.isfinite(shift) and abs(shift) > estimate.stderr:  # false for one without a standard error
-            by = f"{estimate.name} by {shift:+.2g} {estimate.display_unit}".rstrip()
-            text = f"{by} ({abs(shift) / estimate.stderr:.2g} standard errors)"
-            described_shifts.append((abs(shift) / max(abs(estimate.value), 1e-300), text))
-    return _greatest(described_shifts)
+    moved = []
+    for e, shift in zip(estimates, shifts, strict=True):
+        if np.isfinite(shift) and abs(shift) > e.stderr:  # false for one without a standard error
+            by = f"{e.name} by {shift:+.2g} {e.display_unit}".rstrip()
+            moved.append(
+                (abs(shift) / max(abs(e.value), 1e-300), f"{by} ({abs(shift) / e.stderr:.2g} standard errors)")
+            )
+    return _greatest(moved)
 
 
 def _consequence(name: str) -> str:

@@ -22,30 +22,6 @@ from .problem import DynamicFitProblem, DynamicProfile, compute_profile
 from .reliability import Optimum, scatter_of_records, searches_at_lowest
 
 
-def plot_record(measured: Recording, modelled: Recording, names: Sequence[str], ax: Any = None) -> Any:
-    """Plot the observed quantities of a record, measured and modelled, one panel each.
-
-    `ax` is an Axes, or a sequence of one for each quantity, and is returned; without it a figure is returned.
-    Raises ParameterError if `ax` contains too few Axes.
-    """
-    figure = None
-    if ax is None:
-        figure, axes = new_figure(len(names), 1, height=0.6 + 1.7 * len(names), sharex=True, squeeze=False)
-        panels = list(axes[:, 0])
-        figure.suptitle(measured.origin, fontsize=9)
-    else:
-        panels = given_axes(ax, len(names), "plot of a dynamic fit")
-    for name, axis in zip(names, panels, strict=False):
-        factor, unit = display_scale(name)
-        dots = {"linestyle": "none", "marker": ".", "markersize": 2.5, "color": BLACK}
-        axis.plot(modelled["time"], factor * measured[name], label="measured", **dots)
-        axis.plot(modelled["time"], factor * modelled[name], color=RED, linewidth=1.0, label="model")
-        axis.set_ylabel(f"{name}\n[{unit}]" if unit else name)
-        legend_outside(axis)
-    panels[len(names) - 1].set_xlabel("time [s]")
-    return figure if ax is None else ax
-
-
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class DynamicFit(Reported):
     """Plant parameters estimated from transient records; `print` it."""
@@ -123,36 +99,48 @@ class DynamicFit(Reported):
         return compute_profile(self.problem, self.estimates, index, self.costs[0], variance, points)
 
     def plot(self, record: int = 0, *, ax: Any = None) -> Any:
-        """Plot the observed quantities of one record, measured and modelled.
+        """Plot the observed quantities of one record, measured and modelled, one panel each.
 
         `ax` is an Axes, or a sequence of one for each quantity, and is returned; without it a figure is returned.
+        Raises ParameterError if `ax` contains too few Axes.
         """
-        model = self.problem.record_models[record]
-        return plot_record(model.experiment.recording, self.modelled(record), model.names, ax)
+        model, modelled = self.problem.record_models[record], self.modelled(record)
+        measured, names, figure = model.experiment.recording, model.names, None
+        if ax is None:
+            figure, axes = new_figure(len(names), 1, height=0.6 + 1.7 * len(names), sharex=True, squeeze=False)
+            figure.suptitle(measured.origin, fontsize=9)
+        panels = list(axes[:, 0]) if ax is None else given_axes(ax, len(names), "plot of a dynamic fit")
+        for name, axis in zip(names, panels, strict=False):
+            factor, unit = display_scale(name)
+            dots = {"linestyle": "none", "marker": ".", "markersize": 2.5, "color": BLACK}
+            axis.plot(modelled["time"], factor * measured[name], label="measured", **dots)
+            axis.plot(modelled["time"], factor * modelled[name], color=RED, linewidth=1.0, label="model")
+            axis.set_ylabel(f"{name}\n[{unit}]" if unit else name)
+            legend_outside(axis)
+        panels[len(names) - 1].set_xlabel("time [s]")
+        return figure if ax is None else ax
 
     def chapter(self) -> Chapter:
         """The description of the fit: estimates, residuals of each record, identifiability, the records' courses."""
-        analysis = self.identifiability
-        single = "one search, so other optima were not sought; increase the number of starts"
-        several = f"{self.starts_at_optimum} of {self.costs.size} searches reached this optimum"
-        return Chapter(
-            name="dynamic",
-            title="Dynamic fit",
-            summary=f"Residual standard deviation {self.residual_std:.3g} times that of the sensors; rank "
-            f"{analysis.rank} of {analysis.singular_values.size} unknowns that are not on a bound; "
-            f"{single if self.costs.size == 1 else several}.",
-            values=(
-                NamedValue("residual standard deviation", self.residual_std, "1", digits=3, brief=False,
-                         remark="relative to the sensors"),
-                NamedValue("rank", analysis.rank, brief=False),
-                NamedValue("unknowns not on a bound", analysis.singular_values.size, brief=False),
-                NamedValue("searches", self.costs.size, brief=False),
-                NamedValue("searches at the optimum", self.starts_at_optimum, brief=False),
-            ),
-            tables=(estimate_table(self.estimates, "estimates", "Estimates", brief=MAX_ROWS), self._rms_table),
-            plots=(Plot("record", "First record, measured and modelled.", self.plot),),
-            notes=self.notes,
-        )  # fmt: skip
+        rank, inner, searches = self.identifiability.rank, self.identifiability.singular_values.size, self.costs.size
+        reached = f"{self.starts_at_optimum} of {searches} searches reached this optimum"
+        if searches == 1:
+            reached = "one search, so other optima were not sought; increase the number of starts"
+        summary = (
+            f"Residual standard deviation {self.residual_std:.3g} times that of the sensors; rank {rank} of {inner} "
+            f"unknowns that are not on a bound; {reached}."
+        )
+        relative = NamedValue(
+            "residual standard deviation", self.residual_std, "1", "", 3, "relative to the sensors", False
+        )
+        counts = {
+            "rank": rank, "unknowns not on a bound": inner, "searches": searches,
+            "searches at the optimum": self.starts_at_optimum,
+        }  # fmt: skip
+        values = (relative, *(NamedValue(name, count, brief=False) for name, count in counts.items()))
+        tables = (estimate_table(self.estimates, "estimates", "Estimates", brief=MAX_ROWS), self._rms_table)
+        plots = (Plot("record", "First record, measured and modelled.", self.plot),)
+        return Chapter("dynamic", "Dynamic fit", summary, values=values, tables=tables, plots=plots, notes=self.notes)
 
     @property
     def _rms_table(self) -> Table:
@@ -168,10 +156,9 @@ class DynamicFit(Reported):
         return Table("rms", "Residuals by record", columns, brief=MAX_ROWS)
 
 
-MIN_RELATIVE_RESIDUAL = 0.02
-"""Rms residual relative to the pressure rise above which a model is rejected; chosen."""
-MIN_RESIDUAL_RATIO = 2.0
-"""Ratio of rms residuals above which one model is better than another; chosen."""
+MIN_RELATIVE_RESIDUAL, MIN_RESIDUAL_RATIO = 0.02, 2.0
+"""Rms residual relative to the pressure rise above which a model is rejected, and ratio of rms residuals above which
+one model is better than another; chosen."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -216,15 +203,12 @@ def locate_pressure_sensor(*, in_muscle: DynamicFit, in_line: DynamicFit) -> Sen
     Both fits need physical bounds, because a valve with b = 0.9 or a muscle that grows tenfold would imitate a line.
     Raises IdentificationError where a fit is not of one pressure in one record, or the rows differ.
     """
-    for fit in (in_muscle, in_line):
-        if len(fit.problem.record_models) != 1 or len(fit.problem.record_models[0].names) != 1:
-            raise IdentificationError(
-                "locate_pressure_sensor compares two fits of one record with one observed pressure."
-            )
-    rows, others = (fit.problem.record_models[0].measured[:, 0] for fit in (in_muscle, in_line))
+    models = [fit.problem.record_models for fit in (in_muscle, in_line)]
+    if any(len(each) != 1 or len(each[0].names) != 1 for each in models):
+        raise IdentificationError("locate_pressure_sensor compares two fits of one record with one observed pressure.")
+    (first,), (second,) = models
+    rows, others = first.measured[:, 0], second.measured[:, 0]
     if not np.array_equal(rows, others):
-        raise IdentificationError(
-            "locate_pressure_sensor compares two fits of the same record, but these have different rows."
-        )
-    rms = [fit.rms(fit.problem.record_models[0].names[0]) for fit in (in_muscle, in_line)]
-    return SensorLocation(rms[0], rms[1], float(np.ptp(rows)))
+        found = "but these have different rows"
+        raise IdentificationError(f"locate_pressure_sensor compares two fits of the same record, {found}.")
+    return SensorLocation(in_muscle.rms(first.names[0]), in_line.rms(second.names[0]), float(np.ptp(rows)))

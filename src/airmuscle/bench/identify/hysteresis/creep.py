@@ -9,7 +9,6 @@ Reference: Tschoegl, N. W., The Phenomenological Theory of Linear Viscoelastic B
 
 import dataclasses
 import math
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -23,6 +22,10 @@ from .result import SIGNIFICANCE_LEVEL
 
 MIN_ROWS = 12
 """Minimum number of rows for a fit of creep."""
+GRID_SIZE = 40
+"""Grid of initial time constants, evenly spaced in their logarithm over the observable range (chosen)."""
+MIN_RATIO = 3.0
+"""Minimum ratio of two time constants (chosen): closer ones cannot be separated, and their amplitudes diverge."""
 LENGTH_TOLERANCE = 5e-4
 """Range of contraction within which the length counts as constant (chosen)."""
 DRIFT = 2.0
@@ -39,22 +42,17 @@ class Hold:
 
 def find_holds(recording: Recording) -> tuple[Hold, ...]:
     """The holds among the pressure plateaus of a recording; none without a time column."""
-    return tuple(_holds(recording))
-
-
-def _holds(recording: Recording) -> Iterator[Hold]:
-    force, contraction = recording["force"], recording["contraction"]
+    force, contraction, holds = recording["force"], recording["contraction"], list[Hold]()
     for plateau in find_plateaus(recording, columns=("pressure",)):
         rows = plateau.interval.rows
         has_constant_force = np.ptp(force[rows]) <= RELATIVE_BAND * np.abs(force).max()
         relaxes = _drifts(force[rows]) and not _drifts(contraction[rows])
         if len(plateau.interval) >= MIN_ROWS and has_constant_force and not relaxes:
-            yield Hold(plateau.interval, "contraction")
-            continue
-        for level in level_intervals(contraction, LENGTH_TOLERANCE, within=plateau.interval):
-            interval = _trim_to_level(contraction, level)
-            if len(interval) >= MIN_ROWS:
-                yield Hold(interval, "force")
+            holds.append(Hold(plateau.interval, "contraction"))
+        else:
+            levels = level_intervals(contraction, LENGTH_TOLERANCE, within=plateau.interval)
+            holds += [Hold(_trim_to_level(contraction, level), "force") for level in levels]
+    return tuple(hold for hold in holds if len(hold.interval) >= MIN_ROWS)
 
 
 def _drifts(values: Array) -> bool:
@@ -66,16 +64,9 @@ def _drifts(values: Array) -> bool:
 def _trim_to_level(values: Array, level: Interval) -> Interval:
     """The interval without the transitions to and from its level."""
     inside = values[level.rows]
-    near = np.flatnonzero(
-        np.abs(inside - np.median(inside)) <= max(LENGTH_TOLERANCE / 10.0, 4.0 * estimate_noise(inside))
-    )
+    band = max(LENGTH_TOLERANCE / 10.0, 4.0 * estimate_noise(inside))
+    near = np.flatnonzero(np.abs(inside - np.median(inside)) <= band)
     return Interval(level.start + int(near[0]), level.start + int(near[-1]) + 1) if near.size else Interval(0, 0)
-
-
-GRID_SIZE = 40
-"""Grid of initial time constants, evenly spaced in their logarithm over the observable range (chosen)."""
-MIN_RATIO = 3.0
-"""Minimum ratio of two time constants (chosen): closer ones cannot be separated, and their amplitudes diverge."""
 
 
 @model
@@ -126,10 +117,8 @@ class CreepFit:
     def verdict(self) -> str:
         """The number of justified elements, as sentences with the numbers."""
         count, unit = len(self.creep.amplitudes), f" {self.unit}" if self.unit else ""
-        elements = ", ".join(
-            f"{a:.3g}{unit} with {tau:.3g} s"
-            for a, tau in zip(self.creep.amplitudes, self.creep.time_constants, strict=True)
-        )
+        pairs = zip(self.creep.amplitudes, self.creep.time_constants, strict=True)
+        elements = ", ".join(f"{amplitude:.3g}{unit} with {tau:.3g} s" for amplitude, tau in pairs)
         subject = ("no creep", "creep with one time constant", "creep with two time constants")[count]
         rms = ", ".join(f"{value:.3g}" for value in self.rmse_by_order)
         text = f"The data justify {subject}{f' ({elements})' if elements else ''}; "
@@ -211,35 +200,35 @@ def creep_elements(
     """
     if not np.isfinite(step) or step == 0.0:
         raise ParameterError(f"creep_elements: the step is {step:g} m; it must be finite and not zero.")
-    amplitudes = np.array(fit.creep.amplitudes)
-    times = np.array(fit.creep.time_constants)
+    amplitudes, times = np.array(fit.creep.amplitudes), np.array(fit.creep.time_constants)
     if not amplitudes.size:
         return CreepElements()
-    if fit.unit:
-        return _relaxation(amplitudes, times, step)
-    if stiffness is None or resting_length is None:
-        raise ParameterError(
-            "creep_elements: a hold under a load needs the static stiffness and the resting length of the muscle. Give "
-            "stiffness=... [N/m], such as that of its law, and resting_length=... [m]."
+    if not fit.unit:
+        if stiffness is None or resting_length is None:
+            raise ParameterError(
+                "creep_elements: a hold under a load needs the static stiffness and the resting length of the muscle. "
+                "Give stiffness=... [N/m], such as that of its law, and resting_length=... [m]."
+            )
+        if not stiffness > 0.0 or not resting_length > 0.0:
+            raise ParameterError(
+                f"creep_elements: the stiffness is {stiffness:g} N/m and the resting length {resting_length:g} m; both "
+                "must be greater than zero."
+            )
+        amplitudes = amplitudes * resting_length
+    ratios = amplitudes / step
+    if (ratios <= 0.0).any():
+        raise IdentificationError(
+            "the creep has the opposite direction of that of passive elements: after a shortening the force recovers "
+            "at constant length, and the muscle shortens further under a constant load. Check the sign of the step and "
+            "that the pressure was constant; creep of the pressure is no creep of the muscle."
         )
-    if not stiffness > 0.0 or not resting_length > 0.0:
-        raise ParameterError(
-            f"creep_elements: the stiffness is {stiffness:g} N/m and the resting length {resting_length:g} m; both "
-            "must be greater than zero."
-        )
-    return _retardation(amplitudes * resting_length, times, step, stiffness)
-
-
-def _relaxation(amplitudes: np.ndarray, times: np.ndarray, step: float) -> CreepElements:
-    """From the change of the force [N] after a shortening by `step` [m], which lowers the force at first."""
-    stiffnesses = amplitudes / step
-    _check_passive(stiffnesses)
-    return CreepElements(tuple(map(float, stiffnesses)), tuple(map(float, times)))
+    if stiffness is None or fit.unit:  # a shortening by the step lowers the force at first
+        return CreepElements(tuple(ratios.tolist()), tuple(times.tolist()))
+    return _retardation(amplitudes, times, step, stiffness)
 
 
 def _retardation(creep: np.ndarray, times: np.ndarray, step: float, stiffness: float) -> CreepElements:
     """From the further shortening [m] under a constant load after a shortening by `step` [m]."""
-    _check_passive(creep / step)
     load = stiffness * (step + creep.sum())
     instantaneous, compliances = step / load, creep / load
     # D(s) prod(1 + s lambda_i) as a polynomial in s; its zeros are -1/tau_i
@@ -251,12 +240,3 @@ def _retardation(creep: np.ndarray, times: np.ndarray, step: float, stiffness: f
     slopes = [-float(np.sum(compliances * times / (1.0 + zero * times) ** 2)) for zero in zeros]
     stiffnesses = [1.0 / (slope * zero) for slope, zero in zip(slopes, zeros, strict=True)]
     return CreepElements(tuple(map(float, stiffnesses)), tuple(float(-1.0 / zero) for zero in zeros))
-
-
-def _check_passive(ratios: np.ndarray) -> None:
-    if (ratios <= 0.0).any():
-        raise IdentificationError(
-            "the creep has the opposite direction of that of passive elements: after a shortening the force recovers "
-            "at constant length, and the muscle shortens further under a constant load. Check the sign of the step and "
-            "that the pressure was constant; creep of the pressure is no creep of the muscle."
-        )

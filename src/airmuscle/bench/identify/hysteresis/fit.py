@@ -5,19 +5,16 @@ import dataclasses
 import inspect
 
 import numpy as np
-import numpy.typing as npt
 
 from ....core import Array, Hint, IdentificationError, check_whole, model, parameter
 from ....physics.muscle import friction
 from ....physics.muscle.characteristic.base import Characteristic
 from ....physics.muscle.friction import Friction, LoopScales
 from ....recording import Recording
-from ...segment import motion_direction
+from ...segment import Mask, motion_direction
 from .limits import MILLIMETRES, Axis, data_limits, resolved_stiffness
 from .result import HysteresisFit, assess_fit
 from .search import LoopSeries, free_parameters, search_parameters
-
-RowMask = npt.NDArray[np.bool_]
 
 
 class FrictionPath(abc.ABC):
@@ -38,7 +35,13 @@ class ContractionPath(FrictionPath):
     """x = eps L0: friction against shortening, visible in loops at constant pressure or load."""
 
     def displacement(self, recording: Recording) -> Array:
-        return np.asarray(recording["contraction"] * _resting_length(recording))
+        length = recording.constants.get("resting_length")
+        if not isinstance(length, float | int):
+            raise IdentificationError(
+                f"{recording.origin}: friction against shortening needs the resting length.",
+                hint=Hint("To state it", "resting_length", function="ColumnMapping"),
+            )
+        return np.asarray(recording["contraction"] * float(length))
 
 
 @model
@@ -58,17 +61,16 @@ class PressurePath(FrictionPath):
 
     @property
     def axis(self) -> Axis:
-        return Axis(
-            "gauge pressure [kPa]", 1e-3 / self.displacement_per_pressure, "Pa", 1.0 / self.displacement_per_pressure
-        )
+        by_displacement = 1.0 / self.displacement_per_pressure
+        return Axis("gauge pressure [kPa]", 1e-3 / self.displacement_per_pressure, "Pa", by_displacement)
 
 
 class StaticCurve(abc.ABC):
     """The force without friction: a known part, and columns whose coefficients are fitted with the friction."""
 
-    @abc.abstractmethod
     def known_force(self, recording: Recording) -> Array:
-        """The known part of the force [N] at every row, shape (N,)."""
+        """The known part of the force [N] at every row, shape (N,); 0 unless overridden."""
+        return np.zeros(len(recording))
 
     @abc.abstractmethod
     def design_matrix(self, recording: Recording) -> Array:
@@ -95,9 +97,6 @@ class PolynomialCurve(StaticCurve):
     column: str
     degree: int
 
-    def known_force(self, recording: Recording) -> Array:
-        return np.zeros(len(recording))
-
     def design_matrix(self, recording: Recording) -> Array:
         scale = 1e5 if self.column == "pressure" else 0.1  # so that the coefficients have similar magnitudes
         return np.vander(recording[self.column] / scale, self.degree + 1)
@@ -118,8 +117,8 @@ def initial_friction_laws(path: Array, force: Array, elements: int = 8) -> tuple
 
 def fit_hysteresis(
     friction: Friction, recording: Recording, *, static_curve: StaticCurve,
-    friction_path: FrictionPath = ContractionPath(), fitted_rows: RowMask | None = None,
-    repeat: tuple[Recording, RowMask | None] | None = None,
+    friction_path: FrictionPath = ContractionPath(), fitted_rows: Mask | None = None,
+    repeat: tuple[Recording, Mask | None] | None = None,
 ) -> HysteresisFit:  # fmt: skip
     """Fit a friction law to the difference between a loop and its static curve, and test whether the data justify it.
 
@@ -152,35 +151,17 @@ def fit_series(friction: Friction, run: LoopSeries, second_run: LoopSeries | Non
 
 
 def make_loop_series(
-    recording: Recording, static_curve: StaticCurve, friction_path: FrictionPath, fitted_rows: RowMask | None
+    recording: Recording, static_curve: StaticCurve, friction_path: FrictionPath, fitted_rows: Mask | None
 ) -> LoopSeries:
     """The arrays of a run for a fit of friction."""
     target = recording["force"] - static_curve.known_force(recording)
     finite = np.isfinite(target)
     rows = finite if fitted_rows is None else np.asarray(fitted_rows, dtype=bool) & finite
-    path = friction_path.displacement(recording)
-    time = recording.columns.get("time")
+    path, time = friction_path.displacement(recording), recording.columns.get("time")
+    matrix, limits = static_curve.design_matrix(recording), data_limits(recording["force"], path, time, rows)
     series = LoopSeries(
-        origin=recording.origin,
-        path=path,
-        time=time,
-        target=target,
-        design_matrix=static_curve.design_matrix(recording),
-        fitted_rows=rows,
-        direction=motion_direction(path, time),
-        pressure=recording.columns.get("pressure"),
-        limits=data_limits(recording["force"], path, time, rows),
-        axis=friction_path.axis,
-    )
+        recording.origin, path, time, target, matrix, rows, motion_direction(path, time), limits,
+        recording.columns.get("pressure"), friction_path.axis,
+    )  # fmt: skip
     stiffness = resolved_stiffness(path[rows], series.fitted_residuals(None))
     return dataclasses.replace(series, limits=dataclasses.replace(series.limits, stiffness=stiffness))
-
-
-def _resting_length(recording: Recording) -> float:
-    length = recording.constants.get("resting_length")
-    if not isinstance(length, float | int):
-        raise IdentificationError(
-            f"{recording.origin}: friction against shortening needs the resting length.",
-            hint=Hint("To state it", "resting_length", function="ColumnMapping"),
-        )
-    return float(length)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ....core import BLACK, BLUE, DASHES, LINES, RED, Array, leaves, legend_below, new_figure
+from ....core import BLACK, BLUE, DASHES, LINES, RED, Array, Reference, leaves, legend_below, new_figure
 from ....physics.muscle.friction import Friction
 from ....recording.columns import display_scale
 from ....report.chapter import BY_ROW, Chapter, NamedValue, Plot, Table, TableColumn
@@ -34,7 +34,7 @@ def hysteresis_chapters(loop_fits: Sequence[LoopFit], joint: Sequence[JointFit] 
 
 def _overview(loop_fits: Sequence[LoopFit]) -> Chapter:
     """Return the chapter with one row for each loop: its preferred law, or that of the lowest AICc."""
-    best = [each.recommended or (each.fits[0] if each.fits else None) for each in loop_fits]
+    best = [each.recommended or next(iter(each.fits), None) for each in loop_fits]
     columns: dict[str, Any] = {
         "run": [each.loop.recording.origin for each in loop_fits],
         "kind": [each.loop.description for each in loop_fits],
@@ -46,48 +46,50 @@ def _overview(loop_fits: Sequence[LoopFit]) -> Chapter:
         "justified": [each.recommended is not None for each in loop_fits],
         "usable in a plant": TableColumn([each.usable_in_plant for each in loop_fits], brief=False),
     }  # fmt: skip
-    failed: dict[str, list[str]] = {}
+    failed: dict[tuple[str, str], list[str]] = {}
     for each in loop_fits if len(loop_fits) > SEPARATE_LOOPS else ():
-        for name, reason in each.failed.items():
-            failed.setdefault(f"{name} was not fitted to {{}}: {reason}", []).append(each.loop.recording.origin)
+        for law in each.failed.items():
+            failed.setdefault(law, []).append(each.loop.recording.origin)
+    runs = {law: origins[0] if len(origins) == 1 else f"{len(origins)} runs" for law, origins in failed.items()}
+    notes = tuple(f"{name} was not fitted to {which}: {reason}" for (name, reason), which in runs.items())
     justified = sum(each.recommended is not None for each in loop_fits)
-    return Chapter(
-        name="loops",
-        title="Hysteresis loops",
-        summary=f"{len(loop_fits)} loops; the data justify a friction law for {justified} of them.",
-        tables=(Table("loops", "Best law of each loop", columns, brief=12),),
-        notes=tuple(text.format(origins[0] if len(origins) == 1 else f"{len(origins)} runs")
-                    for text, origins in failed.items()),
-    )  # fmt: skip
+    summary = f"{len(loop_fits)} loops; the data justify a friction law for {justified} of them."
+    tables = (Table("loops", "Best law of each loop", columns, brief=12),)
+    return Chapter("loops", "Hysteresis loops", summary, tables=tables, notes=notes)
 
 
 def loop_chapter(loop_fit: LoopFit) -> Chapter:
     """Return the chapter of the friction laws of one loop."""
-    loop = loop_fit.loop
-    best = loop_fit.recommended
-    shown = best or (loop_fit.fits[0] if loop_fit.fits else None)
-    of_shown = None if shown is None else shown.chapter()
+    loop, best = loop_fit.loop, loop_fit.recommended
+    shown = best or next(iter(loop_fit.fits), None)
     plots = [Plot("loop", "Measured loop; light: rows that are not used.", functools.partial(_figure, loop))]
-    tables = [_law_table(loop_fit)]
-    if shown is not None and of_shown is not None:
+    tables, references = [_law_table(loop_fit)], tuple[Reference, ...]()
+    if shown is not None:
+        own = shown.chapter()
         caption = f"{shown.name} with the fitted parameters: initial loading, outer loop and two minor loops."
         minor = functools.partial(plot_loops, shown.friction, loop.friction_path.axis)
-        plots += [*of_shown.plots, Plot("minor-loops", caption, minor)]
-        tables += [dataclasses.replace(table, name=f"friction-{table.name}", brief=0) for table in of_shown.tables]
-    tables.append(_all_parameters(loop_fit))
+        plots += [*own.plots, Plot("minor-loops", caption, minor)]
+        tables += _friction_tables(own)
+        references = own.references
+    rows = [(f.name, leaf) for f in loop_fit.fits for leaf in leaves(f.friction)]
+    columns: dict[str, Any] = {
+        "law": [law for law, _ in rows],
+        "parameter": [leaf.path for _, leaf in rows],
+        "value": TableColumn([leaf.value for _, leaf in rows], BY_ROW),
+        "unit": [leaf.declared.unit for _, leaf in rows],
+    }
+    tables.append(Table("law-parameters", "Parameters of all laws", columns, shown=False))
+    stated = {"recommended": best and best.name, "usable in a plant": loop_fit.usable_in_plant}
     return Chapter(
-        name="friction",
-        title=f"{loop.recording.origin}: {loop.description}",
-        summary=tuple(_summary(loop_fit, shown)),
-        values=(
-            NamedValue("recommended", best and best.name, brief=False),
-            NamedValue("usable in a plant", loop_fit.usable_in_plant, brief=False),
-        ),
-        tables=tuple(tables),
-        plots=tuple(plots),
-        notes=tuple(_notes(loop_fit)),
-        references=() if of_shown is None else of_shown.references,
-    )
+        "friction", f"{loop.recording.origin}: {loop.description}", tuple(_summary(loop_fit, shown)),
+        values=tuple(NamedValue(name, value, brief=False) for name, value in stated.items()), tables=tuple(tables),
+        plots=tuple(plots), notes=tuple(_notes(loop_fit)), references=references,
+    )  # fmt: skip
+
+
+def _friction_tables(chapter: Chapter) -> list[Table]:
+    """Return the tables of the chapter of a friction, as parts of another one."""
+    return [dataclasses.replace(table, name=f"friction-{table.name}", brief=0) for table in chapter.tables]
 
 
 def _summary(loop_fit: LoopFit, shown: HysteresisFit | None) -> list[str]:
@@ -97,19 +99,17 @@ def _summary(loop_fit: LoopFit, shown: HysteresisFit | None) -> list[str]:
     rows = f"{up} rows of the rising branch and {down} of the falling branch are used, of {len(loop.recording)}."
     if shown is None:
         return [rows]
-    if loop_fit.recommended is None:
-        return [f"The data justify none of the laws; {shown.name} is shown as the best one. {shown.verdict}", rows]
-    return [shown.verdict, rows]
+    none = f"The data justify none of the laws; {shown.name} is shown as the best one. "
+    return [f"{none if loop_fit.recommended is None else ''}{shown.verdict}", rows]
 
 
 def _notes(loop_fit: LoopFit) -> list[str]:
-    notes = []
-    if not loop_fit.usable_in_plant:
-        notes.append(
-            "The loop is isometric: the pressure moved the fibres at constant length, and only a friction force over "
-            "pressure is determined. Such a friction describes isometric loops and cannot be used in a plant. For a "
-            "friction that can, measure a loop of contraction at constant pressure."
-        )
+    isometric = (
+        "The loop is isometric: the pressure moved the fibres at constant length, and only a friction force over "
+        "pressure is determined. Such a friction describes isometric loops and cannot be used in a plant. For a "
+        "friction that can, measure a loop of contraction at constant pressure."
+    )
+    notes = [] if loop_fit.usable_in_plant else [isometric]
     if loop_fit.loop.repeat is not None:
         notes.append(f"Validated on {loop_fit.loop.repeat[0].origin}, a second run at the same level.")
     return [*notes, *(f"{name} was not fitted: {reason}" for name, reason in loop_fit.failed.items())]
@@ -148,43 +148,23 @@ def _compared_laws(name: str, title: str, fits: Sequence[FrictionFit], own: dict
     return Table(name, title, columns, brief=len(fits))
 
 
-def _all_parameters(loop_fit: LoopFit) -> Table:
-    """Return the parameters of all laws of a loop."""
-    rows = [(f.name, leaf) for f in loop_fit.fits for leaf in leaves(f.friction)]
-    columns: dict[str, Any] = {
-        "law": [law for law, _ in rows],
-        "parameter": [leaf.path for _, leaf in rows],
-        "value": TableColumn([leaf.value for _, leaf in rows], BY_ROW),
-        "unit": [leaf.declared.unit for _, leaf in rows],
-    }
-    return Table("law-parameters", "Parameters of all laws", columns, shown=False)
-
-
 def joint_friction_chapter(fits: Sequence[JointFit], not_joined: Sequence[str] = ()) -> Chapter:
     """Return the chapter of the joint fits of all laws, lowest AICc first; the best justified one is shown.
 
     `not_joined` are sentences on the loops that the joint fit does not use.
     """
     shown = preferred_fit(fits) or fits[0]
-    of_shown = shown.chapter()
-    first = shown.verdict
-    if not shown.justified:
-        first = (
-            "The runs justify no friction law that holds for all of them, so none is written. "
-            f"{shown.name} is shown as the best one. {first}"
-        )
+    none = "The runs justify no friction law that holds for all of them, so none is written."
+    none = "" if shown.justified else f"{none} {shown.name} is shown as the best one. "
     columns = {
         "depends on pressure": [fit.law is not fit.friction for fit in fits],
         "runs that disagree": [sum(run.disagrees for run in fit.agreement) for fit in fits],
     }
-    laws = _compared_laws("joint-laws", "Friction laws fitted to all runs together, best first", fits, columns)
-    tables = [dataclasses.replace(table, name=f"friction-{table.name}", brief=0) for table in of_shown.tables]
+    laws, own = "Friction laws fitted to all runs together, best first", shown.chapter()
+    tables = (_compared_laws("joint-laws", laws, fits, columns), _run_table(shown), *_friction_tables(own))
+    summary = (f"{none}{shown.verdict}",)
     return dataclasses.replace(
-        of_shown,
-        title="Friction of all runs",
-        summary=(first,),
-        tables=(laws, _run_table(shown), *tables),
-        notes=tuple(not_joined),
+        own, title="Friction of all runs", summary=summary, tables=tables, notes=tuple(not_joined)
     )
 
 
@@ -202,25 +182,20 @@ def _run_table(fit: JointFit) -> Table:
         "agrees": TableColumn([not run.disagrees for run in runs], brief=False),
     }
     title = f"Friction of each run, {fit.name}: half the range of the force"
-    disagreeing = [i for i, run in enumerate(runs) if run.disagrees]
-    return Table("joint-runs", title, columns, brief=disagreeing)
+    return Table("joint-runs", title, columns, brief=[i for i, run in enumerate(runs) if run.disagrees])
 
 
 def _figure(loop: HysteresisLoop) -> Any:
     """Return a figure of the force over the varied quantity, by branch; rows that are not used are light."""
     recording = loop.recording
-    name = (
-        "contraction" if "contraction" in loop.run.swept_columns or "length" in loop.run.swept_columns else "pressure"
-    )
+    name = "contraction" if {"contraction", "length"} & set(loop.run.swept_columns) else "pressure"
     factor, unit = display_scale(name)
     direction = motion_direction(loop.friction_path.displacement(recording), recording.columns.get("time"))
     figure, axes = new_figure(width=6.0, height=3.9)
     axes.plot(recording[name] * factor, recording["force"], color=BLACK, linewidth=0.5, alpha=0.3)
     for sign, colour, branch in ((1, BLUE, "rising"), (-1, RED, "falling")):
-        for rows, alpha, label in (
-            ((direction == sign) & ~loop.fitted_rows, 0.05, None),
-            ((direction == sign) & loop.fitted_rows, 0.8, branch),
-        ):
+        for used, alpha, label in ((~loop.fitted_rows, 0.05, None), (loop.fitted_rows, 0.8, branch)):
+            rows = (direction == sign) & used
             style = {"marker": "o", "linestyle": "none", "markersize": 3, "alpha": alpha, "color": colour}
             axes.plot(recording[name][rows] * factor, recording["force"][rows], label=label, **style)
     axes.set(xlabel=f"{name} [{unit}]", ylabel="force [N]", title=f"{recording.origin}: {loop.description}")
@@ -228,12 +203,11 @@ def _figure(loop: HysteresisLoop) -> Any:
     return figure
 
 
-TURNING_POINTS = (2.0, -2.0, -0.6, -1.1, -0.6, 0.5, -0.3, 0.5, 2.0)
-"""Turning points of the path of `plot_loops`, as multiples of the presliding distance of the law (chosen)."""
+TURNING_POINTS, ROWS_PER_LEG = (2.0, -2.0, -0.6, -1.1, -0.6, 0.5, -0.3, 0.5, 2.0), 200
+"""Turning points of the path of `plot_loops`, as multiples of the presliding distance of the law, and rows between two
+of them (chosen)."""
 INNER_LOOPS = ((3, 5), (6, 8))
 """Legs of the path that form the inner loops, first and last plus one."""
-ROWS_PER_LEG = 200
-"""Rows between two turning points."""
 
 
 def loop_path(distance: float) -> Array:
@@ -250,18 +224,13 @@ def plot_loops(friction: Friction, axis: Axis = MILLIMETRES) -> Any:
     """
     path = loop_path(friction.presliding_distance or 1e-3)
     force = friction.force_along(path)
-    parts = [("outer loop", ROWS_PER_LEG, len(path)), ("from rest", 0, ROWS_PER_LEG + 1)]
-    parts += [
-        ("inner loops" if i == 0 else "", a * ROWS_PER_LEG, b * ROWS_PER_LEG + 1)
-        for i, (a, b) in enumerate(INNER_LOOPS)
-    ]
-    outer = force.copy()
-    for a, b in INNER_LOOPS:
+    outer, parts = force.copy(), [(force, 0, 1, "from rest", 1)]
+    for (a, b), name in zip(INNER_LOOPS, ("inner loops", ""), strict=True):
         outer[a * ROWS_PER_LEG + 1 : b * ROWS_PER_LEG] = np.nan
+        parts.append((force, a, b, name, 2))
     figure, axes = new_figure(width=5.6, height=3.9)
-    for (name, first, last), style in zip(parts, (0, 1, 2, 2), strict=True):
-        rows, label = slice(first, last), name or None
-        values = force if style else outer
+    for values, a, b, name, style in [(outer, 1, len(TURNING_POINTS), "outer loop", 0), *parts]:
+        rows, label = slice(a * ROWS_PER_LEG, b * ROWS_PER_LEG + 1), name or None
         axes.plot(path[rows] * axis.factor, values[rows], color=LINES[style], linestyle=DASHES[style], label=label)
     axes.set(xlabel=axis.label, ylabel="friction [N]", title=type(friction).__name__)
     legend_below(figure, axes, 3)

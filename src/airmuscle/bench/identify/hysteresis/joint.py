@@ -23,17 +23,10 @@ PRESSURE_QUANTILES = (0.01, 0.99)
 """Quantiles of the pressures of the fitted rows that count as the range of the data (chosen)."""
 
 
-def joinable_fits(loop_fits: Sequence[LoopFit]) -> tuple[LoopFit, ...]:
-    """The loops whose friction a plant can use and whose rows give no reason against a friction."""
-    return tuple(each for each in loop_fits if not _reason_against(each))
-
-
 def loops_not_joined(loop_fits: Sequence[LoopFit]) -> tuple[str, ...]:
     """Sentences that name each loop that the joint fit does not use, and the reason."""
-    reasons = [(each.loop, _reason_against(each)) for each in loop_fits]
-    return tuple(
-        f"Not in the joint fit: {loop.recording.origin}, {loop.description}. {why}" for loop, why in reasons if why
-    )
+    reasons = [(f"{fit.loop.recording.origin}, {fit.loop.description}", _reason_against(fit)) for fit in loop_fits]
+    return tuple(f"Not in the joint fit: {loop}. {reason}" for loop, reason in reasons if reason)
 
 
 def _reason_against(loop_fit: LoopFit) -> str:
@@ -56,7 +49,7 @@ def fit_jointly(
     progress  called with a text for each law
     workers   number of processes, as in `compare`: a law is a task
     """
-    usable = joinable_fits(loop_fits)
+    usable = tuple(each for each in loop_fits if not _reason_against(each))
     if len(usable) < 2:
         return ()
     by_law: dict[type[Friction], list[HysteresisFit]] = {}
@@ -87,7 +80,8 @@ def identified_friction(friction: Friction, runs: Sequence[LoopSeries]) -> Frict
 def _fit_law(usable: Sequence[LoopFit], own: Sequence[HysteresisFit]) -> JointFit:
     """One law fitted to all runs, with a constant and with a pressure-dependent scale; the better of the two."""
     runs, scale_p_value = [fit.series for fit in own], float("nan")
-    pressures = np.array([_mean_pressure(run) for run in runs])
+    known = [None if run.pressure is None else float(np.mean(run.pressure[run.fitted_rows])) for run in runs]
+    pressures = np.array([float("-inf") if each is None else each for each in known])
     reference, lowest = int(np.argmax(pressures)), float(pressures.min())  # -inf where a run has no pressure
     friction, weak = search_parameters(own[len(own) // 2].friction, runs)
     if np.isfinite(lowest) and pressures[reference] > max(1e3, MIN_PRESSURE_RATIO * lowest):
@@ -97,17 +91,12 @@ def _fit_law(usable: Sequence[LoopFit], own: Sequence[HysteresisFit]) -> JointFi
         if scale_p_value < SIGNIFICANCE_LEVEL and large.reduction_of_aicc(small) > 0:
             friction, weak = scaled
     repeats = [each.loop.series(*each.loop.repeat) for each in usable if each.loop.repeat is not None]
-    agreement = [
-        agreement_of_run(friction, fit, each.loop.description, pressure)
-        for fit, each, pressure in zip(own, usable, pressures.tolist(), strict=True)
-    ]
+    parts = zip(own, usable, pressures.tolist(), strict=True)
+    agreement = [agreement_of_run(friction, fit, each.loop.description, pressure) for fit, each, pressure in parts]
     return JointFit(
-        **evidence(friction, runs, repeats),
-        weak_combinations=weak,
-        series=tuple(runs),
-        agreement=tuple(agreement),
+        **evidence(friction, runs, repeats), weak_combinations=weak, series=tuple(runs), agreement=tuple(agreement),
         scale_p_value=scale_p_value,
-    )
+    )  # fmt: skip
 
 
 def _initial_scale(own: Sequence[HysteresisFit], pressures: Array, reference: int) -> PressureScaledFriction:
@@ -118,10 +107,6 @@ def _initial_scale(own: Sequence[HysteresisFit], pressures: Array, reference: in
     at_reference = offset + slope * rounded
     ratio = offset / at_reference if at_reference > 0 else 1.0
     return PressureScaledFriction(own[reference].friction, float(np.clip(ratio, 0.01, 5.0)), rounded)
-
-
-def _mean_pressure(run: LoopSeries) -> float:
-    return float("-inf") if run.pressure is None else float(np.mean(run.pressure[run.fitted_rows]))
 
 
 class SelectedFriction(NamedTuple):

@@ -6,7 +6,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from ....core import LINES, Array, given_axes, leaves, legend_below, new_figure, relabel_in_display_units
+from ....core import LINES, given_axes, leaves, legend_below, new_figure, relabel_in_display_units
 from ....physics.muscle.friction import Friction, PressureScaledFriction
 from ....report.chapter import Chapter, Plot
 from ....report.shown import parameter_table
@@ -60,9 +60,9 @@ def agreement_of_run(joint: Friction, own: HysteresisFit, description: str, pres
     """Compare the friction fitted to one run alone with the joint friction."""
     run, rows = own.series, own.series.fitted_rows
     curve = run.design_matrix[rows]
-    joint_force = _without_static_part(run.friction_force(joint)[rows], curve)
-    own_force = _without_static_part(run.friction_force(own.friction)[rows], curve)
-    target = _without_static_part(run.target[rows], curve)
+    forces = [each[rows] for each in (run.friction_force(joint), run.friction_force(own.friction), run.target)]
+    parts = [curve @ np.linalg.lstsq(curve, each, rcond=None)[0] for each in forces]  # that the static curve takes up
+    joint_force, own_force, target = (force - part for force, part in zip(forces, parts, strict=True))
     power = float(joint_force @ joint_force) or 1e-300
     factor = -float(joint_force @ target) / power
     rest = target + factor * joint_force
@@ -80,44 +80,6 @@ def agreement_of_run(joint: Friction, own: HysteresisFit, description: str, pres
         deviation=float(np.linalg.norm(own_force - joint_force)) / largest,
         p_value=misfit.p_value(joint_misfit._replace(parameters=curve.shape[1])),
     )
-
-
-def _without_static_part(force: Array, curve: Array) -> Array:
-    """The force minus its projection on the columns of the static curve, which takes up this part."""
-    return np.asarray(force - curve @ np.linalg.lstsq(curve, force, rcond=None)[0])
-
-
-def plot_amplitudes(runs: Sequence[RunAgreement], friction: Friction, name: str, *, ax: Any = None) -> Any:
-    """Half the range of the friction force over the gauge pressure: each run alone with two standard errors, and joint.
-
-    Returns `ax`, an Axes, or a new Matplotlib figure if it is None. Raises ParameterError for another `ax`.
-    """
-    pressure = np.array([run.pressure for run in runs])
-    own, error, joint = (
-        np.array([getattr(run, field) for run in runs])
-        for field in ("amplitude", "amplitude_stderr", "joint_amplitude")
-    )
-    factors = np.array([float(friction.pressure_factor(p)) for p in pressure])
-    grid = np.linspace(0.0, 1.05 * pressure.max(), 100)
-    at_one = float(np.mean(joint[factors > 0] / factors[factors > 0])) if (factors > 0).any() else 0.0
-    figure = None
-    if ax is None:
-        figure, axes = new_figure(width=6.0, height=3.9)
-    else:
-        axes = given_axes(ax, 1, "plot of a friction")[0]
-    axes.plot(
-        grid / 1e3, [at_one * float(friction.pressure_factor(p)) for p in grid], color=LINES[1], label="joint fit"
-    )
-    axes.errorbar(
-        pressure / 1e3, own, 2.0 * error, fmt="o", color=LINES[0], capsize=3, label="each run alone, 2 standard errors"
-    )
-    axes.set(xlabel="gauge pressure [kPa]", ylabel="friction, half its range [N]", title=name, ylim=(0.0, None))
-    relabel_in_display_units([axes])
-    if figure is None:
-        axes.legend(loc="best", frameon=False, fontsize=8)
-        return ax
-    legend_below(figure, axes, 2)
-    return figure
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -143,15 +105,12 @@ class JointFit(FrictionFit):
 
     @property
     def reservations(self) -> tuple[str, ...]:
-        different = [str(run) for run in self.agreement if run.disagrees]
-        reasons = []
-        if different:
-            reasons.append(
-                "The friction does not hold for all runs; half the range of its force is, in "
-                f"{'; in '.join(different)}."
-            )
-        if self.repeat_rmse >= self.repeat_rmse_without_friction:
-            reasons.append("It does not lower the error on the second runs.")
+        different = "; in ".join(str(run) for run in self.agreement if run.disagrees)
+        found = (
+            (different, f"The friction does not hold for all runs; half the range of its force is, in {different}."),
+            (self.repeat_rmse >= self.repeat_rmse_without_friction, "It does not lower the error on the second runs."),
+        )
+        reasons = [reason for holds, reason in found if holds]
         return (*reasons, *limit_reservations(self.friction, self.limits, self.weak_combinations, MILLIMETRES))
 
     @property
@@ -183,28 +142,41 @@ class JointFit(FrictionFit):
         return self._judged(text, "this friction for all runs", "second runs")
 
     def plot(self, *, ax: Any = None) -> Any:
-        """Plot the amplitude of the friction over the pressure, of each run and of the joint fit.
+        """Plot half the range of the friction force over the gauge pressure: each run alone with two standard errors,
+        and the joint fit.
 
         `ax` is an Axes and is returned; without it a new figure is returned. Raises ParameterError for another `ax`.
         """
-        return plot_amplitudes(self.agreement, self.friction, self.name, ax=ax)
+        fields = ("pressure", "amplitude", "amplitude_stderr", "joint_amplitude")
+        pressure, own, error, joint = (np.array([getattr(run, name) for run in self.agreement]) for name in fields)
+        grid = np.linspace(0.0, 1.05 * pressure.max(), 100)
+        at_runs, factors = ([float(self.friction.pressure_factor(p)) for p in each] for each in (pressure, grid))
+        acting = np.array(at_runs) > 0
+        at_one = float(np.mean(joint[acting] / np.array(at_runs)[acting])) if acting.any() else 0.0
+        figure, axes = (
+            new_figure(width=6.0, height=3.9) if ax is None else (None, given_axes(ax, 1, "plot of a friction")[0])
+        )
+        axes.plot(grid / 1e3, [at_one * factor for factor in factors], color=LINES[1], label="joint fit")
+        dots = {"fmt": "o", "color": LINES[0], "capsize": 3, "label": "each run alone, 2 standard errors"}
+        axes.errorbar(pressure / 1e3, own, 2.0 * error, **dots)
+        labels = {"xlabel": "gauge pressure [kPa]", "ylabel": "friction, half its range [N]", "title": self.name}
+        axes.set(**labels, ylim=(0.0, None))
+        relabel_in_display_units([axes])
+        if figure is None:
+            axes.legend(loc="best", frameon=False, fontsize=8)
+            return ax
+        legend_below(figure, axes, 2)
+        return figure
 
     def chapter(self) -> Chapter:
         """The description of the fit: verdict, parameters, and friction over pressure."""
-        caption = (
-            f"Friction over pressure, {self.name}: half the range of the friction force of each run, and joint fit."
-        )
-        table = parameter_table(
-            self.friction, "joint-parameters", f"Parameters of {self.name} from all runs", brief=True
-        )
-        return Chapter(
-            name="joint-friction",
-            title=f"{self.name} fitted to {len(self.series)} runs",
-            summary=self.verdict,
-            tables=(table,),
-            plots=(Plot("joint-friction", caption, self.plot),),
-            references=(*self.friction.references, *(() if self.law is self.friction else self.law.references)),
-        )
+        of_runs = "half the range of the friction force of each run, and joint fit"
+        plots = (Plot("joint-friction", f"Friction over pressure, {self.name}: {of_runs}.", self.plot),)
+        heading = f"Parameters of {self.name} from all runs"
+        tables = (parameter_table(self.friction, "joint-parameters", heading, brief=True),)
+        references = (*self.friction.references, *(() if self.law is self.friction else self.law.references))
+        title = f"{self.name} fitted to {len(self.series)} runs"
+        return Chapter("joint-friction", title, self.verdict, tables=tables, plots=plots, references=references)
 
 
 SIMILAR_RMSE = 1.02

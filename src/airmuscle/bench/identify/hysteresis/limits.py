@@ -5,20 +5,17 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from ....core import Array, Leaf, leaves
 from ....physics.muscle.friction import Friction
-from ...segment.sensor import estimate_noise
+from ...segment import Mask, estimate_noise
 from ..identifiability import UndeterminedCombination
 
-SPEED_INTERVALS = 40
-"""Intervals of the path over each of which a speed is measured, so that noise of the path has no effect (chosen)."""
-SPEED_QUANTILES = (0.05, 0.95)
-"""Quantiles of the speeds of the intervals that count as the lowest and the highest speed of the data (chosen)."""
+SPEED_INTERVALS, SPEED_QUANTILES = 40, (0.05, 0.95)
+"""Intervals of the path over each of which a speed is measured, so that noise of the path has no effect, and quantiles
+of their speeds that count as the lowest and the highest speed of the data (chosen)."""
 MIN_SPEED_RATIO = 3.0
 """Minimum ratio of the highest to the lowest speed for the terms of speed to be determined (chosen)."""
-
 STEP_SHARE = 0.1
 """Resolution of a path without noise, as a fraction of its median step between two rows (chosen): a transition within
 this part of a step is complete at the next row."""
@@ -80,42 +77,32 @@ class DataLimits:
         A force is at most the maximum force, a viscous force at the highest speed likewise, a characteristic speed is
         between the lowest and the highest speed, and a stiffness is at most what the readings show.
         """
-        low, high = leaf.declared.bounds
-        narrow_low, narrow_high = -math.inf, math.inf
-        if leaf.declared.unit == "N":
-            narrow_high = self.force
-        elif leaf.declared.unit == "N/m":
-            narrow_high = self.stiffness
-        elif leaf.declared.unit == "N s/m" and self.high_speed > 0:
-            narrow_high = self.force / self.high_speed
-        elif leaf.declared.unit == "m/s" and 0 < self.low_speed < self.high_speed:
-            narrow_low, narrow_high = self.low_speed, self.high_speed
-        narrow_low, narrow_high = max(low, narrow_low), min(high, narrow_high)
-        return (narrow_low, narrow_high) if narrow_low < narrow_high else (low, high)
+        narrowed = {"N": (-math.inf, self.force), "N/m": (-math.inf, self.stiffness)}
+        if self.high_speed > 0:
+            narrowed["N s/m"] = (-math.inf, self.force / self.high_speed)
+        if 0 < self.low_speed < self.high_speed:
+            narrowed["m/s"] = (self.low_speed, self.high_speed)
+        (low, high), ends = leaf.declared.bounds, narrowed.get(leaf.declared.unit, (-math.inf, math.inf))
+        within = max(low, ends[0]), min(high, ends[1])
+        return within if within[0] < within[1] else (low, high)
 
 
-def interval_speeds(path: Array, time: Array, rows: npt.NDArray[np.bool_]) -> Array:
-    """Speeds [m/s] at which a path [m] passed intervals of equal length in one direction and ended in a fitted row."""
-    width = float(np.ptp(path)) / SPEED_INTERVALS
-    if not width > 0:
-        return np.empty(0)
-    interval = np.floor((path - path.min()) / width)
-    steps = np.sign(np.diff(interval))
-    crossings = np.flatnonzero(steps) + 1
-    one_way = np.flatnonzero(steps[crossings[1:] - 1] == steps[crossings[:-1] - 1])
-    first, last = crossings[one_way], crossings[one_way + 1]
-    kept = rows[last] & (time[last] > time[first])
-    first, last = first[kept], last[kept]
-    return np.asarray(np.abs(path[last] - path[first]) / (time[last] - time[first]))
+def data_limits(force: Array, path: Array, time: Array | None, rows: Mask) -> DataLimits:
+    """The limits of a run: forces [N] and the path [m] over the time [s], at the fitted rows; arrays (N,).
 
-
-def data_limits(force: Array, path: Array, time: Array | None, rows: npt.NDArray[np.bool_]) -> DataLimits:
-    """The limits of a run: forces [N] and the path [m] over the time [s], at the fitted rows; arrays (N,)."""
-    greatest = float(np.max(np.abs(force[rows]), initial=0.0))
-    if time is None or len(path) < 2:
-        return DataLimits(greatest, float("nan"), float("nan"))
-    moving = interval_speeds(path, time, rows)
-    low, high = np.quantile(moving, SPEED_QUANTILES) if moving.size else (np.nan, np.nan)
+    The speeds are those at which the path passed intervals of equal length in one direction and ended in a fitted row.
+    """
+    greatest, low, high = float(np.max(np.abs(force[rows]), initial=0.0)), math.nan, math.nan
+    width = float(np.ptp(path)) / SPEED_INTERVALS if len(path) else 0.0
+    if time is not None and width > 0:
+        steps = np.sign(np.diff(np.floor((path - path.min()) / width)))
+        crossings = np.flatnonzero(steps) + 1
+        one_way = np.flatnonzero(steps[crossings[1:] - 1] == steps[crossings[:-1] - 1])
+        first, last = crossings[one_way], crossings[one_way + 1]
+        kept = rows[last] & (time[last] > time[first])
+        first, last = first[kept], last[kept]
+        if first.size:
+            low, high = np.quantile(np.abs(path[last] - path[first]) / (time[last] - time[first]), SPEED_QUANTILES)
     return DataLimits(greatest, float(low), float(high))
 
 
@@ -124,42 +111,34 @@ def resolved_stiffness(path: Array, hysteresis: Array) -> float:
 
     path        displacement at the fitted rows [m], shape (N,)
     hysteresis  force without its static curve at these rows [N], shape (N,)
+
+    The resolution is the displacement below which nothing is seen: the noise, a tenth of the median step, or the step
+    of a reading that is repeated during the motion.
     """
-    resolution = _path_resolution(path)
-    amplitude = float(np.quantile(np.abs(hysteresis), AMPLITUDE_QUANTILE)) if resolution else 0.0
-    return amplitude / resolution if amplitude > 0 else math.inf
-
-
-def _path_resolution(path: Array) -> float:
-    """The displacement below which nothing is seen [m]: the noise, a tenth of the median step, or the step of a reading
-    that is repeated during the motion; 0 without a motion."""
     steps = np.abs(np.diff(path))
     moving = steps > 0
     if not moving.any():
-        return 0.0
+        return math.inf
     repeated = np.count_nonzero(~moving[1:-1] & (moving[:-2] | moving[2:]))
     share = 1.0 if repeated > MAX_REPEATED * steps.size else STEP_SHARE
-    return max(estimate_noise(path), share * float(np.median(steps[moving])))
+    resolution = max(estimate_noise(path), share * float(np.median(steps[moving])))
+    amplitude = float(np.quantile(np.abs(hysteresis), AMPLITUDE_QUANTILE))
+    return amplitude / resolution if amplitude > 0 else math.inf
 
 
 def combine_limits(limits: tuple[DataLimits, ...]) -> DataLimits:
     """The limits of several runs together."""
-    return DataLimits(
-        max(each.force for each in limits),
-        float(np.min([each.low_speed for each in limits])),
-        float(np.max([each.high_speed for each in limits])),
-        max(each.stiffness for each in limits),
-    )
+    low, high = np.min([each.low_speed for each in limits]), np.max([each.high_speed for each in limits])
+    force, stiffness = max(each.force for each in limits), max(each.stiffness for each in limits)
+    return DataLimits(force, float(low), float(high), stiffness)
 
 
 def parameters_on_bounds(friction: Friction, limits: DataLimits) -> tuple[str, ...]:
     """Paths of the fitted parameters that are on a bound, declared or set by the data; 0 is no such bound."""
-    on_bounds = []
-    for leaf in leaves(friction):
-        low, high = limits.bounds(leaf)
-        if leaf.declared.fitted and ((low > 0 and leaf.value <= 1.01 * low) or leaf.value >= 0.99 * high):
-            on_bounds.append(leaf.path)
-    return tuple(on_bounds)
+    bounds = [(leaf, *limits.bounds(leaf)) for leaf in leaves(friction) if leaf.declared.fitted]
+    return tuple(
+        leaf.path for leaf, low, high in bounds if (low > 0 and leaf.value <= 1.01 * low) or leaf.value >= 0.99 * high
+    )
 
 
 def undetermined_parameters(
@@ -180,14 +159,10 @@ def limit_reservations(
         for name in parameters_on_bounds(friction, limits)
         if declared[name].unit == "N" and limits.force < declared[name].bounds[1]
     ]
-    if friction.rate_independent:
-        return reasons
-    too_uniform = speed_reservation(limits, axis)
-    if too_uniform:
-        return [*reasons, too_uniform]
-    if undetermined_parameters(friction, limits, weak):
-        reasons.append("A law with terms of speed is justified only if all of its parameters are determined.")
-    return reasons
+    of_speed = "" if friction.rate_independent else speed_reservation(limits, axis)
+    if not friction.rate_independent and not of_speed and undetermined_parameters(friction, limits, weak):
+        of_speed = "A law with terms of speed is justified only if all of its parameters are determined."
+    return [*reasons, of_speed] if of_speed else reasons
 
 
 def speed_reservation(limits: DataLimits, axis: Axis) -> str:

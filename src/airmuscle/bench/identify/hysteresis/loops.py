@@ -30,10 +30,10 @@ class HysteresisLoop(ShortRepr):
     run: segment.Run
     friction_path: loop_fit.FrictionPath
     static_curve: loop_fit.StaticCurve
-    fitted_rows: loop_fit.RowMask
+    fitted_rows: segment.Mask
     transient_rows: int = 0
     """Number of fitted rows in which the pressure changes quickly."""
-    repeat: tuple[Recording, loop_fit.RowMask] | None = None
+    repeat: tuple[Recording, segment.Mask] | None = None
     """A second run of the same kind at the same level, for validation, and its fitted rows."""
 
     @property
@@ -41,7 +41,7 @@ class HysteresisLoop(ShortRepr):
         """Kind and level of the run, for example `isobaric at 300 kPa`."""
         return describe_run(self.run)
 
-    def series(self, recording: Recording, fitted_rows: loop_fit.RowMask) -> LoopSeries:
+    def series(self, recording: Recording, fitted_rows: segment.Mask) -> LoopSeries:
         """The arrays of a run of this loop for a fit of friction."""
         return loop_fit.make_loop_series(recording, self.static_curve, self.friction_path, fitted_rows)
 
@@ -88,9 +88,9 @@ def find_loops(
     quasi-static. Raises IdentificationError if no run gives a loop: each has one branch, or is neither isobaric nor
     isometric while no characteristic is given.
     """
-    sensors, loops, failed = segment.estimate_sensors(recordings), list[HysteresisLoop](), list[IdentificationError]()
+    sensors, loops, muscles = segment.estimate_sensors(recordings), list[HysteresisLoop](), list[Sequence[object]]()
     empty = [recording.origin for recording in recordings if not len(recording)]
-    failed += [IdentificationError(f"{origin}: the recording has no rows. Give one with a loop.") for origin in empty]
+    failed = [IdentificationError(f"{origin}: the recording has no rows. Give one with a loop.") for origin in empty]
     each_run = [part for recording in recordings if len(recording) for part in _separate_runs(recording, sensors)]
     for recording, run in each_run:
         try:
@@ -98,8 +98,11 @@ def find_loops(
         except IdentificationError as error:
             failed.append(error)
             continue
-        same = next((i for i, other in enumerate(loops) if _is_repeat(other, loop)), None)
+        muscle: Sequence[object] = [recording.constants.get(name) for name in ("resting_length", "specimen")]
+        at_level = [i for i, other in enumerate(loops) if _is_same_level(other.run, run)]
+        same = next((i for i in at_level if muscles[i] == muscle), None)
         if same is None:
+            muscles.append(muscle)
             loops.append(loop)
         elif loops[same].repeat is None:
             loops[same] = dataclasses.replace(loops[same], repeat=(recording, loop.fitted_rows))
@@ -108,13 +111,6 @@ def find_loops(
     for reason in failed:
         warnings.warn(AirmuscleWarning(HintedText("left out: ", reason.message)), stacklevel=2)
     return tuple(loops)
-
-
-def _is_repeat(first: HysteresisLoop, other: HysteresisLoop) -> bool:
-    """Whether a loop is of the same muscle as the first, and of the same kind and level."""
-    one, two = first.recording.constants, other.recording.constants
-    same_muscle = all(one.get(name) == two.get(name) for name in ("resting_length", "specimen"))
-    return same_muscle and _is_same_level(first.run, other.run)
 
 
 def _separate_runs(recording: Recording, sensors: Mapping[str, segment.Sensor]) -> list[tuple[Recording, segment.Run]]:
@@ -160,7 +156,11 @@ def _make_loop(
             "static curve cannot be a polynomial in one of them.",
             hint=Hint("To take the muscle's characteristic as the static curve", "law"),
         )
-    rows, transient = _select_rows(recording, sensors, all_rows), 0
+    force, transient = recording["force"], 0
+    rows = (force > 0) & np.isfinite(force)
+    if "force" in sensors:
+        rows &= sensors["force"].censoring(force) == 0
+    rows = rows if all_rows else rows & segment.quasi_static_rows(recording, sensors)
     _check_two_directions(recording, _directions(recording, friction_path), rows)
     if run.kind != segment.ISOBARIC:  # rows in which the pressure changes quickly, whatever the length does
         columns = {name: recording[name] for name in ("time", "pressure") if name in recording}
@@ -169,15 +169,7 @@ def _make_loop(
     return HysteresisLoop(recording, run, friction_path, static_curve, rows, transient)
 
 
-def _select_rows(recording: Recording, sensors: Mapping[str, segment.Sensor], all_rows: bool) -> loop_fit.RowMask:
-    force = recording["force"]
-    rows = (force > 0) & np.isfinite(force)
-    if "force" in sensors:
-        rows &= sensors["force"].censoring(force) == 0
-    return rows if all_rows else rows & segment.quasi_static_rows(recording, sensors)
-
-
-def _check_two_directions(recording: Recording, direction: np.ndarray, fitted_rows: loop_fit.RowMask) -> None:
+def _check_two_directions(recording: Recording, direction: np.ndarray, fitted_rows: segment.Mask) -> None:
     for sign, branch in ((1, "rising"), (-1, "falling")):
         rows = np.count_nonzero(direction == sign)
         if not np.any((direction == sign) & fitted_rows):

@@ -23,45 +23,11 @@ from ..model_evidence import (
 from .limits import DataLimits, limit_reservations, parameters_on_bounds, undetermined_parameters
 from .search import LoopSeries, branch_gap, free_parameters, repeat_difference
 
-
-def plot_hysteresis(series: LoopSeries, friction: Friction, coefficients: Array, title: str, *, ax: Any = None) -> Any:
-    """Measured force minus static curve over the path, with the friction force; and the residuals below.
-
-    `coefficients` are those of the static curve. `ax` is an Axes, or a sequence of two, also for the residuals.
-    Returns `ax`, or a new Matplotlib figure if it is None. Raises ParameterError for another `ax`.
-    """
-    measured = series.target - series.design_matrix @ coefficients
-    if ax is None:
-        figure, axes = new_figure(2, 1, width=6.0, height=5.6, sharex=True)
-    else:
-        figure, axes = None, given_axes(ax, 1, "plot of a loop")[:2]
-    path, rows, force = series.path * series.axis.factor, series.fitted_rows, -series.friction_force(friction)
-    points: dict[str, Any] = {"marker": "o", "markersize": 3, "linestyle": "none", "color": LINES[0], "alpha": 0.5}
-    axes[0].plot(path[rows], measured[rows], **points, label="measured - static curve")
-    axes[0].plot(path, force, color=LINES[1], label=f"{type(friction).__name__}, whole path")
-    axes[0].set_ylabel("force [N]")
-    for lower in axes[1:]:
-        lower.plot(path[rows], (force - measured)[rows], **points)
-        lower.axhline(0.0, color=LINES[1])
-        lower.set_ylabel("residual (model - measured) [N]")
-    axes[-1].set_xlabel(series.axis.label)
-    relabel_in_display_units(axes)
-    if figure is None:
-        axes[0].legend(loc="best", frameon=False, fontsize=8)
-        return ax
-    axes[0].set_title(title)
-    legend_below(figure, axes[0], 2)
-    return figure
-
-
 SIGNIFICANCE_LEVEL = 0.01
 """p-value below which an F test is significant (chosen)."""
-
-MAX_TRANSIENT_RATIO = 0.1
-"""Maximum part of the fitted rows in which the pressure may change quickly for a friction to be justified (chosen)."""
-
-MIN_BRANCH_RATIO = 0.1
-"""Minimum ratio of the rows of the two branches for a friction to be justified (chosen)."""
+MAX_TRANSIENT_RATIO, MIN_BRANCH_RATIO = 0.1, 0.1
+"""Maximum part of the fitted rows in which the pressure may change quickly, and minimum ratio of the rows of the two
+branches, for a friction to be justified (chosen)."""
 
 
 class Misfit(NamedTuple):
@@ -217,22 +183,17 @@ class HysteresisFit(FrictionFit):
     @property
     def reservations_of_rows(self) -> tuple[str, ...]:
         """The reasons, as sentences, that follow from the fitted rows of the loop and hold for every law."""
-        reasons = []
-        direction = self.series.direction[self.series.fitted_rows]
-        up, down = int(np.count_nonzero(direction > 0)), int(np.count_nonzero(direction < 0))
-        if MIN_BRANCH_RATIO * max(up, down) > min(up, down):
-            reasons.append(
-                f"One branch has very few rows ({min(up, down)} against {max(up, down)}); measure the loop more slowly."
-            )
-        if not np.isfinite(self.gap):
-            reasons.append("The branches have no common part of the path in the fitted rows.")
-        transient = self.series.transient_rows
-        if transient > MAX_TRANSIENT_RATIO * direction.size:
-            reasons.append(
-                f"The pressure changes quickly in {transient} of {direction.size} fitted rows; there the pulses of "
-                "valves and the dynamics of the gas appear as friction."
-            )
-        return tuple(reasons)
+        direction, transient = self.series.direction[self.series.fitted_rows], self.series.transient_rows
+        few, many = sorted(int(np.count_nonzero(direction == sign)) for sign in (1, -1))
+        found = (
+            (few < MIN_BRANCH_RATIO * many,
+             f"One branch has very few rows ({few} against {many}); measure the loop more slowly."),
+            (not np.isfinite(self.gap), "The branches have no common part of the path in the fitted rows."),
+            (transient > MAX_TRANSIENT_RATIO * direction.size,
+             f"The pressure changes quickly in {transient} of {direction.size} fitted rows; there the pulses of valves "
+             "and the dynamics of the gas appear as friction."),
+        )  # fmt: skip
+        return tuple(reason for holds, reason in found if holds)
 
     @property
     def verdict(self) -> str:
@@ -257,25 +218,45 @@ class HysteresisFit(FrictionFit):
         return Table("parameters", f"Parameters of {self.name}", columns, brief=len(rows))
 
     def plot(self, *, ax: Any = None) -> Any:
-        """Plot the loop with the friction force, and the residuals.
+        """Plot the measured force minus the static curve over the path, with the friction force, and the residuals.
 
         `ax` is an Axes for the loop, or a sequence of two, also for the residuals, and is returned; without it a new
         figure is returned. Raises ParameterError for another `ax`.
         """
+        series, figure = self.series, None
+        if ax is None:
+            figure, axes = new_figure(2, 1, width=6.0, height=5.6, sharex=True)
+        else:
+            axes = given_axes(ax, 1, "plot of a loop")[:2]
+        measured, force = (
+            series.target - series.design_matrix @ self.coefficients,
+            -series.friction_force(self.friction),
+        )
+        path, rows = series.path * series.axis.factor, series.fitted_rows
+        points: dict[str, Any] = {"marker": "o", "markersize": 3, "linestyle": "none", "color": LINES[0], "alpha": 0.5}
+        axes[0].plot(path[rows], measured[rows], **points, label="measured - static curve")
+        axes[0].plot(path, force, color=LINES[1], label=f"{self.name}, whole path")
+        axes[0].set_ylabel("force [N]")
+        for lower in axes[1:]:
+            lower.plot(path[rows], (force - measured)[rows], **points)
+            lower.axhline(0.0, color=LINES[1])
+            lower.set_ylabel("residual (model - measured) [N]")
+        axes[-1].set_xlabel(series.axis.label)
+        relabel_in_display_units(axes)
+        if figure is None:
+            axes[0].legend(loc="best", frameon=False, fontsize=8)
+            return ax
         rms = f"{self.rmse_without_friction:.3g} N without, {self.rmse:.3g} N with friction"
-        title = f"{self.series.origin}: rms error {rms}"
-        return plot_hysteresis(self.series, self.friction, self.coefficients, title, ax=ax)
+        axes[0].set_title(f"{series.origin}: rms error {rms}")
+        legend_below(figure, axes[0], 2)
+        return figure
 
     def chapter(self) -> Chapter:
         """The description of the fit: verdict, parameters, and the loop with the friction force."""
-        return Chapter(
-            name="friction",
-            title=f"{self.name} fitted to {self.series.origin}",
-            summary=self.verdict,
-            tables=(self.parameter_table,),
-            plots=(Plot("friction", f"Loop and hysteresis described by {self.name}.", self.plot),),
-            references=self.friction.references,
-        )
+        title, caption = f"{self.name} fitted to {self.series.origin}", f"Loop and hysteresis described by {self.name}."
+        tables, plots = (self.parameter_table,), (Plot("friction", caption, self.plot),)
+        references = self.friction.references
+        return Chapter("friction", title, self.verdict, tables=tables, plots=plots, references=references)
 
 
 def assess_fit(
@@ -289,12 +270,9 @@ def assess_fit(
         second = [each[repeat.fitted_rows] for each in (repeat.path, values, repeat.direction)]
         repeatability = repeat_difference(*first, *second).rms / np.sqrt(2)
     path, _, direction = first
+    gap, left = branch_gap(*first).rms, branch_gap(path, residuals[run.fitted_rows], direction).rms
+    numbers = evidence(friction, (run,), () if repeat is None else (repeat,))
     return HysteresisFit(
-        **evidence(friction, (run,), () if repeat is None else (repeat,)),
-        weak_combinations=weak,
-        coefficients=coefficients,
-        gap=branch_gap(*first).rms,
-        residual_gap=branch_gap(path, residuals[run.fitted_rows], direction).rms,
-        repeatability=repeatability,
-        series=run,
-    )
+        **numbers, weak_combinations=weak, coefficients=coefficients, gap=gap, residual_gap=left,
+        repeatability=repeatability, series=run,
+    )  # fmt: skip

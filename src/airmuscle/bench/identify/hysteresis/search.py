@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from ....core import Array, Leaf, tree
 from ....physics.muscle.friction import Friction, PressureScaledFriction
+from ...segment import Mask
 from ..identifiability import UndeterminedCombination, analyse_identifiability
 from ..model_evidence import effective_sample_size
 from .limits import MILLIMETRES, Axis, DataLimits, combine_limits
@@ -31,23 +31,17 @@ class BinnedDifference:
         return float(np.sqrt(np.average(self.values**2, weights=self.weights))) if self.values.size else float("nan")
 
 
-EMPTY = BinnedDifference(np.empty(0), np.empty(0))
-
-
 def binned_difference(path: Array, values: Array, other_path: Array, other_values: Array) -> BinnedDifference:
     """Second branch minus first branch in the bins of the common path where both have rows.
 
-    A bin with n rows of one branch and m of the other has the weight n m/(n + m).
-
-    The values should be residuals from a common static curve, not forces: within a bin the slope of a steep curve would
-    appear as a difference.
+    A bin with n rows of one branch and m of the other has the weight n m/(n + m). The values should be residuals from a
+    common static curve, not forces: within a bin the slope of a steep curve would appear as a difference.
     """
-    if not path.size or not other_path.size:
-        return EMPTY
-    low, high = max(path.min(), other_path.min()), min(path.max(), other_path.max())
-    edges = np.linspace(low, high, BIN_COUNT + 1)
+    low = max(path.min(initial=np.inf), other_path.min(initial=np.inf))
+    high = min(path.max(initial=-np.inf), other_path.max(initial=-np.inf))
     if not low < high:
-        return EMPTY
+        return BinnedDifference(np.empty(0), np.empty(0))
+    edges = np.linspace(low, high, BIN_COUNT + 1)
     (first, n), (second, m) = _bin_means(path, values, edges), _bin_means(other_path, other_values, edges)
     common = (n > 0) & (m > 0)
     return BinnedDifference((second - first)[common], (n * m)[common] / (n + m)[common])
@@ -91,7 +85,7 @@ class LoopSeries:
     """Force [N] to be explained by the static curve and the friction, shape (N,)."""
     design_matrix: Array
     """Columns of the static curve, shape (N, C)."""
-    fitted_rows: npt.NDArray[np.bool_]
+    fitted_rows: Mask
     """Mask of the rows whose residuals are minimised."""
     direction: Array
     """1 where the path rises, -1 where it falls."""
@@ -159,12 +153,9 @@ def _fit_stiffnesses(
     from scipy.linalg import block_diag
     from scipy.optimize import lsq_linear
 
-    terms = np.vstack(
-        [
-            (friction.element_deflections(run.path) * np.reshape(factor, (-1, 1)))[run.fitted_rows]
-            for run, factor in zip(runs, factors or [1.0] * len(runs), strict=True)
-        ]
-    )
+    pairs = zip(runs, factors or [1.0] * len(runs), strict=True)
+    deflections = [(run, friction.element_deflections(run.path) * np.reshape(factor, (-1, 1))) for run, factor in pairs]
+    terms = np.vstack([each[run.fitted_rows] for run, each in deflections])
     norms = np.linalg.norm(terms, axis=0)
     norms = np.where(norms > 0, norms, 1.0)
     curves = block_diag(*(run.design_matrix[run.fitted_rows] for run in runs))
@@ -186,20 +177,18 @@ def _fit_scaled_stiffnesses(friction: PressureScaledFriction, runs: Sequence[Loo
 
     low, high = next(leaf for leaf in tree.leaves(friction) if leaf.path == "ambient_ratio").declared.bounds
 
-    def fitted(ratio: float) -> PressureScaledFriction:
+    def fitted(coordinate: float) -> PressureScaledFriction:
+        ratio = min(max(coordinate / (1.0 - coordinate), low), high)  # 0 to 1 covers all ratios evenly
         scale = dataclasses.replace(friction, ambient_ratio=ratio)
         factors = [1.0 if run.pressure is None else np.asarray(scale.pressure_factor(run.pressure)) for run in runs]
         return dataclasses.replace(scale, inner=_fit_stiffnesses(friction.inner, runs, factors))
 
     def square(coordinate: float) -> float:
-        residuals = _residuals(fitted(_ratio(coordinate)), runs)
+        residuals = _residuals(fitted(coordinate), runs)
         return float(residuals @ residuals)
 
-    def _ratio(coordinate: float) -> float:
-        return min(max(coordinate / (1.0 - coordinate), low), high)  # 0 to 1 covers all ratios evenly
-
     result = minimize_scalar(square, bounds=(0.0, high / (1.0 + high)), method="bounded", options={"xatol": 1e-4})
-    return fitted(_ratio(float(result.x)))
+    return fitted(float(result.x))
 
 
 def _residuals(friction: Friction, runs: Sequence[LoopSeries]) -> Array:
@@ -223,8 +212,7 @@ def _fit_iteratively(
             values[i] = coordinate.parameter_value(float(value))
         return tree.unflatten(friction, values)
 
-    start = [c.start for c in coordinates]
-    bounds = ([c.low for c in coordinates], [c.high for c in coordinates])
+    start, bounds = [c.start for c in coordinates], ([c.low for c in coordinates], [c.high for c in coordinates])
     result = least_squares(lambda x: _residuals(law(x), runs), start, bounds=bounds, x_scale=1.0, max_nfev=60)
     fitted = tree.with_parameters(friction, [leaf.value for leaf in tree.leaves(law(result.x))])
     names = [all_leaves[i].path for i in free]

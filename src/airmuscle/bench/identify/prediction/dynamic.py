@@ -21,10 +21,9 @@ from ..dynamic.fit import fit_dynamic
 from ..dynamic.record_model import ModelOutputs, RecordModel, commands_at
 from ..dynamic.reliability import RECORD_CONSEQUENCE
 from ..dynamic.result import DynamicFit
+from ..parameter_covariance import NORMAL_QUANTILE
 from . import result
 
-NORMAL_QUANTILE = 1.959963984540054
-"""97.5 % quantile of the normal distribution."""
 UNKNOWN = "not known from one record"
 """Words in place of the band of a plant that was fitted to one record, which does not show how records differ."""
 ASSUMED_DEVIATION = 0.01
@@ -69,9 +68,9 @@ class PlantUncertainty(ShortRepr):
 
     def source(self, name: str) -> str:
         """Where the band of a quantity comes from, or why there is none."""
+        if name not in self.deviations:
+            return ""
         if self.factor(name) is None:
-            if name not in self.deviations:
-                return ""
             return UNKNOWN if self.records == 1 else "not known, because the records did not predict each other"
         if not self.records:
             return "residuals of the fit of the plant, and the covariance of its parameters"

@@ -1,12 +1,12 @@
 """Report chapters: predicted records with errors, shares within the 95 % band, and measured and predicted values."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
 import numpy as np
 
-from ....core import RED, Array, cite, legend_below
+from ....core import RED, Array, cite, counted, legend_below
 from ....recording.columns import display_scale, displayed
 from ....report.chapter import BY_ROW, Chapter, Plot, Table, TableColumn
 from ...baselines import ARX, PERSISTENCE, TimedRecord, baseline_errors, skill
@@ -34,82 +34,58 @@ def prediction_chapters(model: str, thing: Any, predictions: Sequence[RecordPred
     return [_overview(model, thing, predictions), *(_record(i, each) for i, each in enumerate(predictions, 1))]
 
 
-def band_sources(predictions: Sequence[RecordPrediction]) -> list[str]:
-    """The sources of the bands of all records, each once."""
-    stated = [quantity for each in predictions for quantity in each.quantities if quantity.half_width is not None]
-    return [source for source in dict.fromkeys(quantity.band for quantity in stated) if source]
-
-
 def _overview(model: str, thing: Any, predictions: Sequence[RecordPrediction]) -> Chapter:
-    pairs = [(each, quantity) for each in predictions for quantity in each.quantities]
-    names = [quantity.name for _, quantity in pairs]
+    quantities = [quantity for each in predictions for quantity in each.quantities]
+    records = [each for each in predictions for _ in each.quantities]
+    names = [quantity.name for quantity in quantities]
+    half_widths = [None if q.half_width is None else float(np.median(q.half_width[q.compared])) for q in quantities]
     columns: dict[str, Any] = {
-        "record": [each.origin for each, _ in pairs],
+        "record": [each.origin for each in records],
         "quantity": names,
-        "rows": [int(quantity.compared.sum()) for _, quantity in pairs],
-        "rms error": TableColumn([quantity.rms for _, quantity in pairs], BY_ROW),
-        "maximum error": TableColumn([quantity.max_error for _, quantity in pairs], BY_ROW),
-        "in row": TableColumn([quantity.worst_row + 1 for _, quantity in pairs], brief=False),
-        "half width of the 95 % band": TableColumn(
-            [_half_width(quantity) for _, quantity in pairs], BY_ROW, short="95 % band ±"
-        ),
+        "rows": [int(quantity.compared.sum()) for quantity in quantities],
+        "rms error": TableColumn([quantity.rms for quantity in quantities], BY_ROW),
+        "maximum error": TableColumn([quantity.max_error for quantity in quantities], BY_ROW),
+        "in row": TableColumn([quantity.worst_row + 1 for quantity in quantities], brief=False),
+        "half width of the 95 % band": TableColumn(half_widths, BY_ROW, short="95 % band ±"),
         "unit": unit_column(names),
         **_baseline_columns(predictions),
-        "rows within the band": TableColumn(
-            [quantity.share for _, quantity in pairs], "1", "%", digits=3, short="within"
-        ),
-        "band": TableColumn([quantity.band or NO_BAND for _, quantity in pairs], brief=False),
-        "notes": TableColumn(["; ".join(each.notes) for each, _ in pairs], brief=False),
+        "rows within the band": TableColumn([q.share for q in quantities], "1", "%", digits=3, short="within"),
+        "band": TableColumn([quantity.band or NO_BAND for quantity in quantities], brief=False),
+        "notes": TableColumn(["; ".join(each.notes) for each in records], brief=False),
     }
-    number = f"{len(predictions)} {'record' if len(predictions) == 1 else 'records'}"
+    number = counted(len(predictions), "record")
     sentences = [f"{number} that {model} was not fitted to, predicted and compared with the measured values."]
-    sources = band_sources(predictions)
+    sources = list(filter(None, dict.fromkeys(q.band for q in quantities if q.half_width is not None)))
     sentences += [f"Band: {source.rstrip('.')}." for source in sources]
-    if not sources and all(quantity.share is None for _, quantity in pairs):
-        reasons = dict.fromkeys(quantity.band or NO_BAND for _, quantity in pairs)
+    if not sources and all(quantity.share is None for quantity in quantities):
+        reasons = dict.fromkeys(quantity.band or NO_BAND for quantity in quantities)
         sentences.append(f"No share of rows within a band is given: {'; '.join(reasons)}.")
     caption = "Errors: predicted minus measured." + (f" {BASELINES}" if "skill" in columns else "")
     table = Table("predictions", "Errors of the predicted values", columns, caption, brief=MAX_BRIEF)
-    return Chapter(
-        name="prediction",
-        title=f"Prediction by {model}",
-        summary=" ".join(sentences),
-        tables=(table,),
-        notes=tuple(f"{each.origin}: {note}" for each in predictions for note in each.notes),
-        references=tuple(cite(thing)),
-    )
+    notes = tuple(f"{each.origin}: {note}" for each in predictions for note in each.notes)
+    title, references = f"Prediction by {model}", tuple(cite(thing))
+    return Chapter("prediction", title, " ".join(sentences), tables=(table,), notes=notes, references=references)
 
 
 def _baseline_columns(predictions: Sequence[RecordPrediction]) -> dict[str, Any]:
     """The rms errors of the baselines of all quantities, and the skill of the model; empty without records in time."""
-    found = [(quantity, errors) for each in _with_baselines(predictions) for quantity, errors in each]
-    if not any(errors for _, errors in found):
+    timed = {each: record for each in predictions if (record := _timed(each)) is not None}
+    names = {each: tuple(quantity.name for quantity in each.quantities) for each in predictions}
+    errors: dict[QuantityPrediction, dict[str, float]] = {q: {} for each in predictions for q in each.quantities}
+    for kind in dict.fromkeys(names.values()):  # the ARX model is fitted to the records with the same quantities
+        alike = [each for each in timed if names[each] == kind]
+        for each, found in zip(alike, baseline_errors([timed[other] for other in alike]), strict=True):
+            for k, quantity in enumerate(each.quantities):
+                errors[quantity] = {name: float(values[k]) for name, values in found.items()}
+    if not any(errors.values()):
         return {}
-    persistence, arx = ([errors.get(name) for _, errors in found] for name in (PERSISTENCE, ARX))
-    skills = [skill(quantity.rms, errors) for quantity, errors in found]
+    persistence, arx = ([each.get(name) for each in errors.values()] for name in (PERSISTENCE, ARX))
+    skills = [skill(quantity.rms, each) for quantity, each in errors.items()]
     return {
         f"rms error of {PERSISTENCE}": TableColumn(persistence, BY_ROW, short=PERSISTENCE),
         f"rms error of an {ARX}": TableColumn(arx, BY_ROW, short="ARX"),
         "skill": TableColumn(skills, "1", digits=2),
     }
-
-
-def _with_baselines(
-    predictions: Sequence[RecordPrediction],
-) -> Iterator[list[tuple[QuantityPrediction, dict[str, float]]]]:
-    """For each record its quantities with the rms errors of the baselines, from the records with the same ones."""
-    timed = {i: record for i, each in enumerate(predictions) if (record := _timed(each)) is not None}
-    errors: dict[int, list[dict[str, float]]] = {}
-    for names in dict.fromkeys(_names(each) for each in predictions):
-        alike = [i for i in timed if _names(predictions[i]) == names]
-        for i, found in zip(alike, baseline_errors([timed[i] for i in alike]), strict=True):
-            errors[i] = [{name: float(values[k]) for name, values in found.items()} for k in range(len(names))]
-    for i, each in enumerate(predictions):
-        yield list(zip(each.quantities, errors.get(i, [{} for _ in each.quantities]), strict=True))
-
-
-def _names(prediction: RecordPrediction) -> tuple[str, ...]:
-    return tuple(quantity.name for quantity in prediction.quantities)
 
 
 def _timed(prediction: RecordPrediction) -> TimedRecord | None:
@@ -120,11 +96,6 @@ def _timed(prediction: RecordPrediction) -> TimedRecord | None:
     quantities = prediction.quantities
     measured, compared = (np.column_stack([getattr(q, name) for q in quantities]) for name in ("measured", "compared"))
     return TimedRecord(time, measured, prediction.inputs, compared)
-
-
-def _half_width(quantity: QuantityPrediction) -> float | None:
-    """The median half width of the band over the compared rows; None without a band."""
-    return None if quantity.half_width is None else float(np.median(quantity.half_width[quantity.compared]))
 
 
 def _record(number: int, prediction: RecordPrediction) -> Chapter:
@@ -147,15 +118,10 @@ def _record(number: int, prediction: RecordPrediction) -> Chapter:
         for quantity in prediction.quantities
     )
     caption = f"{prediction.origin}: measured and predicted values with the 95 % band, and errors."
-    return Chapter(
-        name=stem,
-        title=f"Record {number}: {prediction.origin}",
-        summary=f"{errors[:1].upper()}{errors[1:]}.",
-        tables=(Table(stem, "Measured and predicted values", columns, series=True),),
-        plots=(Plot(stem, caption, partial(_figure, prediction)),),
-        notes=prediction.notes,
-        brief=False,
-    )
+    title, summary = f"Record {number}: {prediction.origin}", f"{errors[:1].upper()}{errors[1:]}."
+    tables = (Table(stem, "Measured and predicted values", columns, series=True),)
+    plots = (Plot(stem, caption, partial(_figure, prediction)),)
+    return Chapter(stem, title, summary, tables=tables, plots=plots, notes=prediction.notes, brief=False)
 
 
 def _figure(prediction: RecordPrediction) -> Any:

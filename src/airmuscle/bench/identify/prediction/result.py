@@ -5,7 +5,6 @@ import dataclasses
 from collections.abc import Mapping, Sequence
 
 import numpy as np
-import numpy.typing as npt
 
 from ....core import Array, ColumnError, Hint, ShortRepr
 from ....physics.muscle import CreepElements
@@ -13,7 +12,7 @@ from ....physics.muscle.characteristic import Characteristic, ForceLaw, Validity
 from ....physics.muscle.friction import Friction, NoFriction
 from ....recording import Recording
 from ....recording.columns import displayed
-from ...segment import rate_of_change
+from ...segment import Mask, rate_of_change
 from ..campaign.friction_and_release import predicted_force
 from ..compared_points import FORCE_MARGIN
 from ..problem import FORCE, evaluate, fitted_quantity_of
@@ -48,16 +47,25 @@ def predict_static(
     ColumnError for a recording without these columns or without tension.
     """
     complete, tension = _rows_with_tension(recording)
-    quantity = fitted_quantity_of(law)
+    quantity, remarks = fitted_quantity_of(law), list[str]()
     moving = [part for part in (friction, creep) if part not in (None, NoFriction(), CreepElements())]
-    remarks, faster = _notes(recording, bool(moving) and quantity == FORCE, validity_range, rates or {})
+    if moving and quantity == FORCE and recording.constants.get("resting_length") is None:
+        remarks = ["friction and creep of the muscle are left out, because the record states no resting length"]
+    limits, faster = dict[str, tuple[float, float]](), rate_notes(recording, rates or {})
+    if validity_range is not None:
+        limits = {"pressure": validity_range.pressure, "contraction": validity_range.contraction}
+    remarks += [*range_notes(recording, limits), *faster]
     pulling = np.zeros(len(recording), dtype=bool)
     if isinstance(law, ForceLaw):
         limit = FORCE_MARGIN * float(np.nanmax(recording["force"]))
         force = predicted_force(law, recording, friction or NoFriction(), creep or CreepElements(), limit)
-        predicted = np.maximum(force, 0.0)
-        pulling = complete & ~tension & (predicted > (half_width or 0.0))
-        remarks += _slack_notes(predicted, pulling, int((complete & ~tension).sum()))
+        predicted, slack = np.maximum(force, 0.0), complete & ~tension
+        pulling = slack & (predicted > (half_width or 0.0))
+        if pulling.any():
+            remarks.append(
+                f"the law pulls at {int(pulling.sum())} of {int(slack.sum())} rows without tension, up to "
+                f"{float(np.max(predicted[pulling])):.4g} N; these rows count as errors outside the band"
+            )
     else:
         predicted = evaluate(law, quantity.method, quantity.arguments, recording)
     known = np.isfinite(predicted)
@@ -66,22 +74,19 @@ def predict_static(
     widths = None if half_width is None else np.full(len(recording), float(half_width))
     measured = recording[quantity.name]
     result = QuantityPrediction(quantity.name, measured, predicted, widths, (tension | pulling) & known, band)
-    limits = ends_of(validity_range)
     driving = np.column_stack([recording[name] for name in COLUMNS if name != quantity.name])
     prediction = RecordPrediction(recording, (result,), (*remarks, *notes), rows_outside(recording, limits), driving)
-    return with_band_notes(prediction, [*differences, *faster], USUAL)
+    return with_band_notes(prediction, [*differences, *(["a faster motion"] if faster else [])], USUAL)
 
 
-def _rows_with_tension(recording: Recording) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
+def _rows_with_tension(recording: Recording) -> tuple[Mask, Mask]:
     """Masks (N,) of the complete rows, and of those with tension. Raises ColumnError without columns or tension."""
     missing = [name for name in COLUMNS if name not in recording]
     if missing:
-        hint = None
-        if missing == ["contraction"]:
-            hint = Hint("To compute it from the length", "resting_length", "300 mm")
+        by_length = Hint("To compute it from the length", "resting_length", "300 mm")
         raise ColumnError(
             f"{recording.origin}: the prediction of a static law is compared with pressure, contraction and force; "
-            f"missing is {', '.join(missing)}.", hint=hint,
+            f"missing is {', '.join(missing)}.", hint=by_length if missing == ["contraction"] else None,
         )  # fmt: skip
     complete = np.isfinite(sum(recording[name] for name in COLUMNS))
     tension = (recording["force"] > 0.0) & complete
@@ -93,30 +98,8 @@ def _rows_with_tension(recording: Recording) -> tuple[npt.NDArray[np.bool_], npt
     return complete, tension
 
 
-def _notes(
-    recording: Recording, moving: bool, limits: ValidityRange | None, rates: Mapping[str, float | None]
-) -> tuple[list[str], list[str]]:
-    """The notes on what limits the prediction, and those of them that name a faster record as a difference."""
-    notes, faster = [], rate_notes(recording, rates)
-    if moving and recording.constants.get("resting_length") is None:
-        notes.append("friction and creep of the muscle are left out, because the record states no resting length")
-    return [*notes, *range_notes(recording, ends_of(limits)), *faster], ["a faster motion"] if faster else []
-
-
-def _slack_notes(predicted: Array, pulling: npt.NDArray[np.bool_], count: int) -> list[str]:
-    """The rows without tension at which the law pulls, which count as outside the band."""
-    if not pulling.any():
-        return []
-    return [
-        f"the law pulls at {int(pulling.sum())} of {count} rows without tension, up to "
-        f"{float(np.max(predicted[pulling])):.4g} N; these rows count as errors outside the band"
-    ]
-
-
-LIMIT_MARGIN = 1e-3
-"""Noise of the sensors at the limits of the range of a law, relative to the range (chosen)."""
-NOISY_MARGIN = 0.05
-"""The same for the range of a noisy measured quantity (chosen)."""
+LIMIT_MARGIN, NOISY_MARGIN = 1e-3, 0.05
+"""Noise of the sensors at the limits of the range of a law, relative to the range, and of a noisy quantity (chosen)."""
 RATE_MARGIN = 1.25
 """Ratio of the rate of a record to that of the fit from which it is outside (chosen)."""
 LENGTH_MARGIN = 1e-3
@@ -124,18 +107,12 @@ LENGTH_MARGIN = 1e-3
 Ends = Mapping[str, tuple[float, float]]
 """Lower and upper end of quantities [SI], by name."""
 NOT_THERE = "the stated band does not apply there"
-MIN_SHARE = 0.8
-"""Share of the rows within a 95 % band below which the band does not hold for a record (chosen)."""
-MIN_ROWS = 5
-"""Minimum number of compared rows for that statement (chosen)."""
+MIN_SHARE, MIN_ROWS = 0.8, 5
+"""Share of the rows within a 95 % band below which the band does not hold for a record, and minimum number of compared
+rows for that statement (chosen)."""
 
 
-def ends_of(limits: ValidityRange | None) -> Ends:
-    """The ends of pressure [Pa] and contraction of a range; empty without one."""
-    return {} if limits is None else {"pressure": limits.pressure, "contraction": limits.contraction}
-
-
-def rows_outside(recording: Recording, ends: Ends, margin: float = LIMIT_MARGIN) -> npt.NDArray[np.bool_] | None:
+def rows_outside(recording: Recording, ends: Ends, margin: float = LIMIT_MARGIN) -> Mask | None:
     """The mask (N,) of the rows with a quantity outside its ends; None without ends."""
     masks = [_beyond(recording[name], *each, margin) for name, each in ends.items() if name in recording]
     return np.asarray(np.logical_or.reduce(masks)) if masks else None
@@ -151,10 +128,8 @@ def range_notes(recording: Recording, ends: Ends, margin: float = LIMIT_MARGIN) 
         for name, each in ends.items()
         if name in recording and _beyond(recording[name], *each, margin).any()
     ]
-    return [
-        f"{int(outside.sum())} of {len(recording)} rows are outside the range of the measurements of the fit "
-        f"({'; '.join(parts)}); {NOT_THERE}"
-    ]
+    rows = f"{int(outside.sum())} of {len(recording)} rows are outside the range of the measurements of the fit"
+    return [f"{rows} ({'; '.join(parts)}); {NOT_THERE}"]
 
 
 def rate_notes(recording: Recording, fitted: Mapping[str, float | None]) -> list[str]:
@@ -163,7 +138,7 @@ def rate_notes(recording: Recording, fitted: Mapping[str, float | None]) -> list
     for name, rate in fitted.items():
         own = rate_of_change(recording, name)
         if rate is not None and own > RATE_MARGIN * rate:
-            parts.append(f"{name} changes by up to {_per_second(name, own)}, in the fit by {_per_second(name, rate)}")
+            parts.append(f"{name} changes by up to {displayed(name, own)}/s, in the fit by {displayed(name, rate)}/s")
     return [f"the record is faster than those of the fit: {'; '.join(parts)}; {NOT_THERE}"] if parts else []
 
 
@@ -187,13 +162,13 @@ def with_band_notes(prediction: "RecordPrediction", differences: Sequence[str], 
     for each in prediction.quantities:
         if each.share is None or each.share >= MIN_SHARE or each.compared.sum() < MIN_ROWS:
             continue
-        mean = float(np.mean(each.errors[each.compared]))
-        known = [*differences]
+        mean, known = float(np.mean(each.errors[each.compared])), [*differences]
         if prediction.outside is not None and (each.compared & prediction.outside).any():
-            known.insert(0, "rows outside the range of the fit" + _share_inside(each, prediction.outside))
-        reason = (
-            f"likely because of {', '.join(known)}" if known else f"nothing recorded explains it; usual are {usual}"
-        )
+            inside = each.share_of(each.compared & ~prediction.outside)
+            text = "" if inside is None else f" (inside it {100 * inside:.3g} % are within the band)"
+            known.insert(0, f"rows outside the range of the fit{text}")
+        reason = f"likely because of {', '.join(known)}"
+        reason = reason if known else f"nothing recorded explains it; usual are {usual}"
         notes.append(
             f"the 95 % band of the {each.name} does not hold for this record: {100 * each.share:.3g} % of the rows are "
             f"within it, and the predicted {each.name} is {displayed(each.name, abs(mean))} too "
@@ -202,25 +177,13 @@ def with_band_notes(prediction: "RecordPrediction", differences: Sequence[str], 
     return dataclasses.replace(prediction, notes=(*prediction.notes, *notes))
 
 
-def _share_inside(quantity: "QuantityPrediction", outside: npt.NDArray[np.bool_]) -> str:
-    rows = quantity.compared & ~outside
-    if quantity.half_width is None or not rows.any():
-        return ""
-    share = np.mean(np.abs(quantity.errors[rows]) <= quantity.half_width[rows])
-    return f" (inside it {100 * share:.3g} % are within the band)"
-
-
-def _beyond(values: Array, low: float, high: float, margin: float) -> npt.NDArray[np.bool_]:
+def _beyond(values: Array, low: float, high: float, margin: float) -> Mask:
     allowed = margin * (high - low)
     return np.asarray((values < low - allowed) | (values > high + allowed))
 
 
 def _span(name: str, low: float, high: float) -> str:
     return f"{displayed(name, float(low))} to {displayed(name, float(high))}"
-
-
-def _per_second(name: str, rate: float) -> str:
-    return f"{displayed(name, rate)}/s"
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -236,7 +199,7 @@ class QuantityPrediction(ShortRepr):
     measured: Array
     predicted: Array
     half_width: Array | None
-    compared: npt.NDArray[np.bool_]
+    compared: Mask
     band: str = ""
 
     @property
@@ -259,12 +222,16 @@ class QuantityPrediction(ShortRepr):
         """Predicted minus measured value of largest magnitude [SI]."""
         return float(self.errors[self.worst_row])
 
+    def share_of(self, rows: Mask) -> float | None:
+        """Share of some rows, a mask (N,), within the 95 % band; None without a band or such a row."""
+        if self.half_width is None or not rows.any():
+            return None
+        return float(np.mean(np.abs(self.errors[rows]) <= self.half_width[rows]))
+
     @property
     def share(self) -> float | None:
         """Share of the compared rows within the 95 % band; None without a band."""
-        if self.half_width is None:
-            return None
-        return float(np.mean(np.abs(self.errors[self.compared]) <= self.half_width[self.compared]))
+        return self.share_of(self.compared)
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -274,7 +241,7 @@ class RecordPrediction(ShortRepr):
     recording: Recording
     quantities: tuple[QuantityPrediction, ...]
     notes: tuple[str, ...] = ()
-    outside: npt.NDArray[np.bool_] | None = None
+    outside: Mask | None = None
     """Mask (N,) of the rows outside the range of the fit; None where the range is not known."""
     inputs: Array | None = None
     """What drives the quantities at the rows (N, K) [SI]: commands of a plant, arguments of a law."""

@@ -72,17 +72,14 @@ class Chebyshev(Basis):
     validity_range: LoadRange
 
     def design_matrix(self, pressure: Array, force: Array, pressure_degree: int, force_degree: int) -> Array:
-        return np.asarray(
-            chebyshev.chebvander2d(*self.validity_range.scale(pressure, force), [pressure_degree, force_degree])
-        )
+        x, y = self.validity_range.scale(pressure, force)
+        return np.asarray(chebyshev.chebvander2d(x, y, [pressure_degree, force_degree]))
 
     def to_bar_and_newton(self, coefficients: Array, pressure_degree: int, force_degree: int) -> Array:
         """The coefficients of p^i F^j in bar and newton of the same surface, in the same order."""
-        validity_range = self.validity_range
-        by_pressure = _chebyshev_to_monomials(
-            validity_range.min_pressure / bar, validity_range.max_pressure / bar, pressure_degree
-        )
-        by_force = _chebyshev_to_monomials(validity_range.min_force, validity_range.max_force, force_degree)
+        limits = self.validity_range
+        by_pressure = _chebyshev_to_monomials(limits.min_pressure / bar, limits.max_pressure / bar, pressure_degree)
+        by_force = _chebyshev_to_monomials(limits.min_force, limits.max_force, force_degree)
         table = coefficients.reshape(pressure_degree + 1, force_degree + 1)
         return (by_pressure @ table @ by_force.T).ravel()
 

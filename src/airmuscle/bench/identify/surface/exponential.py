@@ -57,11 +57,9 @@ class SurfaceProblem:
     ) -> "SurfaceProblem":
         """The problem for the points of a recording. Raises IdentificationError where it cannot be solved."""
         _check_usable(recording, pressure_degree, force_degree)
-        pressure, force = recording["pressure"], recording["force"]
         basis = Chebyshev(LoadRange.from_recording(recording))
-        matrix = basis.design_matrix(pressure, force, pressure_degree, force_degree)
-        contraction = recording["contraction"]
-        problem = cls(recording, saturation, pressure_degree, force_degree, basis, matrix, contraction)
+        matrix = basis.design_matrix(recording["pressure"], recording["force"], pressure_degree, force_degree)
+        problem = cls(recording, saturation, pressure_degree, force_degree, basis, matrix, recording["contraction"])
         problem.check_determined(matrix)
         return problem
 
@@ -69,7 +67,9 @@ class SurfaceProblem:
         """Raise IdentificationError where these rows of the design matrix do not determine all coefficients."""
         conditioning = Conditioning.from_design_matrix(rows)
         if conditioning.rank < conditioning.coefficients:
-            loads = _list_loads(self.recording["force"])
+            levels = np.unique(self.recording["force"])
+            loads = f"{', '.join(f'{load:g}' for load in levels)} N"
+            loads = loads if levels.size <= 6 else f"{levels[0]:g} to {levels[-1]:g} N ({levels.size} levels)"
             raise IdentificationError(
                 f"{self.recording.origin}: {len(rows)} points at loads of {loads} determine {conditioning.rank} of the "
                 f"{conditioning.coefficients} coefficients (degree {self.pressure_degree} in pressure, "
@@ -77,18 +77,18 @@ class SurfaceProblem:
                 f"{self.pressure_degree + 1} or more pressures, or choose a lower degree."
             )
 
-    def predict(self, coefficients: Array) -> Array:
-        """Contraction [1] at the points from the Chebyshev coefficients of v, shape (N,)."""
-        return np.asarray(self.saturation * (1.0 - np.exp(self.design_matrix @ coefficients)))
+    def residuals(self, coefficients: Array) -> Array:
+        """Modelled minus measured contraction [1] at the points, from the Chebyshev coefficients of v, shape (N,)."""
+        return np.asarray(self.saturation * (1.0 - np.exp(self.design_matrix @ coefficients)) - self.contraction)
 
     def jacobian(self, coefficients: Array) -> Array:
-        """Exact derivatives of `predict` with respect to the coefficients, shape (N, coefficients)."""
+        """Exact derivatives of `residuals` with respect to the coefficients, shape (N, coefficients)."""
         return np.asarray(-self.saturation * np.exp(self.design_matrix @ coefficients)[:, None] * self.design_matrix)
 
-    def linear_targets(self) -> tuple[Array, Array]:
-        """Targets and weights for a linear fit of v that approximates a fit of k; 1 - k/k_max is limited to 0.01."""
-        remaining = np.maximum(1.0 - self.contraction / self.saturation, 0.01)
-        return np.log(remaining), remaining
+    def linear_system(self) -> tuple[Array, Array]:
+        """Matrix and right side of a linear fit of v that approximates a fit of k; 1 - k/k_max is limited to 0.01."""
+        weights = np.maximum(1.0 - self.contraction / self.saturation, 0.01)
+        return weights[:, None] * self.design_matrix, weights * np.log(weights)
 
     def build_fit(self, coefficients: Array, procedure: str, dropped: int = 0) -> SurfaceFit:
         """The fit with these Chebyshev coefficients of v."""
@@ -97,16 +97,10 @@ class SurfaceProblem:
         law = BorzikovaExponential(tuple(plain), *self.basis.validity_range, *degrees, saturation=self.saturation)
         modelled = np.asarray(law.contraction(self.recording["pressure"], self.recording["force"]))
         residuals = modelled - self.contraction
-        return SurfaceFit(
-            model=law,
-            procedure=procedure,
-            points=len(self.recording),
-            points_dropped=dropped,
-            rmse=float(np.sqrt(np.mean(residuals**2))),
-            max_error=float(np.abs(residuals).max()),
-            correlation_index=correlation_index(self.contraction, modelled),
-            conditioning=Conditioning.from_design_matrix(self.design_matrix),
-        )
+        rmse, max_error = float(np.sqrt(np.mean(residuals**2))), float(np.abs(residuals).max())
+        index = correlation_index(self.contraction, modelled)
+        conditioning = Conditioning.from_design_matrix(self.design_matrix)
+        return SurfaceFit(law, procedure, len(self.recording), dropped, rmse, max_error, index, conditioning)
 
 
 def fit_linearised(
@@ -136,17 +130,9 @@ def fit_nonlinear(
     from scipy.optimize import least_squares
 
     problem = SurfaceProblem.from_recording(recording, saturation, pressure_degree, force_degree)
-    targets, weights = problem.linear_targets()
-    start = np.linalg.lstsq(weights[:, None] * problem.design_matrix, weights * targets, rcond=None)[0]
-    result = least_squares(
-        lambda c: problem.predict(c) - problem.contraction,
-        start,
-        jac=problem.jacobian,
-        method="lm",
-        xtol=1e-15,
-        ftol=1e-15,
-        gtol=1e-15,
-    )
+    start = np.linalg.lstsq(*problem.linear_system(), rcond=None)[0]
+    limits = {"xtol": 1e-15, "ftol": 1e-15, "gtol": 1e-15}
+    result = least_squares(problem.residuals, start, jac=problem.jacobian, method="lm", **limits)
     if not result.success:
         raise IdentificationError(
             f"{recording.origin}: nonlinear least squares did not converge ({result.message}). Choose a lower degree, "
@@ -176,10 +162,3 @@ def _check_usable(recording: Recording, pressure_degree: int, force_degree: int)
                 f"{recording.origin}: {name} is {values[0]:g} {unit} in every row, so a surface cannot be fitted. "
                 f"Measure at {force_degree + 1} or more loads and {pressure_degree + 1} or more pressures."
             )
-
-
-def _list_loads(forces: Array) -> str:
-    loads = np.unique(forces)
-    if loads.size > 6:
-        return f"{loads[0]:g} to {loads[-1]:g} N ({loads.size} levels)"
-    return f"{', '.join(f'{load:g}' for load in loads)} N"

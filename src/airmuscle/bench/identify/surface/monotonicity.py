@@ -60,13 +60,11 @@ def solve_constrained_least_squares(matrix: Array, right: Array, rows: Array, mi
     from scipy.optimize import nnls
 
     q, r = np.linalg.qr(matrix)
-    inner = solve_triangular(r, rows.T, trans="T").T
-    unconstrained = q.T @ right
-    bound = minimum - inner @ unconstrained
-    target = np.zeros(r.shape[0] + 1)
-    target[-1] = 1.0
-    dual, remainder = nnls(np.vstack([inner.T, bound]), target, maxiter=50 * len(rows))
-    residual = np.vstack([inner.T, bound]) @ dual - target
+    inner, unconstrained = solve_triangular(r, rows.T, trans="T").T, q.T @ right
+    dual_matrix = np.vstack([inner.T, minimum - inner @ unconstrained])
+    target = np.eye(len(dual_matrix))[-1]
+    dual, remainder = nnls(dual_matrix, target, maxiter=50 * len(rows))
+    residual = dual_matrix @ dual - target
     if remainder < 1e-12:
         raise IdentificationError("no surface of this degree satisfies the shape constraints. Choose a higher degree.")
     shortest = -residual[:-1] / residual[-1]
@@ -74,8 +72,9 @@ def solve_constrained_least_squares(matrix: Array, right: Array, rows: Array, mi
 
 
 Range = tuple[float, float]
-_ROUNDING = 1e-9
-"""Slopes below this fraction of the maximum slope are rounding errors; chosen."""
+_ROUNDING, MIN_SLOPE = 1e-9, 1e-9
+"""Slopes below this fraction of the maximum slope are rounding errors, and minimum slope of v on the validity range
+scaled to -1..1, so that rounding cannot change the sign; chosen."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -138,14 +137,9 @@ def find_violations(
             worst = np.unravel_index(int(np.argmax(np.where(inside, excess, -np.inf))), excess.shape)
             arguments = pressure, second_argument
             first, second = ((float(values[inside].min()), float(values[inside].max())) for values in arguments)
-            point = (float(pressure[worst]), float(second_argument[worst]))
-            share, steepest = float(inside.mean()), float(slope[worst])
-            violations.append(MonotonicityViolation(rule, first, second, share, point, steepest))
+            point, share = (float(pressure[worst]), float(second_argument[worst])), float(inside.mean())
+            violations.append(MonotonicityViolation(rule, first, second, share, point, float(slope[worst])))
     return tuple(sorted(violations, key=lambda v: -v.area_fraction))
-
-
-MIN_SLOPE = 1e-9
-"""Minimum slope of v on the validity range scaled to -1..1, so that rounding cannot change the sign; chosen."""
 
 
 RISES_WITH_FORCE = MonotonicityRule("contraction rises with force", "contraction", 1, 1.0)
@@ -176,21 +170,18 @@ def fit_monotone(
     """
     problem = SurfaceProblem.from_recording(recording, saturation, pressure_degree, force_degree)
     constraints = slope_constraints(pressure_degree, force_degree, cells)
-    targets, weights = problem.linear_targets()
-    coefficients = solve_constrained_least_squares(
-        weights[:, None] * problem.design_matrix, weights * targets, constraints, MIN_SLOPE
-    )
+    coefficients = solve_constrained_least_squares(*problem.linear_system(), constraints, MIN_SLOPE)
 
     def sum_of_squares(c: Array) -> float:
-        residuals = problem.predict(c) - problem.contraction
+        residuals = problem.residuals(c)
         return float(residuals @ residuals)
 
     for _ in range(200):
-        residuals, jacobian = problem.predict(coefficients) - problem.contraction, problem.jacobian(coefficients)
-        right = jacobian @ coefficients - residuals
+        jacobian = problem.jacobian(coefficients)
+        right = jacobian @ coefficients - problem.residuals(coefficients)
         step = solve_constrained_least_squares(jacobian, right, constraints, MIN_SLOPE) - coefficients
         # where no fraction of the step reduces the sum of squares, only rounding errors are left
-        step = shortened_step(sum_of_squares, coefficients, step, float(residuals @ residuals), halvings=20)
+        step = shortened_step(sum_of_squares, coefficients, step, sum_of_squares(coefficients), halvings=20)
         coefficients = coefficients + step
         if np.abs(step).max() < 1e-10:
             return problem.build_fit(coefficients, "nonlinear least squares, monotone on the validity range")

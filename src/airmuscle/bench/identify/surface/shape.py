@@ -82,17 +82,13 @@ def fit_shape_constrained(
     surface = unconstrained.model
     assert isinstance(surface, ContractileSurface)
     active = unconstrained.problem.active_rows(unconstrained.problem.predict(unconstrained.values))
-    data = unconstrained.recording.rows(active)
+    data, target = unconstrained.recording.rows(active), unconstrained.problem.target[active]
     matrix = np.array(surface.basis(data["pressure"], data["contraction"])).T
-    target = unconstrained.problem.target[active]
-    rows = shape_constraints(surface.degree, cells)
-    scale = float(np.abs(target).max())
-    basis = _free_contraction_basis(surface, free)
-    minimum = _MIN_SLOPE if free is None else 0.0
+    rows, basis = shape_constraints(surface.degree, cells), _free_contraction_basis(surface, free)
+    scale, minimum = float(np.abs(target).max()), _MIN_SLOPE if free is None else 0.0
     scaled = basis @ monotonicity.solve_constrained_least_squares(matrix @ basis, target / scale, rows @ basis, minimum)
-    model = dataclasses.replace(surface, coefficients=tuple(float(a) for a in scale * scaled))
-    residuals = matrix @ (scale * scaled) - target
-    rmse = float(np.sqrt(np.mean(residuals**2)))
+    model = dataclasses.replace(surface, coefficients=tuple((scale * scaled).tolist()))
+    rmse = float(np.sqrt(np.mean((matrix @ (scale * scaled) - target) ** 2)))
     violations = find_shape_violations(surface, surface.validity_range)
     return ShapeConstrainedFit(model, rmse, unconstrained.rmse, violations)
 
