@@ -189,11 +189,10 @@ def identify_campaign(
 
 
 def _fit_fills(
-    records: Sequence[CampaignRecord],
-    static: StaticStage | LeftOutStage,
-    geometry: Geometry | None,
+    records: Sequence[CampaignRecord], static: StaticStage | LeftOutStage, geometry: Geometry | None,
     progress: Callable[[float], None],
-) -> FillStage | LeftOutStage:
+) -> FillStage | LeftOutStage:  # fmt: skip
+    """The fit of the fills of one muscle, that of the most records."""
     fills = _of_kind(records, RecordKind.FILL)
     main = _main_length(fills)
     if len({r.resting_length for r in fills if r.resting_length is not None}) > 1:

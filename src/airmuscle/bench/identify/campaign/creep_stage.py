@@ -1,4 +1,4 @@
-"""Creep of holds after a motion, as Maxwell elements that all holds share."""
+"""Creep as Maxwell elements: of all holds of a campaign together, and of any holds, also under a constant load."""
 
 import dataclasses
 from collections.abc import Sequence
@@ -7,9 +7,12 @@ import numpy as np
 
 from ....core import AirmuscleError, Array, IdentificationError, ShortRepr
 from ....physics.muscle import CreepElements
+from ....physics.muscle.characteristic.base import ForceLaw
 from ....recording import Recording
-from ..hysteresis import fit_creep
+from ...segment.runs import CONTRACTION_BAND
+from ..hysteresis import Hold, creep_elements, find_holds, fit_creep
 from ..hysteresis.creep import MIN_RATIO, CreepFit
+from .friction_and_release import creep_stretches, has_path
 from .record import CampaignRecord
 from .transient import LeftOutStage, displacement, find_motion, thinned_rows
 
@@ -18,6 +21,8 @@ FIT_ROWS = 400
 """Maximum number of rows of a hold (chosen)."""
 DEADTIME = 0.2
 """Time after the end of the motion that is not fitted [s] (chosen): the load cell and the frame settle."""
+MAX_MOTION = 0.3
+"""Maximum duration of the motion before a hold under a load, by its shortest time constant (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -118,26 +123,6 @@ class HeldRows:
         return np.asarray(creep_stretches(self.time, self.path, times)[self.held])
 
 
-def creep_stretches(time: Array, path: Array, relaxation_times: Array) -> Array:
-    """Stretch z [m] of each Maxwell element along a path x [m], z' = x' - z/tau, exact for linear motion; (N, E)."""
-    steps, durations = np.diff(path, prepend=path[:1]), np.diff(time, prepend=time[:1])
-    decay = np.exp(-durations[:, None] / relaxation_times)
-    ratio = durations[:, None] / relaxation_times
-    gain = np.where(ratio > 1e-9, -np.expm1(-ratio) / np.maximum(ratio, 1e-300), 1.0) * steps[:, None]
-    stretches = np.zeros((time.size, relaxation_times.size))
-    for i in range(1, time.size):
-        stretches[i] = stretches[i - 1] * decay[i] + gain[i]
-    return stretches
-
-
-def creep_force(elements: CreepElements, recording: Recording) -> Array:
-    """Force of the elements against contraction [N] along the motion of a recording, relaxed at its start; (N,)."""
-    if not elements.stiffnesses or "time" not in recording:
-        return np.zeros(len(recording))
-    stretches = creep_stretches(recording["time"], displacement(recording), np.array(elements.relaxation_times))
-    return np.asarray(stretches @ np.array(elements.stiffnesses))
-
-
 def _fit_elements(
     holds: Sequence[HeldRows], count: int, fits: tuple[tuple[str, CreepFit], ...]
 ) -> CreepStage | LeftOutStage:
@@ -150,8 +135,7 @@ def _fit_elements(
     best = max((fit.creep.time_constants for _, fit in fits), key=len)
     ordered = np.clip(np.sort(np.array(best)), 0.1, 2.0 * longest)
     steps = np.log(np.concatenate([ordered[:1], np.maximum(ordered[1:] / ordered[:-1], 1.05 * MIN_RATIO)]))
-    low, high = np.log([0.1, *[MIN_RATIO] * (count - 1)]), np.log([2.0 * longest, *[2.0 * longest] * (count - 1)])
-
+    low, high = np.log([0.1, *[MIN_RATIO] * (count - 1)]), np.log([2.0 * longest] * count)
     start = np.clip(steps, low + 1e-6, high - 1e-6)
     result = least_squares(lambda x: _linear_part(holds, np.exp(np.cumsum(x)))[1], start, bounds=(low, high))
     times = np.exp(np.cumsum(result.x))
@@ -159,10 +143,8 @@ def _fit_elements(
     stiffnesses = coefficients[:count]
     if not (stiffnesses > 0).all():
         reason = "the force of the holds does not relax towards the value before the motion"
-        remedy = (
-            "hold the pressure constant during the motion and after it, because a pressure step also changes the force"
-        )
-        return LeftOutStage(NAME, reason, remedy)
+        because = "because a pressure step also changes the force"
+        return LeftOutStage(NAME, reason, f"hold the pressure constant during the motion and after it, {because}")
     elements = CreepElements(tuple(stiffnesses.tolist()), tuple(times.tolist()))
     modelled = [matrix @ coefficients for matrix in _matrices(holds, times)]
     return _build(holds, elements, _standard_errors(holds, times, coefficients, rest), fits, modelled)
@@ -184,11 +166,9 @@ def _linear_part(holds: Sequence[HeldRows], times: Array) -> tuple[Array, Array]
 def _standard_errors(holds: Sequence[HeldRows], times: Array, coefficients: Array, residuals: Array) -> Array:
     """Standard errors of the stiffnesses and the relaxation times from the Jacobian at the solution."""
     base = np.vstack(_matrices(holds, times))
-    slopes = []
-    for i in range(times.size):
-        changed = times.copy()
-        changed[i] *= 1.0 + 1e-4
-        slopes.append((np.vstack(_matrices(holds, changed)) - base) @ coefficients / (1e-4 * times[i]))
+    changed = np.where(np.eye(times.size) > 0, times * (1.0 + 1e-4), times)
+    steps = [np.vstack(_matrices(holds, each)) - base for each in changed]
+    slopes = [step @ coefficients / (1e-4 * time) for step, time in zip(steps, times, strict=True)]
     jacobian = np.hstack([base, np.column_stack(slopes)])
     variance = float(residuals @ residuals) / max(residuals.size - jacobian.shape[1], 1)
     deviations = np.sqrt(np.maximum(np.diag(np.linalg.pinv(jacobian.T @ jacobian)), 0.0) * variance)
@@ -206,3 +186,112 @@ def _build(
         elements, standard_errors, fits, tuple(times), tuple(measured), tuple(modelled),
         float(np.sqrt(np.mean(residuals**2))), max(float(t[-1]) for t in times),
     )  # fmt: skip
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class HeldCreep(ShortRepr):
+    """The creep of the longest hold of each recording as sentences, and the elements of the muscle."""
+
+    sentences: tuple[str, ...]
+    elements: CreepElements
+    """No element where the holds determine none."""
+    verdict: str
+    """The elements and the holds they are from, or the reason for none."""
+    standard_errors: Array
+    """Of the stiffnesses [N/m], then of the relaxation times [s], shape (2 E,); NaN for a hold under a load."""
+
+
+def fit_held_creep(recordings: Sequence[Recording], *, law: ForceLaw | None = None) -> HeldCreep:
+    """Fit creep to the longest hold of each recording, and the Maxwell elements that the holds have in common.
+
+    law  the static characteristic, whose stiffness a hold under a constant load needs
+
+    Holds at a constant length are fitted together along the recorded motion; without any, the longest hold under a
+    constant load gives the elements. A hold without a motion before it has a course but no stiffness.
+    """
+    sentences, reasons = [], list[str]()
+    held, loaded = list[tuple[str, HeldRows]](), list[tuple[float, str, CreepElements]]()
+    for recording in recordings:
+        hold = max(find_holds(recording), key=lambda each: len(each.interval), default=None)
+        sentences.append(_sentence(recording, hold))
+        if hold is None:
+            continue
+        try:
+            if not has_path(recording):
+                needed = "the resting length and the time; the contraction alone gives no stiffness"
+                raise IdentificationError(f"{recording.origin}: creep elements need {needed}.")
+            if hold.quantity == "force":
+                held.append((recording.origin, _held_rows(recording, hold)))
+            else:
+                loaded.append(_elements_under_load(recording, hold, law))
+        except AirmuscleError as error:
+            reasons.append(error.message)
+    stage = fit_held_rows(held) if held else None
+    if isinstance(stage, CreepStage) and stage.elements.stiffnesses:
+        return HeldCreep(tuple(sentences), stage.elements, stage.verdict, stage.standard_errors)
+    usable = [each for each in loaded if each[2].stiffnesses]
+    if usable:
+        _, origin, elements = max(usable, key=lambda each: each[0])
+        verdict = f"{describe_elements(elements)}, from the hold of {origin} under a constant load."
+        return HeldCreep(tuple(sentences), elements, verdict, np.full(2 * len(elements.stiffnesses), np.nan))
+    causes = [*([stage.verdict] if stage is not None else []), *reasons]
+    none = "The holds under a constant load justify no creep." if loaded else "There is no hold."
+    return HeldCreep(tuple(sentences), CreepElements(), " ".join(causes or [none]), np.zeros(0))
+
+
+def _sentence(recording: Recording, hold: Hold | None) -> str:
+    """The course of the hold of a recording."""
+    if hold is None:
+        needed = "12 rows or more, with constant pressure and constant force or length"
+        return f"{recording.origin}: no hold phase of {needed}."
+    rows = f"{hold.interval.start + 1} to {hold.interval.stop}"
+    verdict = fit_creep(recording.rows(hold.interval.rows), hold.quantity).verdict
+    return f"{recording.origin}, {hold.quantity} in rows {rows}: {verdict}"
+
+
+def _held_rows(recording: Recording, hold: Hold) -> HeldRows:
+    """The rows up to the end of the hold. Raises IdentificationError without a motion before it."""
+    before = recording["contraction"][: hold.interval.start + 1]
+    if float(np.ptp(before)) <= CONTRACTION_BAND:
+        raise IdentificationError(
+            f"{recording.origin}: the length does not change before the hold, so its creep determines no stiffness. "
+            "Move the muscle at constant pressure by a few per cent of its length, then hold it."
+        )
+    start = float(recording["time"][hold.interval.start])
+    return HeldRows.after(recording.rows(slice(0, hold.interval.stop)), start)
+
+
+def _elements_under_load(recording: Recording, hold: Hold, law: ForceLaw | None) -> tuple[float, str, CreepElements]:
+    """Duration [s], origin and elements of a hold under a constant load."""
+    if law is None:
+        raise IdentificationError(
+            f"{recording.origin}: the creep under a constant load needs the stiffness of the muscle, that is, its "
+            "static characteristic; give the muscle, or hold the length."
+        )
+    length, rows = float(recording.constants["resting_length"]), recording.rows(hold.interval.rows)
+    fit = fit_creep(rows, hold.quantity)
+    step = _single_motion(recording, hold, min(fit.creep.time_constants, default=np.inf)) * length
+    pressure, contraction = (float(np.median(rows[name])) for name in ("pressure", "contraction"))
+    stiffness = float(law.stiffness(pressure, contraction)) / length
+    elements = creep_elements(fit, step=step, stiffness=stiffness, resting_length=length)
+    return fit.duration, recording.origin, elements
+
+
+def _single_motion(recording: Recording, hold: Hold, shortest: float) -> float:
+    """Change of the contraction by the one quick motion before a hold. Raises IdentificationError for another one."""
+    contraction, start = recording["contraction"], hold.interval.start
+    first, last = float(contraction[0]), float(np.median(contraction[start : start + 3]))
+    change, origin = last - first, recording.origin
+    remedy = "Record one quick change of the load or the pressure, then hold both."
+    if abs(change) <= CONTRACTION_BAND:
+        raise IdentificationError(f"{origin}: the length does not change before the hold. {remedy}")
+    share = (contraction[: start + 1] - first) / change
+    if share.min() < -0.1 or share.max() > 1.1:
+        raise IdentificationError(f"{origin}: the muscle moves in both directions before the hold. {remedy}")
+    duration = float(recording["time"][start] - recording["time"][int(np.argmax(share > 0.02))])
+    if duration > MAX_MOTION * shortest:
+        raise IdentificationError(
+            f"{origin}: the motion before the hold takes {duration:.3g} s, which is not short compared with the time "
+            f"constant of {shortest:.3g} s. {remedy}"
+        )
+    return change

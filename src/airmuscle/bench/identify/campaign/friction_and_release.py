@@ -1,4 +1,5 @@
-"""Friction of all loops of a campaign, dependent on the pressure; damping by the quick releases of a hanging load."""
+"""Friction of all loops of a campaign, dependent on the pressure; damping by the quick releases of a hanging load; the
+force of friction and creep along a recorded motion."""
 
 import dataclasses
 import itertools
@@ -21,7 +22,6 @@ from ...segment.sensor import estimate_noise
 from .. import hysteresis
 from ..candidates import evaluate_force
 from ..dynamic import DynamicFit, Experiment, InitialConditions, StartTime, fit_dynamic, stated_ambient
-from .creep_stage import creep_force
 from .record import CampaignRecord, RecordKind
 from .transient import LeftOutStage, displacement, find_motion, held_steady, path_rows, thin, thinned_rows, with_force
 
@@ -229,6 +229,39 @@ def friction_along(friction: Friction, recording: Recording) -> Array:
     force = np.asarray(friction.force_along(path, None if time is None else time[rows]))
     factor = np.asarray(friction.pressure_factor(recording["pressure"][rows]))
     return np.asarray(np.interp(np.arange(len(recording)), rows, factor * force))
+
+
+def creep_stretches(time: Array, path: Array, relaxation_times: Array) -> Array:
+    """Stretch z [m] of each Maxwell element along a path x [m], z' = x' - z/tau, exact for linear motion; (N, E)."""
+    steps, durations = np.diff(path, prepend=path[:1]), np.diff(time, prepend=time[:1])
+    decay = np.exp(-durations[:, None] / relaxation_times)
+    ratio = durations[:, None] / relaxation_times
+    gain = np.where(ratio > 1e-9, -np.expm1(-ratio) / np.maximum(ratio, 1e-300), 1.0) * steps[:, None]
+    stretches = np.zeros((time.size, relaxation_times.size))
+    for i in range(1, time.size):
+        stretches[i] = stretches[i - 1] * decay[i] + gain[i]
+    return stretches
+
+
+def creep_force(elements: CreepElements, recording: Recording) -> Array:
+    """Force of the elements against contraction [N] along the motion of a recording, relaxed at its start; (N,)."""
+    if not elements.stiffnesses or "time" not in recording:
+        return np.zeros(len(recording))
+    stretches = creep_stretches(recording["time"], displacement(recording), np.array(elements.relaxation_times))
+    return np.asarray(stretches @ np.array(elements.stiffnesses))
+
+
+def has_path(recording: Recording) -> bool:
+    """Whether a recording has the displacement over time."""
+    return "time" in recording and isinstance(recording.constants.get("resting_length"), float | int)
+
+
+def free_of_creep(elements: CreepElements, recordings: Sequence[Recording]) -> list[Recording]:
+    """The recordings with the force of the creep elements along their motion added to the measured force."""
+    return [
+        with_force(each, creep_force(elements, each)) if elements.stiffnesses and has_path(each) else each
+        for each in recordings
+    ]
 
 
 def predicted_force(

@@ -17,8 +17,7 @@ from ..model_selection import Comparison, compare
 from ..result import Fit
 from ..specimen_errors import odd_specimen_notes, ranked_specimen_errors
 from ..static_fit import refit
-from .creep_stage import creep_force
-from .friction_and_release import friction_along
+from .friction_and_release import creep_force, friction_along
 from .record import CampaignRecord, RecordKind, slow_rows, static_levels
 from .transient import LeftOutStage, is_held, thin, with_force
 

@@ -15,14 +15,13 @@ from .hysteresis_chapter import hysteresis_chapters as hysteresis_chapters
 from .hysteresis_chapter import loop_chapter as loop_chapter
 from .hysteresis_chapter import loop_path as loop_path
 from .hysteresis_chapter import plot_loops as plot_loops
+from .joint import JointFit as JointFit
+from .joint import RunAgreement as RunAgreement
+from .joint import agreement_of_run as agreement_of_run
 from .joint import fit_jointly as fit_jointly
+from .joint import force_amplitude as force_amplitude
 from .joint import identified_friction as identified_friction
 from .joint import loops_not_joined as loops_not_joined
-from .joint_result import JointFit as JointFit
-from .joint_result import RunAgreement as RunAgreement
-from .joint_result import agreement_of_run as agreement_of_run
-from .joint_result import force_amplitude as force_amplitude
-from .joint_result import preferred_fit as preferred_fit
 from .limits import Axis as Axis
 from .limits import DataLimits as DataLimits
 from .limits import data_limits as data_limits
@@ -31,6 +30,7 @@ from .loops import HysteresisLoop as HysteresisLoop
 from .loops import LoopFit as LoopFit
 from .loops import find_loops as find_loops
 from .loops import fit_loop as fit_loop
+from .loops import preferred_fit as preferred_fit
 from .result import HysteresisFit as HysteresisFit
 from .search import branch_gap as branch_gap
 from .search import repeat_difference as repeat_difference
