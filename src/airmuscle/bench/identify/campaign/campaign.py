@@ -9,10 +9,7 @@ import numpy as np
 
 from ....core import Array, IdentificationError, ShortRepr
 from ....engine.processes import Workers, process_pool
-from ....physics.muscle import CreepElements, LinearDamper, Muscle
-from ....physics.muscle.characteristic.base import ForceLaw
-from ....physics.muscle.friction import Friction, NoFriction
-from ....physics.muscle.geometry import Geometry
+from ....physics import CreepElements, ForceLaw, Friction, Geometry, LinearDamper, Muscle, NoFriction
 from ....recording import Recording
 from ..compared_points import law_of_length
 from .creep_stage import CreepStage, fit_creep_stage

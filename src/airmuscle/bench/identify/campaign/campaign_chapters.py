@@ -5,9 +5,8 @@ from collections.abc import Sequence
 from typing import Any
 
 from ....core import Array, counted
-from ....physics.muscle import CreepElements
-from ....report.chapter import Chapter, Table, TableColumn
-from ....report.data import as_data
+from ....physics import CreepElements
+from ....report import Chapter, Table, TableColumn, as_data
 from ..compare_chapter import compare_chapter
 from ..dynamic.dynamic_chapter import dynamic_chapters
 from ..experiment_design import run_table

@@ -6,8 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ....core import AirmuscleError, Array, IdentificationError, ShortRepr
-from ....physics.muscle import CreepElements
-from ....physics.muscle.characteristic.base import ForceLaw
+from ....physics import CreepElements, ForceLaw
 from ....recording import Recording
 from ...segment.runs import CONTRACTION_BAND
 from ..hysteresis import Hold, creep_elements, find_holds, fit_creep

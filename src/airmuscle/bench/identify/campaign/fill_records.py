@@ -9,10 +9,7 @@ import numpy as np
 
 from ....core import tree
 from ....engine.loop.inputs import Schedule
-from ....physics.mechanism import Isometric
-from ....physics.muscle import Muscle
-from ....physics.muscle.geometry import Vessel
-from ....physics.plant.plant import Plant
+from ....physics import Isometric, Muscle, Plant, Vessel
 from ....physics.pneumatics import Circuit, EnergyBalance, FillDischarge, Supply, Tank, Tube, Valve, WithTubes
 from ...baselines import ARX, PERSISTENCE, TimedRecord, baseline_errors, skill
 from .. import dynamic

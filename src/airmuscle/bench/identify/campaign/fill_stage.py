@@ -7,10 +7,8 @@ from functools import partial
 import numpy as np
 
 from ....core import AirmuscleError, Array, ShortRepr
-from ....engine.loop.inputs import Schedule
-from ....physics.muscle.geometry import Geometry
-from ....physics.plant.plant import Plant
-from ....physics.pneumatics import FillDischarge, WithTubes
+from ....engine import Schedule
+from ....physics import FillDischarge, Geometry, Plant, WithTubes
 from ..dynamic import DynamicFit, Experiment, cross_predict, fit_tube
 from ..dynamic.experiment import describe_ambient
 from . import fill_records as fills

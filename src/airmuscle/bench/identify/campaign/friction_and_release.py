@@ -12,11 +12,8 @@ import numpy as np
 from ....core import STANDARD_GRAVITY, AirmuscleError, Array, ShortRepr
 from ....engine.distribution import DistributedCalls
 from ....engine.loop.inputs import Schedule
-from ....physics.mechanism import HangingMass, WithLatch
-from ....physics.muscle import CreepElements, LinearDamper, Muscle
+from ....physics import ClosedChamber, CreepElements, HangingMass, LinearDamper, Muscle, Plant, Polytropic, WithLatch
 from ....physics.muscle.friction import Friction, NoFriction
-from ....physics.plant.plant import Plant
-from ....physics.pneumatics import ClosedChamber, Polytropic
 from ....recording import Recording
 from ...segment.sensor import estimate_noise
 from .. import hysteresis

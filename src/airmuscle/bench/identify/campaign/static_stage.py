@@ -7,8 +7,7 @@ from concurrent.futures import Executor
 import numpy as np
 
 from ....core import AirmuscleError, Array, ShortRepr, counted
-from ....physics.muscle import CreepElements
-from ....physics.muscle.friction import Friction
+from ....physics import CreepElements, Friction
 from ....recording import Recording
 from ..compared_points import FORCE_MARGIN, force_residuals
 from ..data_checks import check_data

@@ -6,8 +6,7 @@ from typing import Any
 import numpy as np
 
 from ....core import Array, PhysicsError
-from ....physics.muscle.characteristic.base import ForceLaw
-from ....physics.muscle.geometry import ChebyshevGeometry
+from ....physics import ChebyshevGeometry, ForceLaw
 
 GRID, MIN_FORCE = 25, 0.02
 """Number of contractions, and of pressures, at which the slope of the force is evaluated, and minimum force of a point

@@ -32,3 +32,9 @@ from .result import locate_pressure_sensor as locate_pressure_sensor
 # For the other packages, not in __all__
 from .experiment import ParameterPaths as ParameterPaths
 from .experiment import RecordUnknown as RecordUnknown
+from .experiment import Unknown as Unknown
+from .experiment import describe_other_ambient as describe_other_ambient
+from .experiment import make_unknowns as make_unknowns
+from .record_model import ModelOutputs as ModelOutputs
+from .record_model import RecordModel as RecordModel
+from .reliability import RECORD_CONSEQUENCE as RECORD_CONSEQUENCE

@@ -7,12 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from ....core import Array, tree
-from ....engine.loop.inputs import Schedule
-from ....physics.mechanism import Isometric
-from ....physics.muscle import Muscle
-from ....physics.muscle.geometry import Vessel
-from ....physics.plant.plant import Plant
-from ....physics.pneumatics import EnergyBalance, FillDischarge, Valve, WallHeatTransfer
+from ....engine import Schedule
+from ....physics import EnergyBalance, FillDischarge, Isometric, Muscle, Plant, Valve, Vessel, WallHeatTransfer
 from ....recording import Recording
 from .experiment import Experiment
 from .initial_conditions import InitialConditions

@@ -8,10 +8,9 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 
 from ....core import AirmuscleError, Array, IdentificationError, ParameterError, check_whole
+from ....engine import Integrator, Rodas4
 from ....engine.compile import System
-from ....engine.run.integrators import Integrator, Rodas4
-from ....physics.plant.plant import Plant
-from ....physics.pneumatics import Tube, Valve, WithTubes
+from ....physics import Plant, Tube, Valve, WithTubes
 from ....recording.columns import displayed
 from ..identifiability import analyse_identifiability
 from ..model_evidence import EQUIVALENT, aicc, lag_one_autocorrelation

@@ -9,11 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from ....core import Array, IdentificationError, ParameterError, Status, System, autodiff, check_known, tree
+from ....engine import InputSignal, PiecewiseLinear
 from ....engine.compile.cache.kernel import newton
 from ....engine.compile.function import Function
-from ....engine.loop import InputSignal, PiecewiseLinear
-from ....physics.equilibrium import find_equilibrium
-from ....physics.plant.plant import Plant
+from ....physics import Plant, find_equilibrium
 from ....physics.plant.validation import check_pressures
 
 PRESSURE_STEP = 100.0

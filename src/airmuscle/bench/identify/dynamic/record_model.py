@@ -7,11 +7,10 @@ import numpy as np
 import numpy.typing as npt
 
 from ....core import Array, IdentificationError, ParameterError, Status, System, tree
+from ....engine import InputSignal, Integrator, WithSensitivities
 from ....engine.compile.cache.kernel import evaluate
 from ....engine.compile.program import CompiledSystem, compile_system
-from ....engine.loop.inputs import InputSignal
-from ....engine.run.integrators import BoundIntegrator, Integrator
-from ....engine.run.with_sensitivities import WithSensitivities
+from ....engine.run.integrators import BoundIntegrator
 from .experiment import CommandInstant, Experiment, InitialValue, StartTime, Unknown, with_command_instants
 from .initial_conditions import TimeGrid, compile_conditions, make_time_grid, solve_initial_state
 

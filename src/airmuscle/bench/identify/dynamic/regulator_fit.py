@@ -7,14 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from ....core import Array, ColumnError, IdentificationError, ParameterError, tree
-from ....engine.loop.inputs import Schedule
-from ....physics.mechanism import Isometric
-from ....physics.muscle import Muscle
-from ....physics.muscle.geometry import Vessel
-from ....physics.plant import Plant
-from ....physics.pneumatics import Isothermal, PressureRegulator, Supply, Valve
+from ....engine import Schedule
+from ....physics import Isometric, Isothermal, Muscle, Plant, PressureRegulator, Supply, Valve, Vessel
 from ....recording import Recording
-from ....report.chapter import Chapter, Table, TableColumn
+from ....report import Chapter, Table, TableColumn
 from ...reported import Reported
 from .experiment import Experiment
 from .fit import fit_dynamic

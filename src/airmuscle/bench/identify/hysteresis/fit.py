@@ -7,9 +7,8 @@ import inspect
 import numpy as np
 
 from ....core import Array, Hint, IdentificationError, check_whole, model, parameter
+from ....physics import Characteristic, Friction, LoopScales
 from ....physics.muscle import friction
-from ....physics.muscle.characteristic.base import Characteristic
-from ....physics.muscle.friction import Friction, LoopScales
 from ....recording import Recording
 from ...segment import Mask, motion_direction
 from .limits import MILLIMETRES, Axis, data_limits, resolved_stiffness

@@ -8,19 +8,7 @@ import numpy as np
 from ....core import Array, IdentificationError, ParameterError, ShortRepr, check_field_types
 from ....engine.compile import System
 from ....engine.run.integrators import Integrator, Rodas4
-from ..dynamic.experiment import (
-    Experiment,
-    InitialValue,
-    ParameterPaths,
-    RecordUnknown,
-    Unknown,
-    describe_other_ambient,
-    make_unknowns,
-)
-from ..dynamic.fit import fit_dynamic
-from ..dynamic.record_model import ModelOutputs, RecordModel, commands_at
-from ..dynamic.reliability import RECORD_CONSEQUENCE
-from ..dynamic.result import DynamicFit
+from .. import dynamic
 from ..parameter_covariance import NORMAL_QUANTILE
 from . import result
 
@@ -50,7 +38,7 @@ class PlantUncertainty(ShortRepr):
     """
 
     deviations: Mapping[str, float]
-    parameters: tuple[ParameterPaths, ...] = ()
+    parameters: tuple[dynamic.ParameterPaths, ...] = ()
     covariance: Array = dataclasses.field(default_factory=lambda: np.zeros((0, 0)))
     records: int | None = None
     factors: Mapping[str, float] = dataclasses.field(default_factory=dict)
@@ -81,8 +69,9 @@ class PlantUncertainty(ShortRepr):
 
 
 def predict_dynamic(
-    plant: System, experiment: Experiment, observed: Mapping[str, float], *,
-    uncertainty: PlantUncertainty | None = None, own: Sequence[RecordUnknown] = (), method: Integrator | None = None,
+    plant: System, experiment: dynamic.Experiment, observed: Mapping[str, float], *,
+    uncertainty: PlantUncertainty | None = None, own: Sequence[dynamic.RecordUnknown] = (),
+    method: Integrator | None = None,
 ) -> result.RecordPrediction:  # fmt: skip
     """Predict quantities of a transient record by simulating an identified plant from its initial conditions.
 
@@ -98,16 +87,16 @@ def predict_dynamic(
 
     Raises IdentificationError where the simulation fails, ParameterError for unknown names.
     """
-    notes = describe_other_ambient(plant, experiment)
+    notes = dynamic.describe_other_ambient(plant, experiment)
     other_air = ["other ambient air"] if notes else []
     plant, known = experiment.plant or plant, uncertainty or PlantUncertainty({})
     deviations = {name: sensor or _deviation(name, experiment, known) for name, sensor in observed.items()}
     if own:
-        fit = fit_dynamic(plant, [experiment], free=(), per_record=own, observed=deviations, method=method)
+        fit = dynamic.fit_dynamic(plant, [experiment], free=(), per_record=own, observed=deviations, method=method)
         plant, experiment = fit.plant(), _with_estimates(fit, experiment)
         notes += _describe_estimates(fit)
-    unknowns = make_unknowns(plant, [experiment], known.parameters, (), {}) if known.parameters else ()
-    model = RecordModel(plant, experiment, 0, unknowns, deviations, method or Rodas4())
+    unknowns = dynamic.make_unknowns(plant, [experiment], known.parameters, (), {}) if known.parameters else ()
+    model = dynamic.RecordModel(plant, experiment, 0, unknowns, deviations, method or Rodas4())
     modelled = model.evaluate(np.array([unknown.value for unknown in unknowns]))
     spread = _parameter_variance(modelled, unknowns, known)
     recording, quantities = experiment.recording, []
@@ -120,42 +109,44 @@ def predict_dynamic(
     notes += [*result.range_notes(recording, known.ranges, result.NOISY_MARGIN), *faster]
     notes += [f"the band of {q.name} is {q.band}" for q in quantities if q.half_width is None and q.band]
     outside = result.rows_outside(recording, known.ranges, result.NOISY_MARGIN)
-    driving = commands_at(plant, experiment.command, recording["time"] - experiment.start_time)
+    driving = dynamic.commands_at(plant, experiment.command, recording["time"] - experiment.start_time)
     prediction = result.RecordPrediction(recording, tuple(quantities), tuple(notes), outside, driving)
     return result.with_band_notes(prediction, [*other_air, *(["faster changes"] if faster else [])], USUAL)
 
 
-def _describe_estimates(fit: DynamicFit) -> list[str]:
+def _describe_estimates(fit: dynamic.DynamicFit) -> list[str]:
     """The unknowns estimated from the record itself, and those of them that are on a bound."""
     texts = [f"{e.name.removesuffix(' of record 1')} {e.value:.4g} {e.display_unit}".rstrip() for e in fit.estimates]
     bounded = [text for text, e in zip(texts, fit.estimates, strict=True) if e.on_bound]
     return [
         f"estimated from the record itself: {', '.join(texts)} (SI)",
-        *(f"on its bound: {text}. {RECORD_CONSEQUENCE}" for text in bounded),
+        *(f"on its bound: {text}. {dynamic.RECORD_CONSEQUENCE}" for text in bounded),
     ]
 
 
-def _deviation(name: str, experiment: Experiment, uncertainty: PlantUncertainty) -> float:
+def _deviation(name: str, experiment: dynamic.Experiment, uncertainty: PlantUncertainty) -> float:
     if name in uncertainty.deviations:
         return float(uncertainty.deviations[name])
     values = experiment.recording[name]
     return ASSUMED_DEVIATION * float(np.nanmax(values) - np.nanmin(values)) or 1.0
 
 
-def _with_estimates(fit: DynamicFit, experiment: Experiment) -> Experiment:
+def _with_estimates(fit: dynamic.DynamicFit, experiment: dynamic.Experiment) -> dynamic.Experiment:
     """The experiment with its estimated start time and initial values, and the plant with its own parameters."""
     model, conditions = fit.problem.record_models[0], experiment.initial_conditions
     initial = {
         unknown.target.name: estimate.value
         for estimate, unknown in zip(fit.estimates, fit.unknowns, strict=True)
-        if isinstance(unknown.target, InitialValue)
+        if isinstance(unknown.target, dynamic.InitialValue)
     }
     conditions = dataclasses.replace(conditions, known={**conditions.known, **initial})
     start, command = model.start_time(fit.values), model.command(fit.values)
-    return Experiment(experiment.recording, command, conditions, start, fit.plant())
+    return dynamic.Experiment(experiment.recording, command, conditions, start, fit.plant())
 
 
-def _parameter_variance(modelled: ModelOutputs, unknowns: Sequence[Unknown], uncertainty: PlantUncertainty) -> Array:
+def _parameter_variance(
+    modelled: dynamic.ModelOutputs, unknowns: Sequence[dynamic.Unknown], uncertainty: PlantUncertainty
+) -> Array:
     """Variance of the outputs by the covariance of the parameters [SI], shape (N, Q)."""
     if not unknowns:
         return np.zeros(modelled.values.shape)

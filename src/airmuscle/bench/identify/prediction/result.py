@@ -7,9 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ....core import Array, ColumnError, Hint, ShortRepr
-from ....physics.muscle import CreepElements
-from ....physics.muscle.characteristic import Characteristic, ForceLaw, ValidityRange
-from ....physics.muscle.friction import Friction, NoFriction
+from ....physics import Characteristic, CreepElements, ForceLaw, Friction, NoFriction, ValidityRange
 from ....recording import Recording
 from ....recording.columns import displayed
 from ...segment import Mask, rate_of_change
