@@ -83,13 +83,15 @@ class Module:
     """Machine code of printed functions; their addresses are valid as long as it lives. It cannot be pickled."""
 
     def __init__(self, text: str, held: int = 0) -> None:
-        self._engine = load_module(text)
+        self._engine, self._addresses = load_module(text), dict[str, int]()
         self.held = held
         """The length of `c`, what the functions need of the parameters."""
 
     def address(self, name: str) -> int:
-        """The address of a function."""
-        return int(self._engine.get_function_address(name))
+        """The address of a function; it is asked for once, which takes 10 us."""
+        if name not in self._addresses:
+            self._addresses[name] = int(self._engine.get_function_address(name))
+        return self._addresses[name]
 
     def prepare(self, parameters: Array) -> Array:
         """The array `c` for a set of parameters."""

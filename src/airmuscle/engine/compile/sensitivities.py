@@ -146,7 +146,7 @@ def stored(values: Sequence[LlvmValue], array: str) -> None:
 
 
 def implicit_module(t: TangentSystem) -> tuple[str, ArraySizes]:
-    """The functions of `printed.implicit_module` for the states and their derivatives.
+    """The functions of `functions.implicit_module` for the states and their derivatives.
 
     J holds the distinct non-zeros of the inner df/dx, then dJ of those that change, K numbers each; A the factors of
     the inner d I - J, then the same dJ, because `solve` and `stage` need it: (d I - J) dk = db + dJ k.

@@ -82,7 +82,7 @@ def _times(h: LlvmValue, weight: float) -> LlvmValue:
 
 
 def explicit_module(t: TangentSystem, a: Sequence[Sequence[float]], b: Sequence[float]) -> tuple[str, int]:
-    """One whole step, as in `printed.explicit_module`: step(x, u, c, w, h, y), and how long `c` must be."""
+    """One whole step, as in `functions.explicit_module`: step(x, u, c, w, h, y), and how long `c` must be."""
     rates = Values(t, t.inner.f)
     along = rates.along(rates.results)
     printer, block = Printer(), FunctionBody(["h"])

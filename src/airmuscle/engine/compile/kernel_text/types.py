@@ -144,10 +144,7 @@ class _Inference:
         ]
         if len({len(values) for values in found}) > 1:
             raise self.source.unprintable(self.source.node, "a function with different numbers of results")
-        return tuple(self._joined(values) for values in zip(*found, strict=True))
-
-    def _joined(self, values: tuple[ast.expr, ...]) -> ElementType:
-        return max(self.of(value) for value in values)
+        return tuple(max(map(self.of, values)) for values in zip(*found, strict=True))
 
     def _use(self, node: ast.AST) -> None:
         """Learn from an element, a range or a call which arguments are arrays and integers, and which are changed."""

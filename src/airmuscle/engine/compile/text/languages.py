@@ -189,9 +189,6 @@ class TorchBody(TextBody):
     def call(self, function: str, x: Sequence[str]) -> str:
         return self.put(f"torch.{function}({', '.join(x)})")
 
-    def begin_branch(self, test: str) -> str:
-        return f"    if {test}:"
-
     unless_zero = FunctionBlock.unless_zero  # a product with the gate is zero, but its derivative by the gate is not
 
 
