@@ -63,7 +63,7 @@ ARGUMENTS = {
     "laws": "control laws side by side",
     "comments": "whether a file begins with comments that state origin, constants and notes",
     "steps": "number of steps of an iterative method",
-    "airs": "air states (pressure, temperature) of the muscles of a circuit, or of the segments of a tube",
+    "air_states": "air states (pressure, temperature) of the muscles of a circuit, or of the segments of a tube",
     "at": "evaluation of a plant: muscles, circuits, forces and accelerations at one state",
     "air": "air state: absolute pressure and temperature",
     "inlet": "air state at the supply",

@@ -175,10 +175,12 @@ def test_a_fit_of_segments_needs_a_tube():
 
 
 def test_records_in_different_ambient_air():
-    airs = (Ambient(8e4), Ambient(9e4, 303.0), STANDARD)
-    stage = stage_of([record(c, BOTH, i, ambient=a) for i, (c, a) in enumerate(zip(CONTRACTIONS, airs, strict=True))])
+    air_states = (Ambient(8e4), Ambient(9e4, 303.0), STANDARD)
+    stage = stage_of(
+        [record(c, BOTH, i, ambient=a) for i, (c, a) in enumerate(zip(CONTRACTIONS, air_states, strict=True))]
+    )
     assert_true(stage)
-    assert [stage.fit.plant(i).ambient for i in range(3)] == list(airs)
+    assert [stage.fit.plant(i).ambient for i in range(3)] == list(air_states)
     assert "ambient" not in stage.verdict
 
 

@@ -428,10 +428,10 @@ def test_the_catalogue_has_the_muscles_whose_maker_states_permitted_values():
 def test_the_choices_are_ranked_by_air_then_length_and_by_other_criteria():
     entries = [am.load(name) for name in MUSCLES]
     result = size_muscles(LIFT, SIX_BAR, entries)
-    airs = [choice.air for choice in result.choices if choice.air is not None]
-    assert airs == sorted(airs)
-    assert len(airs) >= 2
-    unknown = [choice.length for choice in result.choices[len(airs) :]]
+    air_states = [choice.air for choice in result.choices if choice.air is not None]
+    assert air_states == sorted(air_states)
+    assert len(air_states) >= 2
+    unknown = [choice.length for choice in result.choices[len(air_states) :]]
     assert unknown
     assert unknown == sorted(unknown)
     lengths = [choice.length for choice in size_muscles(LIFT, SIX_BAR, entries, by_length).choices]

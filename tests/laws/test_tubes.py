@@ -58,7 +58,7 @@ def steady(p1, p2, length, diameter, end_loss=1.5):
 
 
 def at_rest(tube, pressure, tilt=0.0):
-    """States of a tube and its airs; `tilt` makes the pressures fall towards the muscle."""
+    """States of a tube and its air_states; `tilt` makes the pressures fall towards the muscle."""
     state = tube.steady_state(Air(pressure, WARM), AMBIENT)
     n = tube.segment_count
     for i in range(n):
@@ -134,9 +134,9 @@ def test_the_air_that_flows_on_is_as_warm_as_where_it_comes_from(mass_flow):
     tube = DistributedTube(1.0, 3e-3, 2, EnergyBalance(0.0))
     state = at_rest(tube, 3e5) | {"tube2.flow": mass_flow}
     state["tube2.internal_energy"] *= 1.1
-    airs, muscle = tube.air_states(state, AMBIENT), Air(3e5, 350.0)
-    _, onward = tube.rates(state, airs, NO_FLOW, muscle, AMBIENT)
-    origin = airs[1] if mass_flow > 0 else muscle
+    air_states, muscle = tube.air_states(state, AMBIENT), Air(3e5, 350.0)
+    _, onward = tube.rates(state, air_states, NO_FLOW, muscle, AMBIENT)
+    origin = air_states[1] if mass_flow > 0 else muscle
     assert onward.enthalpy == pytest.approx(SPECIFIC_HEAT_CONSTANT_PRESSURE * origin.temperature * mass_flow)
 
 

@@ -204,8 +204,8 @@ def joint_statics(plant: Plant, pressure_range: tuple[float, float] | None = Non
     """
     joint_torque.check_joint(plant)
     supplies = [circuit.supply for circuit in plant.circuits]
-    airs = [supply.air(supply.steady_state(plant.ambient), plant.ambient) for supply in supplies]
-    lowest = min(float(gauge_pressure(air.pressure, plant.ambient)) for air in airs)
+    air_states = [supply.air(supply.steady_state(plant.ambient), plant.ambient) for supply in supplies]
+    lowest = min(float(gauge_pressure(air.pressure, plant.ambient)) for air in air_states)
     low, high = (0.0, lowest) if pressure_range is None else pressure_range
     if not (np.isfinite([low, high]).all() and low < high):
         raise ParameterError(

@@ -98,10 +98,10 @@ class Plant(PlantDisplay, StaticPlant):
         self, muscles: tuple[MuscleState, ...], state: Values, inputs: Values
     ) -> tuple[CircuitFlows, ...]:
         """Flows, rates and outputs of every circuit."""
-        airs = self._by_circuit([muscle.air for muscle in muscles])
+        air_states = self._by_circuit([muscle.air for muscle in muscles])
         return tuple(
             circuit.compute_flows(air, self._within(prefix, state), select_prefix(prefix, inputs), self.ambient)
-            for (prefix, circuit), air in zip(self._circuits(), airs, strict=True)
+            for (prefix, circuit), air in zip(self._circuits(), air_states, strict=True)
         )
 
     def evaluate(self, state: Values, inputs: Values) -> PlantEvaluation:

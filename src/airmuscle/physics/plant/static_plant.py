@@ -136,8 +136,8 @@ class StaticPlant(System):
     def _circuits(self) -> Iterator[tuple[str, Circuit]]:
         return zip(self.circuit_prefixes, self.circuits, strict=True)
 
-    def _by_circuit(self, airs: list[Air]) -> list[tuple[Air, ...]]:
-        return [tuple(airs)] if self._shared else [(air,) for air in airs]
+    def _by_circuit(self, air_states: list[Air]) -> list[tuple[Air, ...]]:
+        return [tuple(air_states)] if self._shared else [(air,) for air in air_states]
 
     def _outside(self, prefix: str, values: Mapping[str, Any]) -> dict[str, Any]:
         """Values under a circuit's own names, by the plant's names."""
@@ -200,11 +200,11 @@ class StaticPlant(System):
 
     def fill_muscles(self, pressures: Sequence[Value], volumes: Sequence[Value], state: Values) -> dict[str, Value]:
         """`state` with air at these gauge pressures [Pa] in muscles of these volumes [m3], and circuits settled."""
-        filled, airs = dict(state), []
+        filled, air_states = dict(state), []
         for prefix, pressure, volume in zip(self.prefixes, pressures, volumes, strict=True):
             content = self.gas.state_at(absolute_pressure(pressure, self.ambient), volume, self.ambient)
-            airs.append(self.gas.air(content, volume, self.ambient))
+            air_states.append(self.gas.air(content, volume, self.ambient))
             filled |= with_prefix(prefix, content)
-        for (prefix, circuit), air in zip(self._circuits(), self._by_circuit(airs), strict=True):
+        for (prefix, circuit), air in zip(self._circuits(), self._by_circuit(air_states), strict=True):
             filled = {**self._outside(prefix, circuit.steady_state(air, self.ambient)), **filled}
         return filled

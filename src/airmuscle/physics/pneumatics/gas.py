@@ -61,7 +61,7 @@ class Air(NamedTuple):
     temperature: Value
 
 
-Airs = tuple[Air, ...]
+AirStates = tuple[Air, ...]
 """Air states of muscles, or of the segments of a tube."""
 
 

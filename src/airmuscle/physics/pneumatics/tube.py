@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 from ...core import Reference, Value, Values, model, ops, parameter, published, unflatten, within
 from ...core.system import StateVariable, add_prefix, select_prefix, with_prefix
 from .circuit import Circuit, CircuitFlows, CircuitWrapper, ambient_air, port_prefix
-from .gas import GAS_CONSTANT, Air, Airs, Ambient, Flow, Gas, Isothermal, gauge_pressure
+from .gas import GAS_CONSTANT, Air, AirStates, Ambient, Flow, Gas, Isothermal, gauge_pressure
 from .valve import Orifice, Valve, orifice_flow
 
 MAX_SEGMENTS = 200
@@ -51,14 +51,14 @@ class TubeModel(abc.ABC):
         segment = self.resting_segment(air, ambient)
         return {f"{prefix}{name}": value for prefix in self.prefixes for name, value in segment.items()}
 
-    def air_states(self, state: Values, ambient: Ambient) -> Airs:
+    def air_states(self, state: Values, ambient: Ambient) -> AirStates:
         """Air state of each segment, from valve to muscle."""
         segments = (select_prefix(prefix, state) for prefix in self.prefixes)
         return tuple(self.gas.air(segment, self.segment_volume, ambient) for segment in segments)
 
     @abc.abstractmethod
     def rates(
-        self, state: Values, airs: Airs, flow: Flow, muscle: Air, ambient: Ambient
+        self, state: Values, air_states: AirStates, flow: Flow, muscle: Air, ambient: Ambient
     ) -> tuple[dict[str, Value], Flow]:
         """Time derivatives of the states for a flow from the valve, and the flow into the muscle."""
 
@@ -126,10 +126,10 @@ class Tube(TubeModel):
         return self.volume / self.segment_count
 
     def rates(
-        self, state: Values, airs: Airs, flow: Flow, muscle: Air, ambient: Ambient
+        self, state: Values, air_states: AirStates, flow: Flow, muscle: Air, ambient: Ambient
     ) -> tuple[dict[str, Value], Flow]:
         rates: dict[str, Value] = {}
-        for prefix, air, downstream in zip(self.prefixes, airs, (*airs[1:], muscle), strict=True):
+        for prefix, air, downstream in zip(self.prefixes, air_states, (*air_states[1:], muscle), strict=True):
             outflow = orifice_flow(self.orifice, air, downstream, self.segment_count**0.5)
             segment = self.gas.rates(select_prefix(prefix, state), air, flow - outflow, 0.0, ambient)
             rates |= with_prefix(prefix, segment)
@@ -191,10 +191,10 @@ class DistributedTube(TubeModel):
         return {**super().resting_segment(air, ambient), "flow": 0.0}
 
     def rates(
-        self, state: Values, airs: Airs, flow: Flow, muscle: Air, ambient: Ambient
+        self, state: Values, air_states: AirStates, flow: Flow, muscle: Air, ambient: Ambient
     ) -> tuple[dict[str, Value], Flow]:
         rates: dict[str, Value] = {}
-        for prefix, air, downstream in zip(self.prefixes, airs, (*airs[1:], muscle), strict=True):
+        for prefix, air, downstream in zip(self.prefixes, air_states, (*air_states[1:], muscle), strict=True):
             mass_flow = state[f"{prefix}flow"]
             outflow = _convected_flow(mass_flow, air, downstream)
             segment = self.gas.rates(select_prefix(prefix, state), air, flow - outflow, 0.0, ambient)
@@ -263,9 +263,9 @@ class WithTubes(CircuitWrapper):
         tube = self.tube.states(ambient)
         return (*self.circuit.own_states(ambient), *(s for prefix in self.prefixes for s in add_prefix(prefix, tube)))
 
-    def own_steady_state(self, airs: Airs, ambient: Ambient) -> dict[str, Value]:
-        state = self.circuit.own_steady_state(airs, ambient)
-        for prefix, air in zip(self.prefixes, airs, strict=True):
+    def own_steady_state(self, air_states: AirStates, ambient: Ambient) -> dict[str, Value]:
+        state = self.circuit.own_steady_state(air_states, ambient)
+        for prefix, air in zip(self.prefixes, air_states, strict=True):
             state |= with_prefix(prefix, self.tube.steady_state(air, ambient))
         return state
 
@@ -275,12 +275,16 @@ class WithTubes(CircuitWrapper):
             warnings |= with_prefix(prefix, self.tube.validity_warnings(select_prefix(prefix, columns), ambient))
         return warnings
 
-    def supplied_flow(self, inlet: Air, airs: Airs, state: Values, inputs: Values, ambient: Ambient) -> CircuitFlows:
+    def supplied_flow(
+        self, inlet: Air, air_states: AirStates, state: Values, inputs: Values, ambient: Ambient
+    ) -> CircuitFlows:
         tubes = [select_prefix(prefix, state) for prefix in self.prefixes]
         in_tubes = [self.tube.air_states(tube, ambient) for tube in tubes]
         inner = self.circuit.supplied_flow(inlet, tuple(segments[0] for segments in in_tubes), state, inputs, ambient)
         rates, outputs, flows = dict(inner.rates), dict(inner.outputs), []
-        for prefix, tube, segments, inflow, air in zip(self.prefixes, tubes, in_tubes, inner.flows, airs, strict=True):
+        for prefix, tube, segments, inflow, air in zip(
+            self.prefixes, tubes, in_tubes, inner.flows, air_states, strict=True
+        ):
             tube_rates, outflow = self.tube.rates(tube, segments, inflow, air, ambient)
             rates |= with_prefix(prefix, tube_rates)
             for segment, in_segment in zip(self.tube.prefixes, segments, strict=True):
