@@ -415,7 +415,8 @@ def test_the_loop_of_a_scenario_has_the_margins_of_the_library():
     assert values["sensitivity peak"] == pytest.approx(found.peak, rel=1e-3)
     assert [base64.b64decode(each.partition(",")[2])[:5] for each in shown["figures"]] == [b"<?xml"] * 2
     text = (EXAMPLES / "pressure_loop.toml").read_text()
-    assert "with valves open by 0.01" in sheet_of_scenario_text(text)["loop"]["text"]
+    assert "with valves open by 0.01" in (once := sheet_of_scenario_text(text))["loop"]["text"]
+    assert sheet_of_scenario_text(text)["id"] == once["id"], "equal scenarios have one sheet"
     switched = text.replace('model = "PID"', 'model = "OnOffController"').replace(
         'gain = "1.5 1/bar"', 'hysteresis = "0.1 bar"'
     )

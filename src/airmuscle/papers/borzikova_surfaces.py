@@ -9,9 +9,8 @@ import numpy as np
 
 import airmuscle as am
 
+from ..bench.identify import LoadRange, fit_monotone
 from ..bench.identify.statistics import CorrelationIndex, correlation_index
-from ..bench.identify.surface.basis import LoadRange
-from ..bench.identify.surface.monotonicity import fit_monotone
 from ..core import AirmuscleWarning, Array, autodiff, bar
 from ..core.plotting import BLACK, BLUE, DASHES, LINES, MARKERS, ORANGE, RED, legend_outside, new_figure
 from ..files.library.entry_file import load_law

@@ -9,8 +9,7 @@ import numpy.typing as npt
 import airmuscle as am
 
 from ..core import BLACK, DASHES, LINES, legend_below, new_figure
-from ..report.chapter import Plot, Table
-from ..report.claims import AtLeast, AtMost, Claim
+from ..report import AtLeast, AtMost, Claim, Plot, Table
 from ..report.formatting import format_unit
 from . import hosovsky_plant as rig
 from .hosovsky_plant import FORCE_MAPS, MATRIX, UnpublishedParameters, hanging_load, latched_load, plant

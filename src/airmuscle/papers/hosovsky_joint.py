@@ -9,10 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ..design.study.design import Sobol
-from ..design.study.distributions import Uniform
-from ..report.chapter import Table
-from ..report.claims import AtLeast, Claim
+from ..design.study import Sobol, Uniform
+from ..report import AtLeast, Claim, Table
 from ..report.formatting import format_quantity, format_unit
 from .hosovsky_fill_and_release import RELEASED_AT, STATEMENTS, agrees, compare_releases, release
 from .hosovsky_plant import FORCE_MAPS, PAPER, UnpublishedParameters

@@ -8,8 +8,7 @@ from typing import Any
 from ...bench.identify.branch_residuals import delay_notes, find_delay
 from ...bench.identify.campaign import fit_held_creep, free_of_creep
 from ...bench.identify.campaign.campaign_chapters import creep_chapter
-from ...bench.identify.hysteresis import find_loops, fit_jointly, fit_loop
-from ...bench.identify.hysteresis.hysteresis_chapter import hysteresis_chapters
+from ...bench.identify.hysteresis import find_loops, fit_jointly, fit_loop, hysteresis_chapters
 from ...bench.identify.hysteresis.joint import select_friction
 from ...bench.identify.hysteresis.loops import CURVE_DEGREE
 from ...core import check_writable

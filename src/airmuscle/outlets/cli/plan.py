@@ -8,11 +8,9 @@ from json import dumps
 from pathlib import Path
 from typing import Any
 
+from ...bench.identify import BenchLimits, RecursiveFit, optimal_design
 from ...bench.identify.dynamic import rank_records
-from ...bench.identify.experiment_design import BenchLimits, optimal_design
-from ...bench.identify.recursive_fit import RecursiveFit
-from ...bench.readers import write
-from ...bench.readers.follow import RowReader, follow_lines
+from ...bench.readers import RowReader, follow_lines, write
 from ...core import ColumnError, IdentificationError, atomic_folder, check_writable, contraction_text, quantity_text
 from ...design.sizing.chapter import sizing_chapter
 from ...design.sizing.scenario import sizing_scenario

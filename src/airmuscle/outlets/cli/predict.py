@@ -3,8 +3,7 @@
 from pathlib import Path
 from typing import Annotated, Any
 
-from ...bench.identify.dynamic import StartTime
-from ...bench.identify.prediction import RecordPrediction
+from ...bench import RecordPrediction, StartTime
 from ...bench.identify.prediction.prediction_chapter import prediction_chapters
 from ...core import FileError, check_writable
 from ...files.library import PlantEntry, is_path, kind_of, list_plants, load_law, read_toml

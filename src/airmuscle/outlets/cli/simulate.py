@@ -13,8 +13,7 @@ from ...design.study.chunk import count_finished_runs
 from ...design.study.paths import changed_scenario
 from ...engine.executors import SharedFolder
 from ...engine.processes import process_pool
-from ...files.scenario.scenario import Scenario, load_scenario
-from ...files.scenario.schema import muscle_schema, scenario_schema
+from ...files.scenario import Scenario, load_scenario, muscle_schema, scenario_schema
 from ...files.scenario.simulation_chapter import run_chapter
 from ...recording import Recording
 from ...report.chapter import Chapter

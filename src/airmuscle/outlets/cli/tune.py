@@ -8,18 +8,14 @@ from typing import Annotated, Any
 import typer
 
 from ...core import InputError, SimulationError, check_known, check_writable, leaves
-from ...design.control_benchmark import learn, scenario_contender, standard_contenders
+from ...design import TRUTH_SEEDS, Perturbations, RobustObjective, Tuning
+from ...design.control_benchmark import benchmark_chapter, find_tasks, learn, scenario_contender, standard_contenders
 from ...design.control_benchmark.benchmark import benchmark_controllers
-from ...design.control_benchmark.chapter import benchmark_chapter
 from ...design.control_benchmark.commissioning import COMMISSIONING_RUNS
 from ...design.control_benchmark.joints import BenchmarkJoint, on_off_joint, proportional_joint
-from ...design.control_benchmark.tasks import find_tasks
-from ...design.control_benchmark.truths import TRUTH_SEEDS
 from ...design.tuning import IntegralAbsoluteError, IntegralTimeAbsoluteError, RootMeanSquareError, TrackingIndex
 from ...design.tuning import tune as find_gains
 from ...design.tuning.chapter import history_table, tuning_chapter
-from ...design.tuning.perturbations import Perturbations
-from ...design.tuning.result import RobustObjective, Tuning
 from ...design.tuning.rules import RuleSettings, rule_settings, rule_starts, step_experiment
 from ...design.tuning.scenario_loop import ScenarioLoop, load_scenario_loop
 from ...engine.processes import Workers

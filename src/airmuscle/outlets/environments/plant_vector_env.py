@@ -13,8 +13,7 @@ from ...core import Array, ParameterError, ShortRepr, check_whole
 from ...engine.distribution import DistributedCalls
 from ...engine.processes import Workers, process_pool
 from ...engine.run import RungeKutta4
-from ...engine.run.batch import Double, Precision
-from ...engine.run.batch.stepper import BatchStepper
+from ...engine.run.batch import BatchStepper, Double, Precision
 from . import EPISODE_PERIODS
 from .plant_env import STEP, action_space, observation_space, with_on_off_valves
 from .randomisation import EpisodeDraw, Randomisation, whole_steps

@@ -9,10 +9,7 @@ from typing import Any, TypeVar
 
 from ...core import AirmuscleWarning, ParameterError, Value, bar, model, ops, parameter
 from ...files.library import Entry, PlantEntry, ValveEntry, load
-from ...physics.mechanism import Coordinate, HangingMass
-from ...physics.muscle import LinearDamper
-from ...physics.plant import Plant
-from ...physics.pneumatics import FillDischarge, Supply
+from ...physics import Coordinate, FillDischarge, HangingMass, LinearDamper, Plant, Supply
 from .randomisation import FactorRange, Randomisation, ValueRange
 from .task import EnvironmentTask, Observation
 

@@ -19,8 +19,7 @@ from ...engine.compile import compile_system, derivatives
 from ...engine.compile.functions import Printer, TracedSystem
 from ...engine.compile.ir.emission import TargetLanguage
 from ...engine.run.integrators import RungeKutta4
-from ...physics.mechanism import ExternalLoad
-from ...physics.mechanism.loads import SHORTENING, SHORTENING_SPEED
+from ...physics.mechanism import SHORTENING, SHORTENING_SPEED, ExternalLoad
 from ...physics.plant import Plant, open_plant
 from .printed_system import make_labels
 

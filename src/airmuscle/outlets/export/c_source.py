@@ -8,11 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from ...engine import Integrator, PiecewiseLinear
 from ...engine.compile.functions import ArraySizes, Extension
 from ...engine.compile.kernel_text import CKernels
 from ...engine.compile.text.languages import CLanguage
-from ...engine.loop import PiecewiseLinear
-from ...engine.run.integrators import Integrator
 from ...recording.recording import column_heading
 from .exported_run import BETWEEN, SHAPES, STEP, TABLEAU, ExportedLoop, ExportedRun, SolverText
 from .identifiers import block_comment, c_integers, c_number, c_string, c_strings, c_values, filled, make_identifiers

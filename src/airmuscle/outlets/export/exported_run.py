@@ -12,9 +12,8 @@ from ...engine.compile.kernel_text.printer import KernelPrinter
 from ...engine.compile.kernel_text.types import TypedKernel
 from ...engine.compile.program import Description
 from ...engine.loop import COMMAND, MEASURED, SETPOINT, PiecewiseLinear
-from ...engine.run import Problem
+from ...engine.run import ExplicitRungeKutta, Integrator, Problem, Rodas4
 from ...engine.run.driver_table import KINDS, MAX_CAPACITY, DriverTable, greatest_capacity
-from ...engine.run.integrators import ExplicitRungeKutta, Integrator, Rodas4
 from ...engine.run.sampled_loop import CLOSE, SampledLoop, prepare_loop, snapped
 from .printed_controller import PrintedController, check_control_law, print_controller
 from .printed_system import ExportedSystem

@@ -18,9 +18,7 @@ from ...engine.compile.text.languages import TorchLanguage, WarpLanguage
 from ...engine.run.batch import Double, Precision, Single
 from ...files import load_scenario
 from ...files.library.uncertainty import ParameterUncertainty
-from ...physics.mechanism import ExternalLoad
-from ...physics.muscle import Muscle
-from ...physics.plant import Plant
+from ...physics import ExternalLoad, Muscle, Plant
 from .actuator import ActuatorModel, actuator_model
 from .identifiers import filled, line_comment, program_name, provenance
 from .write import write_files

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from ...core import Array, Leaf, ParameterError, leaves
+from ...engine import ControlLaw, ControlLoop, Problem
 from ...engine.compile.functions import Printer
 from ...engine.compile.ir import emission
 from ...engine.compile.ir.emission import TargetLanguage
@@ -14,8 +15,6 @@ from ...engine.compile.ir.instructions import Code, instructions
 from ...engine.compile.ir.interpreter import InterpretedBody
 from ...engine.compile.text.body import Labels
 from ...engine.compile.text.languages import CLanguage
-from ...engine.loop import ControlLaw, ControlLoop
-from ...engine.run import Problem
 from ...engine.run.compiled_law import trace_sample
 from ...engine.run.sampled_loop import SampledLoop
 from .identifiers import block_comment, c_number, c_strings, c_values, filled, make_identifiers, provenance, with_cmake

@@ -9,8 +9,7 @@ import numpy as np
 from ...control import LinearModelPredictive, PredictiveControl
 from ...core import Array, ParameterError, atomic_folder, check_known
 from ...engine.compile.kernel_text import CKernels, plain_kernels
-from ...engine.loop import MEASURED, ControlLoop, EnclosingLaw, WithSensors, without_simulated
-from ...engine.loop.controller import Measurement
+from ...engine.loop import MEASURED, ControlLoop, EnclosingLaw, Measurement, WithSensors, without_simulated
 from ...engine.run import Problem, solve
 from ...engine.run.batch.lanes import Double, Precision, Single
 from ...engine.run.sampled_loop import SampledLoop, prepare_loop

@@ -16,11 +16,9 @@ from ...bench.identify.surface.shape import fit_shape_constrained, shape_violati
 from ...bench.identify.uncertainty_chapter import Uncertainty, length_error_chapter, shape_chapter, uncertainty_chapter
 from ...core import ParameterError
 from ...engine.processes import Workers
-from ...files.library import find_initial_law, missing_geometry, resting_lengths
-from ...files.library.entry import Entry
+from ...files.library import Entry, find_initial_law, missing_geometry, resting_lengths
 from ...files.library.fitted_entry import fitted_entry, left_out_ratio
-from ...physics.muscle.characteristic import ContractileSurface
-from ...physics.muscle.geometry import Geometry
+from ...physics import ContractileSurface, Geometry
 from ...recording import Recording
 from ...report.chapter import Chapter, Table
 from .fit import WEAK, FitRequest, check_one_length, with_braid

@@ -3,8 +3,7 @@
 from pathlib import Path
 from typing import Any
 
-from ...bench.readers import ColumnMapping
-from ...bench.readers.mapping import mapping_of_tables, read_mapping
+from ...bench.readers import ColumnMapping, mapping_of_tables, read_mapping
 from ...bench.readers.missing_values import parse_code
 from .declaration import RequestError, many, optional, request
 

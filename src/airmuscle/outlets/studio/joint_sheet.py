@@ -23,9 +23,8 @@ import airmuscle as am
 
 from ...core import ParameterError, leaves, tree
 from ...design.control_benchmark import STANDARD_TASKS, ControlTask
-from ...engine.compile.functions import Printer
+from ...engine.compile import Printer, compile_system
 from ...engine.compile.kernel_text import JavaScriptKernels
-from ...engine.compile.program import compile_system
 from ...engine.compile.text.languages import JavaScriptLanguage
 from ...engine.run.compiled_law import trace_sample
 from ...files.library import list_plants, plant_tables

@@ -1,7 +1,6 @@
 """Sheet of a plant: a scenario with its printed program, names, units and start, for a run in the page."""
 
 import base64
-import io
 import re
 from collections.abc import Mapping
 from typing import Any
@@ -10,7 +9,7 @@ import numpy as np
 
 import airmuscle as am
 
-from ...core import AirmuscleError, ParameterError, cite, leaves
+from ...core import AirmuscleError, ParameterError, cite, leaves, plotting
 from ...files.library import Location, part_toml, tables_toml
 from ...files.scenario.scenario import TABLES, Scenario, build_scenario, initial_pressure
 from ...recording.columns import display_scale
@@ -169,7 +168,5 @@ def _loop_row(scenario: Scenario) -> dict[str, Any] | None:
 
 
 def svg_uri(figure: Any) -> str:
-    """A Matplotlib figure as an address of its SVG text."""
-    text = io.BytesIO()
-    figure.savefig(text, format="svg", metadata={"Date": None})
-    return f"data:image/svg+xml;base64,{base64.b64encode(text.getvalue()).decode()}"
+    """A Matplotlib figure as an address of its SVG text; equal content gives equal texts."""
+    return f"data:image/svg+xml;base64,{base64.b64encode(plotting.rendered(figure, ('svg',))['svg']).decode()}"
