@@ -11,6 +11,7 @@ from scipy import stats
 
 from airmuscle.bench import (
     Creep,
+    FrictionStage,
     HysteresisFit,
     LoopFit,
     PolynomialCurve,
@@ -34,7 +35,7 @@ from airmuscle.bench.identify.hysteresis import (
 )
 from airmuscle.bench.identify.hysteresis.creep import _drifts, _fit_elements
 from airmuscle.errors import AirmuscleWarning, ColumnError, IdentificationError
-from airmuscle.physics import Dahl, IdentifiedFriction, MaxwellSlip
+from airmuscle.physics import Dahl, IdentifiedFriction, MaxwellSlip, NoFriction
 from airmuscle.recording import Recording
 
 LENGTH = 0.3
@@ -150,6 +151,18 @@ def test_a_dependence_on_pressure_is_tested_from_a_ratio_of_pressures_of_1_2_on(
     loops = find_loops(recordings)
     (joint,) = fit_jointly([LoopFit(each, (fitted(each.recording),), {}) for each in loops])
     assert np.isfinite(joint.scale_p_value) == is_tested
+
+
+def test_a_campaign_whose_loops_cannot_be_fitted_together_names_no_friction():
+    """One of two loops has no law: the muscle has no friction, although the other loop alone would justify one."""
+    runs = [loop(seed=i).with_columns(pressure=np.full(600, level)) for i, level in enumerate((2e5, 4e5))]
+    first, second = find_loops([dataclasses.replace(run, origin=f"loop {i}") for i, run in enumerate(runs)])
+    alone = LoopFit(first, (fitted(first.recording),), {})
+    stage = FrictionStage(NoFriction(), (alone, LoopFit(second, (), {})), fit_jointly([alone]))
+    assert alone.recommended is not None
+    assert stage.verdict == "Fewer than two loops can be fitted together; the muscle is written without friction."
+    single = dataclasses.replace(stage, friction=alone.recommended.friction, loops=(alone,))
+    assert single.verdict.startswith(alone.recommended.verdict)
 
 
 # Limits by the data

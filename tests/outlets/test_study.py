@@ -11,6 +11,7 @@ from __future__ import annotations
 import contextlib
 import csv
 import ctypes
+import dataclasses
 import functools
 import importlib
 import multiprocessing
@@ -441,6 +442,18 @@ def test_the_fingerprint_depends_on_how_the_initial_state_is_specified(folder: P
     assert held.template.scenario.initial_state == pytest.approx(at_rest.template.scenario.initial_state)
     assert held.scenario(0).initial_state != pytest.approx(at_rest.scenario(0).initial_state)
     assert held.fingerprint() != at_rest.fingerprint()
+
+
+def test_the_fingerprint_of_a_model_depends_on_its_file_only_outside_the_program():
+    """A moved file of the program changes no exported model; models of a user with one name are different models."""
+
+    def made(module: str) -> str:
+        kind = dataclasses.make_dataclass("Law", ["gain"])
+        kind.__module__ = module
+        return tree.fingerprint(kind(1.0))
+
+    assert made("airmuscle.physics.old") == made("airmuscle.physics.moved") != made("laws.old")
+    assert made("laws.old") != made("laws.moved")
 
 
 def test_a_failure_reason_does_not_depend_on_the_path_of_the_study(folder: Path, monkeypatch: pytest.MonkeyPatch):

@@ -246,7 +246,9 @@ def _to_json(value: Any) -> Any:
         return [_to_json(item) for item in value]
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         fields = {f.name: _to_json(getattr(value, f.name)) for f in dataclasses.fields(value)}
-        return [f"{type(value).__module__}.{type(value).__qualname__}", fields]
+        module = type(value).__module__
+        package = "airmuscle" if module.startswith("airmuscle.") else module  # whose public names are unique
+        return [f"{package}.{type(value).__qualname__}", fields]
     return repr(value)  # such as a date in a TOML file
 
 

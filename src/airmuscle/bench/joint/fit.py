@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.linalg import block_diag
 
-from ...core import Array, ParameterError, tree
+from ...core import Array, ParameterError, one_thread, tree
 from ...physics import Braid, Muscle, MuscleRoute, PressureDriven, SerialArm, SpatialLink, StickSlip, WithStickSlip
 from ...physics.muscle.characteristic.linear_in_pressure import LinearInPressure
 from .descent import CLIP, Descent, SearchStage, gradients, joint_errors, typical_size, with_values
@@ -27,6 +27,7 @@ CONTACT = 5.0
 Progress = Callable[[str], None]
 
 
+@one_thread()
 def fit_joint(
     episodes: Episodes, *, pairs: Sequence[tuple[int, int]] = (), axes: Sequence[tuple[int, int, int]] = (),
     left_out: float | None = None, rows: int = ROWS, residual: bool = False, seed: int = 0,

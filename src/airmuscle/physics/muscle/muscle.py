@@ -18,7 +18,7 @@ from ...core import (
 )
 from ...core.errors import AirmuscleWarning, ParameterError
 from ...recording.notebook import Card, NotebookDisplay
-from .characteristic import HOSOVSKY_HILL, Characteristic, Clamped, VirtualWork
+from .characteristic import HOSOVSKY_HILL, Clamped, ForceLaw, VirtualWork
 from .characteristic.validity_range import ValidityRange, validity_range_of
 from .friction.base import Friction, NoFriction
 from .geometry.base import Geometry
@@ -66,7 +66,7 @@ class Muscle(QuantityMethods, NotebookDisplay):
         "stiffness": ("Pa", "1"),
     }
 
-    contractile: Characteristic
+    contractile: ForceLaw
     geometry: Geometry
     spring: Spring = LinearSpring(0.0)
     damper: Damper = LinearDamper(0.0)

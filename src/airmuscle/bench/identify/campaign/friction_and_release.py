@@ -152,6 +152,8 @@ class FrictionStage(ShortRepr):
             return self.selected.verdict
         if self.joint:
             return f"{self.joint[0].verdict} The muscle is written without friction."
+        if len(self.loops) > 1:
+            return "Fewer than two loops can be fitted together; the muscle is written without friction."
         best = self.loops[0].recommended
         if best is None:
             return "The loops justify no friction; the muscle is written without friction."
