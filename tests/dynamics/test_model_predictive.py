@@ -14,7 +14,7 @@ import pytest
 
 import airmuscle as am
 from airmuscle.control import design_predictive
-from airmuscle.control.estimation.linear_design import regulator
+from airmuscle.control.estimation.lqg_and_adrc import regulator
 from airmuscle.engine import ControlLoop, Measurement
 from airmuscle.errors import ParameterError
 from airmuscle.physics import linearise

@@ -175,12 +175,10 @@ def test_a_fit_of_segments_needs_a_tube():
 
 
 def test_records_in_different_ambient_air():
-    air_states = (Ambient(8e4), Ambient(9e4, 303.0), STANDARD)
-    stage = stage_of(
-        [record(c, BOTH, i, ambient=a) for i, (c, a) in enumerate(zip(CONTRACTIONS, air_states, strict=True))]
-    )
+    airs = (Ambient(8e4), Ambient(9e4, 303.0), STANDARD)
+    stage = stage_of([record(c, BOTH, i, ambient=a) for i, (c, a) in enumerate(zip(CONTRACTIONS, airs, strict=True))])
     assert_true(stage)
-    assert [stage.fit.plant(i).ambient for i in range(3)] == list(air_states)
+    assert [stage.fit.plant(i).ambient for i in range(3)] == list(airs)
     assert "ambient" not in stage.verdict
 
 

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from airmuscle.bench import BlockMeans, ColumnMapping, Decimation, read
-from airmuscle.bench.readers import raw_columnar, raw_mat, raw_timed, read_contents
+from airmuscle.bench.readers import raw_columnar, raw_mat, raw_mdf_tdms_ros, read_contents
 from airmuscle.bench.readers import time_base as pieces
 from airmuscle.errors import AirmuscleError, ColumnError
 
@@ -97,7 +97,7 @@ def test_the_pieces_of_a_column_give_the_rows_of_the_whole(small_pieces, size, d
         ("run.h5", hdf5, lambda path, d: raw_columnar.read_hdf5_tables_here(path, "/", d)),
         ("run.mat", mat_7_3, lambda path, d: raw_mat.read_mat_tables_here(path, "run", (), d)),
         ("run.mat", mat_5, lambda path, d: raw_mat.read_mat_tables_here(path, "run", (), d)),
-        ("run.mf4", mdf, lambda path, d: raw_timed.read_mdf_tables_here(path, None, d)),
+        ("run.mf4", mdf, lambda path, d: raw_mdf_tdms_ros.read_mdf_tables_here(path, None, d)),
     ],
 )
 def test_a_large_file_gives_every_nth_row_as_measured_with_a_note(tmp_path, small_pieces, name, write, reader):

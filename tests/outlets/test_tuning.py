@@ -340,8 +340,8 @@ def test_no_set_of_gains_surpasses_the_pareto_front():
     assert (np.diff(error[front]) >= 0).all()
     for i in front:
         assert not ((error <= error[i]) & (air <= air[i]) & ((error < error[i]) | (air < air[i]))).any()
-    with pytest.raises(ColumnError, match=r"no metric 'air_states'.*Did you mean 'air'"):
-        history.pareto("air_states")
+    with pytest.raises(ColumnError, match=r"no metric 'airs'.*Did you mean 'air'"):
+        history.pareto("airs")
 
 
 # Bad input

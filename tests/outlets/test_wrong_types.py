@@ -82,7 +82,7 @@ CASES = {
     "name of a muscle": (lambda: replace(MUSCLE, name=5), "Muscle: name must be a text; it is 5"),
     "empty name": (lambda: replace(MUSCLE, name=""), "Muscle: name is ''; it must be a non-empty text"),
     "validity range of a muscle": (lambda: replace(MUSCLE, validity_range="all"), "Muscle: validity_range must be an instance of ValidityRange or None; it is 'all'"),
-    "geometry first": (lambda: Muscle(MUSCLE.geometry, MUSCLE.contractile), "Muscle: contractile must be an instance of ForceLaw; it is "),
+    "geometry first": (lambda: Muscle(MUSCLE.geometry, MUSCLE.contractile), "Muscle: contractile must be an instance of Characteristic; it is "),
     "list of muscles": (lambda: Plant([MUSCLE], CIRCUIT, MASS), "its muscle must be a Muscle; .*into a tuple"),
     "library entry": (lambda: Plant(ENTRY, CIRCUIT, MASS), "its muscle must be a Muscle; .* give its .muscle"),
     "no muscle": (lambda: Plant((), (), MASS), "Plant: it has no muscle; give one, or a tuple of them"),

@@ -10,7 +10,7 @@ from chapter_words import visible_words
 
 from airmuscle.bench import fit
 from airmuscle.engine import ZERO_INPUT, DormandPrince8, RungeKutta4, SampledSignal, simulate
-from airmuscle.papers import hosovsky, hosovsky_claims
+from airmuscle.papers import hosovsky, hosovsky_fill_claims
 from airmuscle.papers import hosovsky_effects as causing
 from airmuscle.papers import hosovsky_fill_and_release as stages
 from airmuscle.papers import hosovsky_joint as joining
@@ -77,20 +77,20 @@ def test_the_muscle_fills_to_the_supply_and_empties_to_the_surroundings(fill):
 
 def test_a_higher_critical_ratio_changes_the_verdict_on_choking(fill):
     claim = r"the flow is choked until \(p_2/p_1 = b\): muscle pressure at which the mass flow begins to decrease"
-    assert verdicts(hosovsky_claims.fill_claims(fill))[claim] == HOLDS
+    assert verdicts(hosovsky_fill_claims.fill_claims(fill))[claim] == HOLDS
     other = stages.run_fill(NUMBERS, dataclasses.replace(MATRIX, critical_ratio=0.5))
-    assert verdicts(hosovsky_claims.fill_claims(other))[claim] == DIFFERS
+    assert verdicts(hosovsky_fill_claims.fill_claims(other))[claim] == DIFFERS
 
 
 def test_another_conductance_changes_the_verdict_on_its_usual_unit(fill):
     claim = "sonic conductance of the MATRIX valve in customary units"
     other = stages.run_fill(NUMBERS, dataclasses.replace(MATRIX, conductance=2.6167e-8))
-    assert verdicts(hosovsky_claims.fill_claims(fill))[claim] == HOLDS
-    assert verdicts(hosovsky_claims.fill_claims(other))[claim] == DIFFERS
+    assert verdicts(hosovsky_fill_claims.fill_claims(fill))[claim] == HOLDS
+    assert verdicts(hosovsky_fill_claims.fill_claims(other))[claim] == DIFFERS
 
 
 def test_what_has_no_printed_number_is_never_said_to_hold(fill):
-    assert [c.verdict for c in hosovsky_claims.fill_claims(fill) if c.reproduced is None] == [NOT_TESTABLE]
+    assert [c.verdict for c in hosovsky_fill_claims.fill_claims(fill) if c.reproduced is None] == [NOT_TESTABLE]
 
 
 def test_interchanged_pressures_change_the_verdicts_of_the_release():
@@ -323,12 +323,12 @@ def test_a_missing_value_does_not_hold():
 
 
 def test_filling_suffers_more_by_a_fifth_only_inside_the_range_of_heat_transfer():
-    ranges = {r.meaning: r for r in hosovsky_claims.ratio_ranges(NUMBERS, causing.SuspectedCauses())}
+    ranges = {r.meaning: r for r in hosovsky_fill_claims.ratio_ranges(NUMBERS, causing.SuspectedCauses())}
     heat = ranges["heat transfer coefficient times area, wall to air"]
     assert heat.ratios == pytest.approx((1.08, 1.40, 1.16), abs=5e-3)
     assert not heat.stronger
     assert ranges["critical pressure ratio of the valve with fittings"].ratios[1] == pytest.approx(3.26, abs=5e-3)
-    text = hosovsky_claims.describe_ranges(tuple(ranges.values()))
+    text = hosovsky_fill_claims.describe_ranges(tuple(ranges.values()))
     assert "wall to air (ratio 1.08, 1.4 and 1.16 at 0.1, 0.5 and 2 W/K)" in text
 
 
@@ -341,7 +341,7 @@ def test_the_volume_flow_of_equation_11_is_the_mass_flow_with_dry_reference_air(
 
 
 def test_ideal_gas_and_reference_density_are_negligible_causes(effects):
-    gas, density = hosovsky_claims.gas_findings(effects)
+    gas, density = hosovsky_fill_claims.gas_findings(effects)
     assert (gas.verdict, density.verdict) == (HOLDS, HOLDS)
     assert density.reproduced == pytest.approx(0.88, abs=5e-3)
     assert 0.5 < gas.reproduced < 0.9
@@ -349,7 +349,7 @@ def test_ideal_gas_and_reference_density_are_negligible_causes(effects):
 
 
 def test_the_step_lies_in_the_range_of_the_sensor_only_as_absolute_pressure():
-    absolute, gauge, hysteresis = (claim for row in hosovsky_claims.MEASUREMENT for claim in row.claims(""))
+    absolute, gauge, hysteresis = (claim for row in hosovsky_fill_claims.MEASUREMENT for claim in row.claims(""))
     assert (absolute.reproduced, absolute.verdict) == (pytest.approx(0.548675), HOLDS)
     assert (gauge.verdict, hysteresis.verdict) == (DIFFERS, NOT_TESTABLE)
 

@@ -77,7 +77,8 @@ def model(cls: type[T]) -> type[T]:
     Library and scenario files may name the class unless it declares `from_file: ClassVar[bool] = False`. A model may
     define `check(self)` for conditions on several parameters together; it raises ParameterError. The values of the
     other fields must conform to their annotations, unless the class declares `checks_structure: ClassVar[bool] = True`
-    because its `check` does this.
+    because its `check` does this. In Python a field also takes the more general type that the class variable `accepted`
+    has by the name of the field.
     """
     if "from_file" not in cls.__dict__:
         cls.from_file = True  # type: ignore[attr-defined]
@@ -226,7 +227,7 @@ def attribute_hint(obj: Any, kind: type[Any]) -> str:
 
 def _check_annotations(obj: Any) -> None:
     """Raise ParameterError if a structural field does not conform to its annotation."""
-    hints = type_hints(type(obj))
+    hints = {**type_hints(type(obj)), **getattr(obj, "accepted", {})}
     for field in dataclasses.fields(obj):
         component, hint = getattr(obj, field.name), hints.get(field.name)
         if "unit" in field.metadata:

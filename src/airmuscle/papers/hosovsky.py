@@ -9,9 +9,9 @@ from ..files.library import load_data, load_law
 from ..physics.muscle.characteristic import exponents, maxwell_defect
 from ..report.chapter import Chapter, Plot, Table
 from ..report.claims import claims_of
-from . import hosovsky_claims as claiming
 from . import hosovsky_effects as causing
 from . import hosovsky_fill_and_release as runs
+from . import hosovsky_fill_claims as claiming
 from . import hosovsky_joint as joining
 from . import hosovsky_plant as rig
 from .hosovsky_plant import FORCE_MAPS, surface, surface_fit

@@ -15,7 +15,7 @@ import numpy as np
 from ...core import Array, ColumnError, FileError
 from ..readers.channels import RawTable
 from ..readers.raw_csv import read_csv_table
-from ..readers.raw_timed import read_rosbag_tables
+from ..readers.raw_mdf_tdms_ros import read_rosbag_tables
 from ..readers.separate_process import import_lab_package, reading
 from .episode_inspection import TURN
 

@@ -20,7 +20,7 @@ from .raw_columnar import read_hdf5_tables, read_parquet_tables
 from .raw_csv import Progress, is_large_file, read_csv_table, read_large_csv, read_text_stream
 from .raw_lvm import is_lvm, read_lvm_tables
 from .raw_mat import read_mat_tables
-from .raw_timed import read_mdf_tables, read_rosbag_tables, read_tdms_tables
+from .raw_mdf_tdms_ros import read_mdf_tables, read_rosbag_tables, read_tdms_tables
 from .raw_workbook import read_workbook_tables
 from .time_base import Decimation, Downsampling, downsample
 

@@ -14,7 +14,7 @@ from ...engine.loop.controller import Measurement, MultivariableController, fail
 from ...physics.analysis import held, linearise
 from ..laws.linear_model_predictive import RAWLINGS2017
 from .estimates import StateEstimate
-from .linear_design import check_numbers, regulator
+from .lqg_and_adrc import check_numbers, regulator
 from .predictive_program import MAX_HORIZON, PredictiveProgram, check_limits
 from .state_estimator import EstimatingController
 

@@ -13,7 +13,7 @@ from ...physics.equilibrium import find_equilibrium
 from ...physics.plant.plant import Plant
 from ..laws import CHISCI2001, RAWLINGS2017, LinearModelPredictive
 from ..laws.linear_model_predictive import CondensedProblem, ObserverModel, PredictiveMemory, TargetMap
-from .linear_design import (
+from .lqg_and_adrc import (
     DISTURBANCE,
     check_numbers,
     check_sample_time,

@@ -14,7 +14,7 @@ from ...engine.compile import AugmentedRates, CompiledSystem, augmented_rates, c
 from ...engine.loop import COMMAND, Controller, Measurement
 from ...recording.recording import Recording
 from .estimates import BoundFilter, Innovation, MeasuredRows, Pass, StateEstimate
-from .linear_design import DISTURBANCE, check_numbers, check_sample_time
+from .lqg_and_adrc import DISTURBANCE, check_numbers, check_sample_time
 
 UNKNOWN = 1e30
 """Factor of the variance of a missing measurement."""

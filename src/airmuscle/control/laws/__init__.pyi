@@ -28,15 +28,15 @@ from .open_loop import SetpointCommand as SetpointCommand
 from .open_loop import SetpointLead as SetpointLead
 from .open_loop import StaticFeedForward as StaticFeedForward
 from .open_loop import StaticInverse as StaticInverse
+from .pid_and_sliding_mode import PID as PID
+from .pid_and_sliding_mode import DeadZoneController as DeadZoneController
+from .pid_and_sliding_mode import OnOffController as OnOffController
+from .pid_and_sliding_mode import SlidingMode as SlidingMode
+from .pid_and_sliding_mode import SuperTwisting as SuperTwisting
 from .pressures import AngleAndStiffness as AngleAndStiffness
 from .pressures import AntagonisticInverse as AntagonisticInverse
 from .pressures import CoContraction as CoContraction
 from .pressures import ProportionalFeedback as ProportionalFeedback
-from .single_column import PID as PID
-from .single_column import DeadZoneController as DeadZoneController
-from .single_column import OnOffController as OnOffController
-from .single_column import SlidingMode as SlidingMode
-from .single_column import SuperTwisting as SuperTwisting
 from .state_feedback import ComputedTorque as ComputedTorque
 from .state_feedback import StateFeedback as StateFeedback
 

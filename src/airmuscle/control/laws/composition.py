@@ -9,7 +9,7 @@ from ...core.declaration import forwarded
 from ...core.errors import check_known
 from ...core.system import select_prefix, united, with_prefix
 from ...engine.loop import ControlLaw, EnclosingLaw, Measurement, Memory, Sampled, parameter_units
-from .single_column import ASTROM_HAGGLUND1995
+from .pid_and_sliding_mode import ASTROM_HAGGLUND1995
 
 
 @model

@@ -5,7 +5,7 @@ from typing import ClassVar
 from ...core import ParameterError, Reference, Value, check_known, model, ops, parameter, select_prefix, with_prefix
 from ...core.annotation import within
 from ...engine.loop import LECUYER1999, STATE, ControlLaw, EnclosingLaw, Measurement, Memory, Sampled, drawn, seeded
-from .single_column import ASTROM_HAGGLUND1995
+from .pid_and_sliding_mode import ASTROM_HAGGLUND1995
 from .state_feedback import FRANKLIN1998
 
 MAX_SAMPLES = 1000

@@ -10,7 +10,7 @@ from ...core import Parameter, ParameterError, Reference, Value, model, ops, par
 from ...engine.loop import ControlLaw, Measurement, Memory, Sampled
 from ...physics import ElasticSeriesElement, ForceLaw, Muscle
 from ...physics.muscle.geometry.meridian import SAGA_2007
-from .single_column import ASTROM_HAGGLUND1995
+from .pid_and_sliding_mode import ASTROM_HAGGLUND1995
 
 
 class OpenLoopLaw(ControlLaw):

@@ -9,7 +9,7 @@ from ...engine.loop import Commanded, ControlLaw, Measurement, Memory, Sampled, 
 from ...physics import Mechanism, Muscle
 from ...physics.muscle.characteristic.tondu_lopez2000 import TONDU_LOPEZ_2000
 from .open_loop import OpenLoopLaw, check_invertible, check_pair, pressure_between, static_force
-from .single_column import ASTROM_HAGGLUND1995
+from .pid_and_sliding_mode import ASTROM_HAGGLUND1995
 
 DIFFERENCE = "difference"
 """Name of the set point that an outer controller commands: half the difference of both pressures [Pa]."""

@@ -7,7 +7,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from ...control.laws.single_column import PID
+from ...control.laws.pid_and_sliding_mode import PID
 from ...core import AirmuscleError, Array, ParameterError, Reference, check_field_types, published
 from ...engine.loop import Schedule, WithDrivers, commands, range_of
 from ...engine.run import Integrator, simulate

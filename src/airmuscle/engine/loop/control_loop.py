@@ -18,7 +18,6 @@ from ...core.tree import Structure, structure, with_ambient
 from ...recording.recording import Recording
 from .control_law import ControlLaw, EnclosingLaw, Memory, Sampled, rebuilt
 from .controller import Controller, Measurement, named_signal_units
-from .driver import Driver, WithDrivers
 from .inputs import (
     ZERO_INPUT,
     InputSignal,
@@ -28,6 +27,7 @@ from .inputs import (
     check_input_signal,
     merge_columns,
 )
+from .pwm_and_solenoid import Driver, WithDrivers
 
 COMMAND, SETPOINT, MEASURED = "command.", "setpoint.", "measured."
 """Prefixes of the columns of a recording that hold commands, set points and measurements of a controller."""

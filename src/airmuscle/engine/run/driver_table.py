@@ -9,7 +9,7 @@ import numpy as np
 from ...core import Array
 from ..compile.kernel_layout import DriverKind
 from ..loop import PWM, ControlLoopState, Driver, PwmState, SolenoidDriver
-from ..loop.driver import MAX_PERIODS, SolenoidState, apply_drivers, check_command_range
+from ..loop.pwm_and_solenoid import MAX_PERIODS, SolenoidState, apply_drivers, check_command_range
 from .sampled_loop import SampledLoop
 
 MAX_CAPACITY = 1_000_000

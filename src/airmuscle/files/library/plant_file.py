@@ -14,7 +14,7 @@ from typing import Any
 
 from ...bench.readers import read_csv
 from ...core import FileError, ParameterError, Reference, abridged
-from ...engine.loop.driver import Driver, SolenoidDriver
+from ...engine.loop.pwm_and_solenoid import Driver, SolenoidDriver
 from ...physics import ForceLaw, Muscle, Orifice, Plant
 from ...recording import Recording
 from . import Location, check_keys, list_data, located_errors, read_finite_number, read_table, read_text, read_toml

@@ -1,4 +1,4 @@
-"""`airmuscle fit-dynamic`, `fit-regulator` and `fit-joint`: plants, regulators and joints from transient records."""
+"""`airmuscle fit-dynamic` and `fit-regulator`: plants and regulators from transient records."""
 
 import dataclasses
 from pathlib import Path
@@ -12,14 +12,12 @@ from ...files.library import list_files, part_toml, scenario_toml
 from ...files.scenario.identification import load_dynamic_fit
 from ...recording.recording import row_notes
 from ..requests import WEAK, ReadingRequest, many, option, optional, request
-from ..requests.joint import JointFitRequest, fit_requested_arm, inspect_requested
 from .delivery import deliver
 from .measurements import Files, read_recordings, reading_chapters
 from .options import Folder, Json, argument, with_requests
 from .terminal import echo
 
 Study = Annotated[Path, argument("STUDY.toml", "A file with [plant], [observed], [fit] and [[record]].")]
-Episodes = Annotated[Path, argument("EPISODES", "A folder of episodes or bags, or one file with all.")]
 
 
 @request
@@ -115,31 +113,3 @@ def fit_regulator_command(
     }
     chapters = [*regulator_chapters(result, title), *reading_chapters(recordings)]
     deliver("fit-regulator", chapters, json=json, out=out, title="Pressure regulator", files=contents)
-
-
-@with_requests
-def fit_joint_command(
-    source: Episodes, request: JointFitRequest, out: Folder = Path("joint"), json: Json = False
-) -> None:
-    """Identify a joint or an arm from its episodes.
-
-    \b
-    Episodes are short records with angles of the joints and pressures of their muscles: CSV, NPZ, JSON, HDF5,
-    Parquet, ROS bags or RLDS-like steps, one file each or one for all. The mapping file says which column is what,
-    in which unit, and may state the muscles of each joint and the axes of the joints; without one it is proposed.
-    The free run is judged on the last episodes, beside persistence and a linear ARX model. Writes DIR/report.html,
-    DIR/scenario.toml, the arm with a pressure regulator for each muscle and the covariance of its parameters, and
-    DIR/controlled.toml, the same with a controller of each angle to be tuned.
-
-    \b
-    Examples:
-      airmuscle fit-joint episodes/ --mapping arm.toml --inspect
-      airmuscle fit-joint episodes.npz --mapping arm.toml --out arm
-      airmuscle fit-joint episodes --mapping arm.toml --known joint.toml --free mechanism.inertia --free zeros
-    """
-    if request.inspect:
-        echo(str(inspect_requested(source, request)))
-        return
-    check_writable(out)
-    chapter, files = fit_requested_arm(source, request, lambda text: None if json else echo(text))
-    deliver("fit-joint", [chapter], json=json, out=out, title="Identified arm", files=files)

@@ -1,4 +1,4 @@
-"""`airmuscle simulate` and `airmuscle study`: runs of a scenario file; `airmuscle schema`: its JSON schema."""
+"""`airmuscle simulate`: run of a scenario file; `airmuscle schema`: its JSON schema."""
 
 from pathlib import Path
 from typing import Annotated, Any
@@ -6,27 +6,20 @@ from typing import Annotated, Any
 import typer
 
 from ...bench.readers import write
-from ...core import AirmuscleError, SimulationError, atomic_folder, check_writable, new_figure
-from ...design.study import Study, StudyResult, load_study, run_study
-from ...design.study.chapter import RESULTS_FILE, study_chapter, write_study
-from ...design.study.chunk import count_finished_runs
+from ...core import SimulationError, atomic_folder, check_writable
 from ...design.study.paths import changed_scenario
-from ...engine.executors import SharedFolder
-from ...engine.processes import process_pool
 from ...files.scenario import Scenario, load_scenario, muscle_schema, scenario_schema
 from ...files.scenario.simulation_chapter import run_chapter
 from ...recording import Recording
 from ...report.chapter import Chapter
 from ...report.data import as_json
-from ...report.write import REPORT_FILE
 from ..requests import many, read_pair, request
-from .delivery import Execution, Files, contributions, deliver, print_result, write_result
+from .delivery import Files, deliver, write_result
 from .options import Folder, Json, argument, complete_plant, with_requests
-from .terminal import counted_progress, echo, print_json
+from .terminal import echo, print_json
 
 SCENARIO = "A file with [plant], [input] and [run], or the name of a plant of the library."
 ScenarioFile = Annotated[Path, argument("SCENARIO.toml", SCENARIO, complete_plant)]
-StudyFile = Annotated[Path, argument("STUDY.toml", "A file with scenario, [vary], [design] and [metrics].")]
 
 
 @request
@@ -73,62 +66,6 @@ def _results(scenario: Scenario, recording: Recording) -> tuple[list[Chapter], s
     """The chapters, the title of the report, and the file of the recording."""
     files = {"recording.csv": lambda path: write(scenario.select_columns(recording), path)}
     return [run_chapter(scenario, recording)], "Simulation", files
-
-
-@with_requests
-def study(file: StudyFile, execution: Execution, out: Folder = Path("study"), json: Json = False) -> None:
-    """Run a parameter study of a scenario.
-
-    \b
-    The parameters vary on a grid or randomly. Writes DIR/results.csv (one row per run), DIR/report.html, DIR/figures/
-    and DIR/data/. Completed runs are saved in DIR/chunks, or in the folder of --join: after an interruption the same
-    command resumes the study, with bit-identical results. If a run fails, results.csv states the reason.
-
-    \b
-    Examples:
-      airmuscle study examples/valve_study.toml --out study
-      airmuscle study study.toml --workers 8
-      airmuscle study study.toml --dask tcp://head-node:8786
-      airmuscle study study.toml --join /shared/study    (on each machine)
-    """
-    loaded, writes = load_study(file), execution.writes(out)
-    if writes and execution.join is not None:
-        new_figure()  # imports Matplotlib while the other processes compute, which draw no figures
-    result, shares = _run(loaded, out if execution.join is None else None, execution)
-    writes = writes or execution.takes_over(out)
-    if writes or json:
-        chapter = study_chapter(result, execution=shares)
-        page = write_study(result, out, chapter) if writes else out / REPORT_FILE
-        print_result([chapter], {"results": out / RESULTS_FILE, "report": page}, json)
-    if result.failed.size == len(result.study):
-        raise SimulationError(f"all {len(result.study)} runs failed; reason of the first: {result.failure_reasons[0]}")
-
-
-def _run(study: Study, folder: Path | None, execution: Execution) -> tuple[StudyResult, str]:
-    """The result of the study, and a sentence on the processes that share it.
-
-    A message states how many runs an earlier command has saved in the folder, and at an abort how many are saved.
-    """
-    first = iter([True])
-
-    def show(done: int, total: int) -> None:
-        draw("runs", done, total)
-        if next(first, False) and done:
-            echo(f"resuming: {done} of {total} runs are already saved", err=True)
-
-    try:
-        with (
-            counted_progress("runs") as draw,
-            execution.executor(len(study.chunks)) as workers,
-            process_pool(workers) as executor,
-        ):
-            result = run_study(study, folder, executor, show)
-        return result, f"{contributions(workers)}." if isinstance(workers, SharedFolder) else ""
-    except (AirmuscleError, KeyboardInterrupt):
-        if folder and (done := count_finished_runs(study, folder)):  # one may have been completed during the abort
-            saved = f"{done} of {len(study)} runs are saved in {folder / 'chunks'}"
-            echo(f"{saved}; the same command resumes from there", err=True)
-        raise
 
 
 OfMuscles = Annotated[bool, typer.Option("--muscle", help="The schema of muscle files; default: of scenario files.")]

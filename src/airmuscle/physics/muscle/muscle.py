@@ -2,6 +2,7 @@
 
 import textwrap
 import warnings
+from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, ClassVar, NamedTuple
 
@@ -18,7 +19,7 @@ from ...core import (
 )
 from ...core.errors import AirmuscleWarning, ParameterError
 from ...recording.notebook import Card, NotebookDisplay
-from .characteristic import HOSOVSKY_HILL, Clamped, ForceLaw, VirtualWork
+from .characteristic import HOSOVSKY_HILL, Characteristic, Clamped, ForceLaw, VirtualWork
 from .characteristic.validity_range import ValidityRange, validity_range_of
 from .friction.base import Friction, NoFriction
 from .geometry.base import Geometry
@@ -65,6 +66,9 @@ class Muscle(QuantityMethods, NotebookDisplay):
         "static_force": ("Pa", "1"),
         "stiffness": ("Pa", "1"),
     }
+
+    accepted: ClassVar[Mapping[str, type]] = MappingProxyType({"contractile": Characteristic})
+    """Types of fields in Python; a muscle in a plant, and so one of a file, needs the annotated one."""
 
     contractile: ForceLaw
     geometry: Geometry

@@ -1,6 +1,6 @@
 """Drivers of an input inside a kernel: pulse width modulation, and a switch with delays and ramps.
 
-`control.driver.PWM` and `control.driver.SolenoidDriver` call them as plain Python, and exported programs print them. A
+`PWM` and `SolenoidDriver` of `engine.loop` call them as plain Python, and exported programs print them. A
 signal is an array (3, capacity): end, value at the start, and slope of each segment; `count` of them are used.
 """
 

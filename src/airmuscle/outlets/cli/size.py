@@ -1,0 +1,36 @@
+"""`airmuscle size`: muscles of the catalogue for a lift or a joint."""
+
+from ...core import check_writable
+from ...design.sizing.chapter import sizing_chapter
+from ...design.sizing.scenario import sizing_scenario
+from ..requests.size import SizeRequest
+from .delivery import deliver
+from .options import Json, OptionalFolder, with_requests
+from .terminal import computation_progress
+
+SCENARIO_FILE = "scenario.toml"
+
+
+@with_requests
+def size(request: SizeRequest, out: OptionalFolder = None, json: Json = False) -> None:
+    """Size muscles of the catalogue for a lift or a joint.
+
+    \b
+    For each muscle whose law and permitted values are known: the shortest length that reaches both ends of the motion
+    within ratings, validity range and supply, alone and in parallel, with pressures, reserve and air of a cycle.
+    With --out, DIR/report.html shows the force-contraction chart and all choices, and DIR/scenario.toml is the best
+    choice that `airmuscle simulate` can run, with valves for the cycle time.
+
+    \b
+    Examples:
+      airmuscle size --load "20 kg" --stroke "40 mm" --supply "6 bar" --max-length "400 mm" --out lift
+      airmuscle size --load "100 N" --stiffness "2 N/mm" --stroke "40 mm" --supply "6 bar" --sort length
+      airmuscle size --torque "5 N m" --angle "60 deg" --inertia "0.05 kg m^2" --supply "6 bar" --max-count 1
+    """
+    if out is not None:
+        check_writable(out)
+    with computation_progress("sizing") as progress:
+        result = request.evaluate(progress)
+    scenario = sizing_scenario(result.choices, SCENARIO_FILE if out is not None else "scenario.toml of --out")
+    files = {SCENARIO_FILE: scenario.text} if scenario.text else {}
+    deliver("size", [sizing_chapter(result, scenario)], json=json, out=out, title="Sizing", files=files)
