@@ -23,6 +23,7 @@ from airmuscle.physics import (
     Ambient,
     EnergyBalance,
     FillDischarge,
+    GaussianResidual,
     HangingMass,
     Isothermal,
     Plant,
@@ -101,6 +102,13 @@ def energies_close(run, plant):
 def test_a_plant_composed_at_random_runs_or_ends_with_a_reason_or_is_refused(seeds):
     outcomes = collections.Counter(outcome(seed) for seed in seeds)
     assert outcomes[Status.DONE] >= 1, outcomes
+
+
+def test_the_energy_of_a_mechanism_with_a_residual_closes():
+    """Two joints without tension and gravity, which the torques of the residual alone move: friction takes their work."""
+    plant = Composer(2364).plant()
+    assert any(isinstance(part, GaussianResidual) for part in models_in(plant.mechanism))
+    assert outcome(2364) is Status.DONE
 
 
 @pytest.mark.slow

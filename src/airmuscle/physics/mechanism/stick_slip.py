@@ -215,8 +215,13 @@ class WithStickSlip(ForceWrapper):
         ]
 
     def own_loss(self, q: Values, v: Values, forces: Values, inputs: Values) -> Value:
+        """Power [W] that friction takes, less that of the torques of the residual."""
         forces = self._with_bearings(q, v, forces, inputs)
-        return -sum(torque * v[c.speed] for c, torque in self._friction(q, v, forces))
+        taken = -sum(torque * v[c.speed] for c, torque in self._friction(q, v, forces))
+        if self.residual is None:
+            return taken
+        torques, _ = self.residual.evaluate([q[c.name] for c in self._angles], q)
+        return taken - sum(torque * v[c.speed] for c, torque in zip(self._angles, torques, strict=True))
 
 
 def _bristle(coordinate: Coordinate) -> str:
