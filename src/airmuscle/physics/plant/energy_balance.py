@@ -31,7 +31,8 @@ class WithEnergyMeters(System):
 
     Four balances must close. Mechanical: kinetic + potential energy increase by `work_of_tension`, which includes the
     contact force of an end stop, minus `mechanism_loss`, provided that a latch is operated at rest only; the energies
-    of an ExternalLoad are outside the plant, and the work on it is part of `mechanism_loss`. Muscle:
+    of an ExternalLoad are outside the plant, and the work on it is part of `mechanism_loss`, from which the work of the
+    torques of a residual is subtracted. Muscle:
     `work_of_contractile` is `work_of_tension` + `damping_heat` + `element_work` + `friction_work` (with friction),
     provided that no muscle is slack. Air: `air_energy`, of the air in the muscles, increases by `energy_of_flow` +
     `heat_to_air` minus `work_of_air`. Mass: `air_total`, of all air, increases by `air_supplied` minus

@@ -12,11 +12,13 @@ from ..dynamic.dynamic_chapter import draw_residuals, residual_panels, running_e
 from . import Campaign, CampaignRecord, CreepStage, FillStage, RecordKind, StaticStage
 from .transient import thinned_rows
 
-MAX_LOOPS, MAX_PANELS, CURVE_POINTS = 6, 6, 161
-"""Maximum number of loops in a figure, and of panels of fills; points of a curve (chosen)."""
-LEVEL_TOLERANCE, POINT_TOLERANCE = 0.03, 0.005
-"""Maximum relative difference of two pressures that have one curve, and that of the pressure of a point from its curve,
-relative to the maximum (chosen)."""
+MAX_LOOPS, MAX_PANELS = 6, 6
+"""Maximum number of loops in a figure, and of panels of fills (chosen)."""
+CURVE_POINTS = 161
+LEVEL_TOLERANCE = 0.03
+"""Maximum relative difference of two pressures that have one curve (chosen)."""
+POINT_TOLERANCE = 0.005
+"""Maximum difference of the pressure of a point from that of its curve, relative to the maximum (chosen)."""
 
 
 def characteristic_plot(campaign: Campaign) -> Plot | None:
