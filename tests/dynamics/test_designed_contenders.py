@@ -200,10 +200,11 @@ def test_the_tuning_covers_the_frequencies_that_are_judged_and_no_judged_motion(
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [LQG, MPC, ADRC])
 def test_the_weights_of_a_design_are_tuned_like_gains(name: str):
+    """Eight sets for each gain: with three, the search ends within its first sample of the ranges, before a descent."""
     alone = dataclasses.replace(JOINT, family={"nominal": JOINT.model})
-    ((tuning, _),) = search_gains(alone, CONTENDERS[name].tuned_as or CONTENDERS[name], (1,), 3, lambda *_: None)
+    ((tuning, _),) = search_gains(alone, CONTENDERS[name].tuned_as or CONTENDERS[name], (1,), 8, lambda *_: None)
     law = tuned_law(alone, CONTENDERS[name], 1, tuning)
-    assert tuning.objective < tuning.present_objective
+    assert tuning.objective < 0.8 * tuning.present_objective
     (path,) = (path for path in tuning.gains if path.endswith(("permitted_angle", ".bandwidth")))
     name = path.rpartition(".")[2]
     values = [leaf.value for leaf in leaves(law) if leaf.path.endswith(f".{name}")]
