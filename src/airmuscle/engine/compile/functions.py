@@ -2,6 +2,7 @@
 
 import copy
 import dataclasses
+import functools
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -10,6 +11,7 @@ from .ir import emission
 from .ir.emission import FunctionBlock, TargetLanguage
 from .ir.instructions import Code, Operand, finished, hoisted, instructions, recorded
 from .ir.jacobian import Tape, nonzeros
+from .ir.scheduling import Item
 from .ir.sparse_lu import Factors
 from .llvm.emit import LlvmLanguage
 from .text.body import NO_LABEL
@@ -132,12 +134,21 @@ class Printer:
         if self.quantities and set(map(self._argument, self.quantities[0])) <= set(inputs):
             trial = copy.copy(block)  # it prints the quantities, too: those that have values already have their names
             trial.lines, trial._known, trial.read, trial.loaded = [], dict(block._known), set(), {}
-            code = instructions(list(self.quantities[0].values()), [self.quantities[1]])
-            results = self.compute(trial, code, list(self.quantities[0]))
+            code, held, items = self._quantity_code
+            values = emission.Emission(trial, list(self.quantities[0]), held, {})
+            values.run(items)
             known = set(block._known.values())
-            named = {value: ("o", index) for (_, index), value in results.items() if value in known}
+            results = ((values.value_of(operand), index) for _, index, operand in code.outputs)
+            named = {value: ("o", index) for value, index in results if value in known}
         of_c = [labels[PARAMETERS][parameters[v][1]] if v in parameters else NO_LABEL for v in self._places]
         block.name_values({**labels, "c": of_c}, named, {*inputs, *outputs})
+
+    @functools.cached_property
+    def _quantity_code(self) -> tuple[Code, dict[Operand, int], list[Item]]:
+        """Code of the quantities, which is the same in all functions: where `c` holds operands, its instructions."""
+        arguments, values = self.quantities  # type: ignore[misc]
+        code, held = self.set_apart(instructions(list(arguments.values()), [values]), list(arguments))
+        return code, held, emission.with_gates(code, list(arguments), held)
 
     @staticmethod
     def _argument(name: str) -> str:

@@ -9,12 +9,11 @@ The metadata of a field may state another `key`, and none if it is empty.
 
 import dataclasses
 import inspect
-import typing
 from collections.abc import Callable, Mapping
 from typing import Any
 
 from ...core import ParameterError, abridged, check_field, parameters
-from ...core.annotation import conforms
+from ...core.annotation import conforms, type_hints
 from . import fields
 from .fields import allows, model_class, model_names
 from .files import Location, check_keys, located_errors
@@ -61,7 +60,7 @@ class TableReader:
         library = ["library"] if any(each in self.named for each in fields.options(kind)) else []
         check_keys(values, [*(key for key in names if key), *library], location)
         values = {names[key]: value for key, value in values.items() if names[key] not in given}
-        hints = typing.get_type_hints(cls)
+        hints = type_hints(cls)
         declared = {p.name: p for p in parameters(cls)}
         signals = self.signals if self.signals and self.signals.concerns(cls) else None
         parts = signals.parts(cls, hints) if signals else {}

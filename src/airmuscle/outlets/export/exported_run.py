@@ -78,7 +78,7 @@ class SolverText:
         tableau = {key.upper(): value for key, value in zip(TABLEAU, arrays, strict=True) if key in read}
         return {"FIRST_STEP": own.step, "CLOSE": 1e-9 * own.step, "RTOL": 0.0, **tableau}
 
-    @property
+    @functools.cached_property
     def places(self) -> dict[str, str]:
         """The printed functions, and their calls with their workspace, for a template."""
         result = {"steps": self.printer.printed(self._kernels)}

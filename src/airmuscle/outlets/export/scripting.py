@@ -1,5 +1,6 @@
 """JavaScript module, and MATLAB and Octave functions, of a system: functions, solver and the run of a scenario."""
 
+import functools
 import json
 import re
 from collections.abc import Iterable, Mapping
@@ -11,6 +12,7 @@ from ...core import printable
 from ...engine.compile.kernel_text import JavaScriptKernels, MatlabKernels
 from ...engine.compile.kernel_text.printer import KernelPrinter
 from ...engine.compile.text.languages import DEFINITION, JavaScriptLanguage, MatlabBody, MatlabLanguage
+from ...engine.run import Integrator
 from .c_source import csv_header
 from .exported_run import BETWEEN, SHAPES, STEP, TABLEAU, ExportedRun, SolverText
 from .identifiers import block_comment, filled, line_comment, template
@@ -20,12 +22,7 @@ def javascript_files(program: ExportedRun) -> dict[str, str]:
     """The ECMAScript module of a program, its types, a program for Node that writes the columns as CSV, and the
     package.json of a folder that npm installs, by file name."""
     name, loop = program.name, program.loop
-    names = {*STEP.values(), *BETWEEN.values()}
-    fields = {key: f"this.{word}" for key, word in zip(names, _camel(dict.fromkeys(names)), strict=True)}
-    fields |= {"nominal": "nominal"} | {key: key.upper() for key in TABLEAU}
-    lengths = {"STATES": "states.length", "INPUTS": "inputs.length", "STAGES": "WEIGHTS.length",
-               "JACOBIAN": "SIZES.jacobian", "FACTORS": "SIZES.factors"}  # fmt: skip
-    solver = SolverText(JavaScriptKernels(), program.integrator, fields, lengths, "work.")
+    solver = javascript_solver(program.integrator)
     functions, sizes = program.system.printed(JavaScriptLanguage(), implicit=solver.implicit)
     functions = functions.replace("export function outputs(", "export function outputsOf(", 1)
     text = "".join(f"export const {key} = {to_json(value)};\n" for key, value in _camel(program.data()).items())
@@ -47,6 +44,17 @@ def javascript_files(program: ExportedRun) -> dict[str, str]:
         f"{name}.run.mjs": filled("run.mjs", places, name),
         "package.json": filled("package.json", places, name),
     }
+
+
+@functools.lru_cache(maxsize=16)
+def javascript_solver(integrator: Integrator) -> SolverText:
+    """The solver of a module, whose text is that of no other system: the page asks for one with every plant."""
+    names = {*STEP.values(), *BETWEEN.values()}
+    fields = {key: f"this.{word}" for key, word in zip(names, _camel(dict.fromkeys(names)), strict=True)}
+    fields |= {"nominal": "nominal"} | {key: key.upper() for key in TABLEAU}
+    lengths = {"STATES": "states.length", "INPUTS": "inputs.length", "STAGES": "WEIGHTS.length",
+               "JACOBIAN": "SIZES.jacobian", "FACTORS": "SIZES.factors"}  # fmt: skip
+    return SolverText(JavaScriptKernels(), integrator, fields, lengths, "work.")
 
 
 def _types(program: ExportedRun) -> dict[str, str]:

@@ -106,11 +106,11 @@ class FunctionBlock(abc.ABC):
 
     def operate(self, operation: Operation, x: Sequence[str]) -> str:
         """The value of one operation, whose instructions are appended; raises TraceError for an unknown operation."""
-        one, zero = self.constant(1.0), self.constant(0.0)
         if operation in _ARITHMETIC:
             return self.arithmetic(_ARITHMETIC[operation], x[0], x[-1])
         if operation in _FUNCTIONS:
             return self.call(_FUNCTIONS[operation], x)
+        one, zero = self.constant(1.0), self.constant(0.0)
         if operation in _COMPARISONS:
             return self.choose(_COMPARISONS[operation], x[0], x[1], one, zero)
         if operation in _EXTREMES:
