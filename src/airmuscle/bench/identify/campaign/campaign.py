@@ -168,7 +168,8 @@ def identify_campaign(
         )
     check_one_rig(records)
     steps.end("records", records)
-    creep = steps.fit("creep", lambda _: fit_creep_stage(_of_kind(records, RecordKind.CREEP)))
+    of_kind = {kind: [record for record in records if record.kind is kind] for kind in RecordKind}
+    creep = steps.fit("creep", lambda _: fit_creep_stage(of_kind[RecordKind.CREEP]))
     elements = creep.elements if isinstance(creep, CreepStage) else CreepElements()
     with process_pool(workers, one_thread_each=True, terminate=True) as executor:
         hysteresis = steps.fit("hysteresis", lambda show: fit_friction_stage(records, elements, show, executor))
@@ -176,29 +177,17 @@ def identify_campaign(
         static = steps.fit(
             "static characteristic", lambda show: fit_static_stage(records, friction, elements, show, executor)
         )
-    fills = steps.fit("fills and volume", lambda show: _fit_fills(records, static, geometry, show))
+    filled, main = of_kind[RecordKind.FILL], _main_length(of_kind[RecordKind.FILL])
+    if len({r.resting_length for r in filled} - {None}) > 1:  # one muscle, that of the most records
+        filled = [r for r in filled if r.resting_length == main]
+    change = None if main is None else _volume_change(static, main)
+    fills = steps.fit("fills and volume", lambda show: fit_fill_stage(filled, geometry, change, show))
     partial = Campaign(records, creep, hysteresis, static, fills, LeftOutStage("release", "", ""), (), geometry)
-    releases = _of_kind(records, RecordKind.RELEASE)
+    releases = of_kind[RecordKind.RELEASE]
     muscle = partial.muscle(releases[0].resting_length) if releases else None
     release = steps.fit("release", lambda _: fit_release_stage(releases, muscle))
-    planned = steps.end("plan", plan_next((creep, hysteresis, static, fills, release), static, records))
+    planned = steps.end("plan", plan_next((creep, hysteresis, static, fills, release), records))
     return dataclasses.replace(partial, release=release, next_experiments=planned)
-
-
-def _fit_fills(
-    records: Sequence[CampaignRecord], static: StaticStage | LeftOutStage, geometry: Geometry | None,
-    progress: Callable[[float], None],
-) -> FillStage | LeftOutStage:  # fmt: skip
-    """The fit of the fills of one muscle, that of the most records."""
-    fills = _of_kind(records, RecordKind.FILL)
-    main = _main_length(fills)
-    if len({r.resting_length for r in fills if r.resting_length is not None}) > 1:
-        fills = [r for r in fills if r.resting_length == main]
-    return fit_fill_stage(fills, geometry, None if main is None else _volume_change(static, main), progress)
-
-
-def _of_kind(records: Sequence[CampaignRecord], kind: RecordKind) -> list[CampaignRecord]:
-    return [record for record in records if record.kind is kind]
 
 
 @dataclasses.dataclass(frozen=True)

@@ -41,19 +41,15 @@ def stage_result(stage: CreepStage | FrictionStage | StaticStage | FillStage | R
             f"error {best.cross_validated_rmse:.3g} N in cross-validation."
         )
     if isinstance(stage, FillStage):
-        return _fill_result(stage)
+        cross, conductance = stage.cross_rms, getattr(stage.circuit.fill, "conductance", None)
+        text = f"Each fill is predicted from the others within {max(cross) / 1e3:.3g} kPa (rms). " if cross else ""
+        text += f"Conductance {conductance:.3g} m3/(s Pa), " if conductance is not None else ""
+        volume = f"{text}volume at zero contraction {1e6 * float(stage.geometry.volume(0.0)):.3g} cm3."
+        return f"{volume} {stage.misfit}".rstrip()
     if isinstance(stage, ReleaseStage):
         damping = stage.fit["muscle.damper.damping"]
         return f"Damping {damping.value:.3g} N s/m (2 standard errors {damping.format_interval()})."
     return stage.verdict
-
-
-def _fill_result(stage: FillStage) -> str:
-    cross, conductance = stage.cross_rms, getattr(stage.circuit.fill, "conductance", None)
-    text = f"Each fill is predicted from the others within {max(cross) / 1e3:.3g} kPa (rms). " if cross else ""
-    text += f"Conductance {conductance:.3g} m3/(s Pa), " if conductance is not None else ""
-    volume = f"{text}volume at zero contraction {1e6 * float(stage.geometry.volume(0.0)):.3g} cm3."
-    return f"{volume} {stage.misfit}".rstrip()
 
 
 MAX_NEXT = 4
@@ -80,8 +76,11 @@ def campaign_chapters(
     `unread` are pairs of a file that could not be read and the reason, `scenarios` of a record and its scenario file or
     the reason.
     """
+    plots = (plot(campaign) for plot in (characteristic_plot, prediction_plot, residual_plot, fill_plot))
+    summary = "The predicted force is that of the static law minus friction and creep along the recorded motion."
+    muscle = Chapter("campaign-muscle", "Muscle and prediction error", summary, plots=tuple(filter(None, plots)))
     stages = sorted((stage for _, stage in campaign.stages), key=lambda stage: not isinstance(stage, StaticStage))
-    chapters = [_predictions(campaign), *(chapter for stage in stages for chapter in stage_chapters(stage, entry))]
+    chapters = [muscle, *(chapter for stage in stages for chapter in stage_chapters(stage, entry))]
     parts = [dataclasses.replace(chapter, brief=False) for chapter in chapters]
     return [_overview(campaign, unread, dict(scenarios), validation), _next(campaign), *parts]
 
@@ -135,21 +134,12 @@ def _overview(
         "result": [stage_result(stage) for _, stage in stages],
     }
     files = {"file": [name for name, _ in unread], "reason": [reason for _, reason in unread]}
-    tables = [
+    tables = (
         Table("campaign-stages", "Stages", columns, brief=len(stages), key="stages"), _band_table(campaign),
         _validation_table(validation), _record_table(campaign, scenarios),
         Table("campaign-unread", "Files that could not be read", files, brief=MAX_NEXT, key="unread"),
-    ]  # fmt: skip
-    shown = tuple(table for table in tables if table)
-    return Chapter("campaign", "Overview", " ".join(sentences), tables=shown, notes=tuple(notes))
-
-
-def _predictions(campaign: Campaign) -> Chapter:
-    """Return the chapter of the muscle: characteristic, predicted loops and fills, residuals and bands."""
-    plots = [characteristic_plot(campaign), prediction_plot(campaign), residual_plot(campaign), fill_plot(campaign)]
-    summary = "The predicted force is that of the static law minus friction and creep along the recorded motion."
-    shown = tuple(plot for plot in plots if plot is not None)
-    return Chapter("campaign-muscle", "Muscle and prediction error", summary, plots=shown)
+    )  # fmt: skip
+    return Chapter("campaign", "Overview", " ".join(sentences), tables=tuple(filter(len, tables)), notes=tuple(notes))
 
 
 def _next(campaign: Campaign) -> Chapter:
@@ -167,14 +157,15 @@ def _next(campaign: Campaign) -> Chapter:
     return Chapter("campaign-next", "What to measure next", summary, tables=tuple(tables))
 
 
-def _band_table(campaign: Campaign) -> Table | None:
-    if not isinstance(campaign.static, StaticStage):
-        return None
-    bands = campaign.static.all_bands
-    half_widths = [band.half_width for band in bands]
+def _half_widths(rows: Sequence[Any]) -> TableColumn:
+    return TableColumn([row.half_width for row in rows], "N", digits=3, short="95 % band ±")
+
+
+def _band_table(campaign: Campaign) -> Table:
+    bands = campaign.static.all_bands if isinstance(campaign.static, StaticStage) else ()
     columns: dict[str, Any] = {
         "prediction of": [band.purpose for band in bands],
-        "half width of the 95 % band": TableColumn(half_widths, "N", digits=3, short="95 % band ±"),
+        "half width of the 95 % band": _half_widths(bands),
         "rms error": TableColumn([band.rmse for band in bands], "N", digits=3),
         "groups left out": TableColumn([band.groups for band in bands], brief=False),
         "rows": TableColumn([band.rows for band in bands], brief=False),
@@ -186,9 +177,7 @@ def _validation_table(rows: Sequence[ValidationRow]) -> Table:
     columns: dict[str, Any] = {
         "record": [row.record for row in rows],
         "rms error": TableColumn([row.rmse for row in rows], "N"),
-        "half width of the 95 % band": TableColumn(
-            [row.half_width for row in rows], "N", digits=3, short="95 % band ±"
-        ),
+        "half width of the 95 % band": _half_widths(rows),
         "rows within the band": TableColumn([row.share for row in rows], "1", "%", digits=3, short="within"),
         "rows": [row.rows for row in rows],
     }

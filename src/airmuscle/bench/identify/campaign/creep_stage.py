@@ -45,10 +45,8 @@ class CreepStage(ShortRepr):
         """The elements and their agreement with the holds, as sentences."""
         if not self.elements.stiffnesses:
             return "The holds justify no creep."
-        holds, slowest = (
-            f"{len(self.holds)} holds; rms residual {self.rmse:.3g} N.",
-            max(self.elements.relaxation_times),
-        )
+        holds = f"{len(self.holds)} holds; rms residual {self.rmse:.3g} N."
+        slowest = max(self.elements.relaxation_times)
         further = (
             f" The holds of {self.longest:.4g} s are too short for the longest relaxation time; hold for "
             f"{6 * slowest:.2g} s to determine it."
@@ -62,35 +60,6 @@ def describe_elements(elements: CreepElements) -> str:
     return f"Maxwell elements of {' and '.join(f'{k:.4g} N/m with {tau:.4g} s' for k, tau in pairs)}"
 
 
-def fit_creep_stage(records: Sequence[CampaignRecord]) -> CreepStage | LeftOutStage:
-    """Fit Maxwell elements to the holds at constant length and pressure.
-
-    The number of elements is the largest that the F test justifies in a hold. Relaxation times and stiffnesses are
-    common to all holds, each hold has its own initial force.
-    """
-    if not records:
-        remedy = (
-            "move the muscle by a few per cent of its length within a second at constant pressure, hold the length for "
-            "two minutes or more, and record the force"
-        )
-        return LeftOutStage(NAME, "no record is a hold after a motion", remedy)
-    motions = [(record, find_motion(record.recording)) for record in records]
-    return fit_held_rows(
-        [(each.origin, HeldRows.after(each.recording, motion.end)) for each, motion in motions if motion]
-    )
-
-
-def fit_held_rows(named_holds: "Sequence[tuple[str, HeldRows]]") -> CreepStage | LeftOutStage:
-    """Fit Maxwell elements to named holds, as `fit_creep_stage`."""
-    holds = [hold for _, hold in named_holds]
-    try:
-        fits = [fit_creep(hold.recording, "force") for hold in holds]
-    except AirmuscleError as error:
-        return LeftOutStage(NAME, str(error.message), "record holds of 12 rows or more with increasing time")
-    count = max(len(fit.creep.amplitudes) for fit in fits)
-    return _fit_elements(holds, count, tuple((name, fit) for (name, _), fit in zip(named_holds, fits, strict=True)))
-
-
 @dataclasses.dataclass(frozen=True, eq=False)
 class HeldRows:
     """The held rows of a record, and the path of its displacement from the first row."""
@@ -102,10 +71,7 @@ class HeldRows:
 
     @classmethod
     def after(cls, whole: Recording, end_of_motion: float) -> "HeldRows":
-        """The rows after a dead time from the end of the motion [s] to the end of the recording.
-
-        Raises IdentificationError where there are none.
-        """
+        """The rows after a dead time from the end of the motion [s] on. Raises IdentificationError without any."""
         later = whole["time"] > end_of_motion + DEADTIME
         if not later.any():
             raise IdentificationError(
@@ -122,31 +88,61 @@ class HeldRows:
         return np.asarray(creep_stretches(self.time, self.path, times)[self.held])
 
 
-def _fit_elements(
-    holds: Sequence[HeldRows], count: int, fits: tuple[tuple[str, CreepFit], ...]
-) -> CreepStage | LeftOutStage:
+def fit_creep_stage(records: Sequence[CampaignRecord]) -> CreepStage | LeftOutStage:
+    """Fit Maxwell elements to the holds at constant length and pressure.
+
+    The number of elements is the largest that the F test justifies in a hold. Relaxation times and stiffnesses are
+    common to all holds, each hold has its own initial force.
+    """
+    if not records:
+        remedy = (
+            "move the muscle by a few per cent of its length within a second at constant pressure, hold the length for "
+            "two minutes or more, and record the force"
+        )
+        return LeftOutStage(NAME, "no record is a hold after a motion", remedy)
+    motions = [(record.recording, find_motion(record.recording)) for record in records]
+    return fit_held_rows([HeldRows.after(recording, motion.end) for recording, motion in motions if motion])
+
+
+def fit_held_rows(holds: Sequence[HeldRows]) -> CreepStage | LeftOutStage:
+    """Fit Maxwell elements to holds, as `fit_creep_stage`."""
+    try:
+        fits = [fit_creep(hold.recording, "force") for hold in holds]
+    except AirmuscleError as error:
+        return LeftOutStage(NAME, str(error.message), "record holds of 12 rows or more with increasing time")
+    elements, errors, measured = CreepElements(), np.zeros(0), [hold.recording["force"] for hold in holds]
+    modelled = [np.full(force.size, force.mean()) for force in measured]
+    count = max(len(fit.creep.amplitudes) for fit in fits)
+    if count:
+        times = _common_times(holds, max((fit.creep.time_constants for fit in fits), key=len))
+        coefficients, rest = _linear_part(holds, times)
+        if not (coefficients[:count] > 0).all():
+            reason = "the force of the holds does not relax towards the value before the motion"
+            because = "because a pressure step also changes the force"
+            return LeftOutStage(NAME, reason, f"hold the pressure constant during the motion and after it, {because}")
+        elements = CreepElements(tuple(coefficients[:count].tolist()), tuple(times.tolist()))
+        modelled = [matrix @ coefficients for matrix in _matrices(holds, times)]
+        errors = _standard_errors(holds, times, coefficients, rest)
+    elapsed = [hold.recording["time"] - hold.recording["time"][0] for hold in holds]
+    residuals = np.concatenate([a - b for a, b in zip(modelled, measured, strict=True)])
+    return CreepStage(
+        elements, errors, tuple((hold.recording.origin, fit) for hold, fit in zip(holds, fits, strict=True)),
+        tuple(elapsed), tuple(measured), tuple(modelled), float(np.sqrt(np.mean(residuals**2))),
+        max(float(t[-1]) for t in elapsed),
+    )  # fmt: skip
+
+
+def _common_times(holds: Sequence[HeldRows], initial: Sequence[float]) -> Array:
+    """The relaxation times of all holds [s] from initial ones, for which the linear unknowns are solved."""
     from scipy.optimize import least_squares
 
-    if count == 0:
-        constant = [np.full(len(hold.recording), hold.recording["force"].mean()) for hold in holds]
-        return _build(holds, CreepElements(), np.zeros(0), fits, constant)
-    longest = max(float(hold.recording["time"][-1] - hold.recording["time"][0]) for hold in holds)
-    best = max((fit.creep.time_constants for _, fit in fits), key=len)
-    ordered = np.clip(np.sort(np.array(best)), 0.1, 2.0 * longest)
+    longest, count = max(float(h.recording["time"][-1] - h.recording["time"][0]) for h in holds), len(initial)
+    ordered = np.clip(np.sort(np.array(initial)), 0.1, 2.0 * longest)
     steps = np.log(np.concatenate([ordered[:1], np.maximum(ordered[1:] / ordered[:-1], 1.05 * MIN_RATIO)]))
     low, high = np.log([0.1, *[MIN_RATIO] * (count - 1)]), np.log([2.0 * longest] * count)
     start = np.clip(steps, low + 1e-6, high - 1e-6)
     result = least_squares(lambda x: _linear_part(holds, np.exp(np.cumsum(x)))[1], start, bounds=(low, high))
-    times = np.exp(np.cumsum(result.x))
-    coefficients, rest = _linear_part(holds, times)
-    stiffnesses = coefficients[:count]
-    if not (stiffnesses > 0).all():
-        reason = "the force of the holds does not relax towards the value before the motion"
-        because = "because a pressure step also changes the force"
-        return LeftOutStage(NAME, reason, f"hold the pressure constant during the motion and after it, {because}")
-    elements = CreepElements(tuple(stiffnesses.tolist()), tuple(times.tolist()))
-    modelled = [matrix @ coefficients for matrix in _matrices(holds, times)]
-    return _build(holds, elements, _standard_errors(holds, times, coefficients, rest), fits, modelled)
+    return np.asarray(np.exp(np.cumsum(result.x)))
 
 
 def _matrices(holds: Sequence[HeldRows], times: Array) -> list[Array]:
@@ -174,19 +170,6 @@ def _standard_errors(holds: Sequence[HeldRows], times: Array, coefficients: Arra
     return np.concatenate([deviations[: times.size], deviations[-times.size :]])
 
 
-def _build(
-    holds: Sequence[HeldRows], elements: CreepElements, standard_errors: Array, fits: tuple[tuple[str, CreepFit], ...],
-    modelled: Sequence[Array],
-) -> CreepStage:  # fmt: skip
-    measured = [hold.recording["force"] for hold in holds]
-    residuals = np.concatenate([a - b for a, b in zip(modelled, measured, strict=True)])
-    times = [hold.recording["time"] - hold.recording["time"][0] for hold in holds]
-    return CreepStage(
-        elements, standard_errors, fits, tuple(times), tuple(measured), tuple(modelled),
-        float(np.sqrt(np.mean(residuals**2))), max(float(t[-1]) for t in times),
-    )  # fmt: skip
-
-
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class HeldCreep(ShortRepr):
     """The creep of the longest hold of each recording as sentences, and the elements of the muscle."""
@@ -209,7 +192,7 @@ def fit_held_creep(recordings: Sequence[Recording], *, law: ForceLaw | None = No
     constant load gives the elements. A hold without a motion before it has a course but no stiffness.
     """
     sentences, reasons = [], list[str]()
-    held, loaded = list[tuple[str, HeldRows]](), list[tuple[float, str, CreepElements]]()
+    held, loaded = list[HeldRows](), list[tuple[float, str, CreepElements]]()
     for recording in recordings:
         hold = max(find_holds(recording), key=lambda each: len(each.interval), default=None)
         sentences.append(_sentence(recording, hold))
@@ -220,7 +203,7 @@ def fit_held_creep(recordings: Sequence[Recording], *, law: ForceLaw | None = No
                 needed = "the resting length and the time; the contraction alone gives no stiffness"
                 raise IdentificationError(f"{recording.origin}: creep elements need {needed}.")
             if hold.quantity == "force":
-                held.append((recording.origin, _held_rows(recording, hold)))
+                held.append(_held_rows(recording, hold))
             else:
                 loaded.append(_elements_under_load(recording, hold, law))
         except AirmuscleError as error:
@@ -269,16 +252,16 @@ def _elements_under_load(recording: Recording, hold: Hold, law: ForceLaw | None)
         )
     length, rows = float(recording.constants["resting_length"]), recording.rows(hold.interval.rows)
     fit = fit_creep(rows, hold.quantity)
-    step = _single_motion(recording, hold, min(fit.creep.time_constants, default=np.inf)) * length
+    change = _single_motion(recording, hold.interval.start, min(fit.creep.time_constants, default=np.inf))
     pressure, contraction = (float(np.median(rows[name])) for name in ("pressure", "contraction"))
     stiffness = float(law.stiffness(pressure, contraction)) / length
-    elements = creep_elements(fit, step=step, stiffness=stiffness, resting_length=length)
+    elements = creep_elements(fit, step=change * length, stiffness=stiffness, resting_length=length)
     return fit.duration, recording.origin, elements
 
 
-def _single_motion(recording: Recording, hold: Hold, shortest: float) -> float:
+def _single_motion(recording: Recording, start: int, shortest: float) -> float:
     """Change of the contraction by the one quick motion before a hold. Raises IdentificationError for another one."""
-    contraction, start = recording["contraction"], hold.interval.start
+    contraction = recording["contraction"]
     first, last = float(contraction[0]), float(np.median(contraction[start : start + 3]))
     change, origin = last - first, recording.origin
     remedy = "Record one quick change of the load or the pressure, then hold both."

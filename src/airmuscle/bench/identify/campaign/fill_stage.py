@@ -2,7 +2,6 @@
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
-from functools import partial
 
 import numpy as np
 
@@ -16,8 +15,7 @@ from .record import CampaignRecord
 from .transient import LeftOutStage
 from .volume import VolumeChange, VolumeEstimate, relate_volumes
 
-Fitted = Callable[[Sequence[Experiment], fills.ValveUnknowns], DynamicFit]
-Supplied = tuple[DynamicFit, Sequence[Experiment], fills.ValveUnknowns]
+Fitted = Callable[[Sequence[Experiment]], DynamicFit]
 NAME = "fills and volume"
 VOLUME = "muscle.geometry.enclosed_volume"
 REMEDY = (
@@ -114,13 +112,13 @@ def fit_fill_stage(
     """
     if not records:
         return LeftOutStage(NAME, "no record is a fill or a discharge at a held length", REMEDY)
+    estimate = None
     try:
         rising = [record for record in records if any(step.change > 0 for step in record.steps)] or list(records)
         relative, held = _fit_relative(rising), np.array([fills.held_contraction(record) for record in rising])
         own = [each for each in relative.estimates if each.name.startswith(VOLUME)]
         volumes, errors = np.array([each.value for each in own]), np.array([each.stderr for each in own])
         progress(0.5)
-        estimate = None
         if geometry is not None:  # the factor that makes the relative volumes its own
             known = np.array([float(geometry.volume(contraction)) for contraction in held])
             scale = float(known @ volumes / (volumes @ volumes))
@@ -141,18 +139,15 @@ def fit_fill_stage(
 
 
 def _fit_relative(records: Sequence[CampaignRecord]) -> DynamicFit:
-    """A fit of own volumes of the records for an assumed conductance of the valve of their first direction.
+    """A fit of own volumes of the records for an assumed conductance of the valve of their first direction."""
 
-    The records with a fill have it, because without one the ratio of the other conductance and the volumes remains.
-    """
-
-    def fitted(experiments: Sequence[Experiment], valves: fills.ValveUnknowns) -> DynamicFit:
+    def fitted(experiments: Sequence[Experiment]) -> DynamicFit:
+        valves = fills.ValveUnknowns.of(records, experiments[0].plant)
         free = [*valves.shared, *([f"{valves.circuit}.discharge.{fills.CONDUCTANCE}"] if valves.both else [])]
         return fills.fit_pressure(records, experiments, free, (VOLUME,))
 
-    experiments = [fills.detected_experiment(record, fills.vessel_plant(record)) for record in records]
-    valves = fills.ValveUnknowns.of(records, experiments[0].plant)
-    return _with_supply(records, experiments, valves, fitted)[0]
+    detected = [fills.detected_experiment(record, fills.vessel_plant(record)) for record in records]
+    return _with_supply(records, detected, fitted)[0]
 
 
 def _experiments(
@@ -160,14 +155,13 @@ def _experiments(
     scale: float,
 ) -> list[Experiment]:  # fmt: skip
     """All records with the volumes of a geometry, from the valves of the scaled relative fit and its instants."""
-    found, experiments = fills.rescaled(fills.plant_of(relative.plant()), scale), []
-    for record in records:
-        plant = fills.at_record(found, record, float(geometry.volume(fills.held_contraction(record))))
-        experiment = fills.detected_experiment(record, plant)
-        if record in rising:
-            experiment = fills.with_instants(experiment, relative, rising.index(record))
-        experiments.append(experiment)
-    return experiments
+    found = fills.rescaled(fills.plant_of(relative.plant()), scale)
+    plants = [fills.at_record(found, each, float(geometry.volume(fills.held_contraction(each)))) for each in records]
+    detected = list(map(fills.detected_experiment, records, plants))
+    return [
+        fills.with_instants(experiment, relative, rising.index(record)) if record in rising else experiment
+        for record, experiment in zip(records, detected, strict=True)
+    ]
 
 
 def _fit_jointly(
@@ -175,23 +169,22 @@ def _fit_jointly(
     estimate: VolumeEstimate | None, progress: Callable[[float], None],
 ) -> FillStage:  # fmt: skip
     """The fit with the volumes of one curve, and the prediction of each record from the others."""
-    everything = range(len(records))
+    everything, common_ratio = range(len(records)), ""
 
-    def fitted(experiments: Sequence[Experiment], every: fills.ValveUnknowns, chosen: Sequence[int]) -> DynamicFit:
-        """The fit of the chosen records, with what is supposed of the valves of every record."""
-        own = fills.ValveUnknowns.of([records[i] for i in chosen], experiments[0].plant, every.common_ratio)
+    def fitted(experiments: Sequence[Experiment], chosen: Sequence[int] = everything) -> DynamicFit:
+        own = fills.ValveUnknowns.of([records[i] for i in chosen], experiments[0].plant, common_ratio)
         free = [*own.shared, *own.paths(fills.CONDUCTANCE)]
         return fills.fit_pressure(records, [experiments[i] for i in chosen], free)
 
+    fit, experiments = _with_supply(records, experiments, fitted)
     valves = fills.ValveUnknowns.of(records, experiments[0].plant)
-    fit, experiments, valves = _with_supply(records, experiments, valves, partial(fitted, chosen=everything))
-    if valves.both and (reason := fills.poor_ratios(fit)):
-        valves = dataclasses.replace(valves, common_ratio=reason)
-        fit = fitted(experiments, valves, everything)
+    if valves.both and (common_ratio := fills.poor_ratios(fit)):
+        valves = dataclasses.replace(valves, common_ratio=common_ratio)
+        fit = fitted(experiments)
 
     def fit_to_others(chosen: Sequence[int]) -> DynamicFit:
         progress(0.5 + 0.5 * (sum(everything) - sum(chosen)) / len(records))
-        return fitted(experiments, valves, chosen)
+        return fitted(experiments, chosen)
 
     predictions = cross_predict(fit, fit_to_others)
     fit = fit.with_scatter_of_records([each.common for each in predictions])
@@ -206,21 +199,18 @@ def _fit_jointly(
 
 
 def _with_supply(
-    records: Sequence[CampaignRecord], experiments: Sequence[Experiment], valves: fills.ValveUnknowns, fitted: Fitted,
-) -> Supplied:  # fmt: skip
-    """The fit with a constant supply; where it does not follow the records, with a volume before the valve or a tube.
-
-    A volume is used where the records determine it and the fit then follows them; a tube that is too large in relation
-    to the muscle is not, because it stands for an error of the model.
-    """
-    constant = fitted(experiments, valves)
+    records: Sequence[CampaignRecord], experiments: Sequence[Experiment], fitted: Fitted
+) -> tuple[DynamicFit, Sequence[Experiment]]:
+    """The fit with a constant supply; where it does not follow the records, with a volume before the valve or a tube,
+    if the records determine it and the fit then follows them. Too large a tube stands for an error of the model."""
+    constant, valves = fitted(experiments), fills.ValveUnknowns.of(records, experiments[0].plant)
     limit = MAX_FOLLOWED * fills.pressure_deviation(records)
     if not valves.fill or valves.sinks or valves.tube or max(fills.record_rms(constant)) <= limit:
-        return constant, experiments, valves
+        return constant, experiments
     found = [fills.with_instants(each, constant, i) for i, each in enumerate(experiments)]
-    for change, volume in ((_with_volume, "supply.volume"), (_with_tube, "tube.volume")):
+    for change, begun, volume in ((_with_volume, found, "supply.volume"), (_with_tube, experiments, "tube.volume")):
         try:
-            fit, changed, unknowns = change(found if change is _with_volume else experiments, valves, fitted)
+            fit, changed = change(begun, fitted)
         except AirmuscleError:  # the simulation fails on the way
             continue
         estimate = next(each for each in fit.estimates if each.name.endswith(volume))
@@ -228,23 +218,23 @@ def _with_supply(
         muscle = fills.volume_at_rest(fills.plant_of(fit.plant()))
         possible = change is _with_volume or estimate.value <= MAX_TUBE_VOLUME * muscle
         if determined and possible and max(fills.record_rms(fit)) <= limit:
-            return fit, changed, unknowns
-    return constant, experiments, valves
+            return fit, changed
+    return constant, experiments
 
 
-def _with_volume(experiments: Sequence[Experiment], valves: fills.ValveUnknowns, fitted: Fitted) -> Supplied:
+def _with_volume(experiments: Sequence[Experiment], fitted: Fitted) -> tuple[DynamicFit, list[Experiment]]:
     """The fit with a volume before the valve."""
-    sinking, changed = dataclasses.replace(valves, sinks=True), list(map(fills.with_supply_volume, experiments))
-    return fitted(changed, sinking), changed, sinking
+    changed = list(map(fills.with_supply_volume, experiments))
+    return fitted(changed), changed
 
 
-def _with_tube(experiments: Sequence[Experiment], valves: fills.ValveUnknowns, fitted: Fitted) -> Supplied:
+def _with_tube(experiments: Sequence[Experiment], fitted: Fitted) -> tuple[DynamicFit, list[Experiment]]:
     """The fit with a tube between valves and muscle, whose number of segments AICc chooses."""
-    unknowns, plant = dataclasses.replace(valves, tube=True), fills.plant_of(experiments[0].plant)
+    plant = fills.plant_of(experiments[0].plant)
 
     def divided(changed: Plant) -> list[Experiment]:
         return [fills.with_circuit(each, changed.circuits[0]) for each in experiments]
 
     guess = dataclasses.replace(plant, circuit=WithTubes(fills.valves_of(plant.circuit), fills.tube_guess(plant)))
-    fit = fit_tube(guess, lambda changed, _: fitted(divided(changed), unknowns))
-    return fit, divided(fills.plant_of(fit.plant())), unknowns
+    fit = fit_tube(guess, lambda changed, _: fitted(divided(changed)))
+    return fit, divided(fills.plant_of(fit.plant()))

@@ -24,8 +24,8 @@ from .transient import LeftOutStage, displacement, find_motion, held_steady, pat
 
 FIT_ROWS, INITIAL_DAMPING = 300, 100.0
 """Maximum number of rows of a release, and initial damping of the search [N s/m] (chosen)."""
-MIN_DEVIATIONS = {"position": 2e-5, "pressure": 100.0}
-"""Least standard deviations of the sensors [m], [Pa] (chosen)."""
+MIN_DEVIATIONS = (("position", "length", 2e-5), ("pressure", "pressure", 100.0))
+"""Quantities, their columns, and least standard deviations of the sensors [m], [Pa] (chosen)."""
 SETTLED_SHARE = 0.1
 """Share of the rows at the end of a release from which the load follows (chosen)."""
 DAMPING = "muscle.damper.damping"
@@ -79,7 +79,11 @@ def fit_release_stage(records: Sequence[CampaignRecord], muscle: Muscle | None) 
     try:
         damped = dataclasses.replace(muscle, damper=LinearDamper(INITIAL_DAMPING))
         experiments = [_experiment(record, damped, mass) for record, mass in masses.items()]
-        deviations = {name: _deviation(list(masses), name) for name in ("position", "pressure")}
+        sensors = [record.inspection.sensors for record in masses]
+        deviations = {
+            name: max([least, *(each[column].std for each in sensors if column in each)])
+            for name, column, least in MIN_DEVIATIONS
+        }
         first = experiments[0].plant
         assert first is not None
         fit = fit_dynamic(
@@ -101,13 +105,6 @@ def _mass(record: CampaignRecord) -> float | None:
     rows = max(int(SETTLED_SHARE * len(record.recording)), 3)
     mass = float(np.median(record.recording["force"][-rows:])) / STANDARD_GRAVITY
     return mass if mass > 0.01 else None
-
-
-def _deviation(records: Sequence[CampaignRecord], name: str) -> float:
-    column = "length" if name == "position" else name
-    sensors = [record.inspection.sensors.get(column) for record in records]
-    values = [sensor.std for sensor in sensors if sensor is not None]
-    return max([MIN_DEVIATIONS[name], *values])
 
 
 def _experiment(record: CampaignRecord, muscle: Muscle, mass: float) -> Experiment:
@@ -268,8 +265,8 @@ def predicted_force(
 ) -> Array:
     """The force [N] along the pressure and the motion of a recording, negative where the muscle is slack; shape (N,).
 
-    Friction and creep are relaxed at the first row; they need the constant `resting_length`, and are left out without
-    it. `max_force` [N] limits the force of laws that give contraction or pressure. Raises ColumnError.
+    Friction and creep, relaxed at the first row, are left out without the constant `resting_length`. `max_force` [N]
+    limits the force of laws that give contraction or pressure. Raises ColumnError.
     """
     force = evaluate_force(law, recording["pressure"], recording["contraction"], max_force)
     if recording.constants.get("resting_length") is None:

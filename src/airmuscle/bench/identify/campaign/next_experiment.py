@@ -92,60 +92,55 @@ class NextExperiment(ShortRepr):
     plan: ExperimentPlan | None = None
 
 
-def plan_next(
-    stages: Sequence[object], static: StaticStage | LeftOutStage, records: Sequence[CampaignRecord]
-) -> tuple[NextExperiment, ...]:
+def plan_next(stages: Sequence[object], records: Sequence[CampaignRecord]) -> tuple[NextExperiment, ...]:
     """The next experiments: missing ones, then those that determine weak parameters, then static runs."""
-    missing = [
+    planned = [
         NextExperiment(_sentence(stage.remedy), f"{stage.name}: {stage.reason.rstrip('.')}")
         for stage in stages
         if isinstance(stage, LeftOutStage) and stage.remedy
     ]
-    return (*missing, *_undetermined(stages), *_lengths(static, records), *_static_runs(static))
+    for stage in stages:
+        if isinstance(stage, FillStage):
+            planned += _separating_records(stage)
+        elif isinstance(stage, CreepStage):
+            longest = max(stage.elements.relaxation_times, default=0.0)
+            if longest > stage.longest / 2:
+                text = f"Hold the length for {6 * longest:.2g} s instead of {stage.longest:.3g} s."
+                planned.append(NextExperiment(text, "creep: the longest relaxation time is extrapolated"))
+    for stage in stages:
+        if isinstance(stage, StaticStage):
+            planned += [*_lengths(records), *_static_runs(stage)]
+    return tuple(planned)
 
 
 def _sentence(text: str) -> str:
     return f"{text[:1].upper()}{text[1:].rstrip('.')}."
 
 
-def _undetermined(stages: Sequence[object]) -> list[NextExperiment]:
-    """The experiments that separate parameters that the fills do not, and longer holds."""
-    experiments = []
-    for stage in stages:
-        if isinstance(stage, FillStage):
-            for each in stage.fit.identifiability.undetermined:
-                names = ", ".join(name for name, _ in each.shares)
-                experiments.append(NextExperiment(_sentence(each.remedy), f"fills: {names} are not determined"))
-            experiments += _separating_record(stage)
-        elif isinstance(stage, CreepStage):
-            longest = max(stage.elements.relaxation_times, default=0.0)
-            if longest > stage.longest / 2:
-                text = f"Hold the length for {6 * longest:.2g} s instead of {stage.longest:.3g} s."
-                experiments.append(NextExperiment(text, "creep: the longest relaxation time is extrapolated"))
-    return experiments
-
-
-def _separating_record(stage: FillStage) -> list[NextExperiment]:
-    """The record that would separate valve and wall, where the fills leave one of the two poorly determined."""
+def _separating_records(stage: FillStage) -> list[NextExperiment]:
+    """The experiments that determine what the fills do not, and the record that would separate valve and wall."""
+    planned = []
+    for each in stage.fit.identifiability.undetermined:
+        names = ", ".join(name for name, _ in each.shares)
+        planned.append(NextExperiment(_sentence(each.remedy), f"fills: {names} are not determined"))
     try:
         ranking = rank_records(stage.fit)
     except AirmuscleError:
-        return []  # fewer than two common parameters within their bounds
+        return planned  # fewer than two common parameters within their bounds
     best, (first, second) = ranking.ranking[0], ranking.pair
     if ranking.now.worst < POORLY_DETERMINED or best.gain < MIN_GAIN:
-        return []
+        return planned
     now, after = (100.0 * each.worst for each in (ranking.now, best.precision))
     purpose = f"fills: {first} and {second} have a relative standard error of up to {now:.2g} %, then {after:.2g} %"
-    return [NextExperiment(_sentence(f"measure {best.description}"), purpose)]
+    return [*planned, NextExperiment(_sentence(f"measure {best.description}"), purpose)]
 
 
-def _lengths(static: StaticStage | LeftOutStage, records: Sequence[CampaignRecord]) -> list[NextExperiment]:
+def _lengths(records: Sequence[CampaignRecord]) -> list[NextExperiment]:
     lengths = {r.resting_length for r in records if r.kind.is_static and r.resting_length is not None}
-    if isinstance(static, LeftOutStage) or len(lengths) >= MIN_LENGTHS:
-        return []
     measured = f"{len(lengths)} resting {'length is' if len(lengths) == 1 else 'lengths are'} measured"
     text = "Measure muscles of the same type with three resting lengths, each at three pressures or more."
-    return [NextExperiment(text, f"lengths: {measured}, so the error for other lengths is not known")]
+    next_length = NextExperiment(text, f"lengths: {measured}, so the error for other lengths is not known")
+    return [next_length] if len(lengths) < MIN_LENGTHS else []
 
 
 def _levels(run: PlannedRun) -> str:
@@ -154,10 +149,8 @@ def _levels(run: PlannedRun) -> str:
     return f"{run.constant} {level_text(run.constant, run.level)}, {run.swept} {ends}"
 
 
-def _static_runs(static: StaticStage | LeftOutStage) -> list[NextExperiment]:
-    if isinstance(static, LeftOutStage):
-        return []
-    fit, ranges = static.fit, static.fit.data_ranges
+def _static_runs(stage: StaticStage) -> list[NextExperiment]:
+    fit, ranges = stage.fit, stage.fit.data_ranges
     (low, high), (least, greatest) = ranges["pressure"], ranges["contraction"]
     limits = BenchLimits(ValidityRange(max(low, 0.0), high, max(least, 0.0), greatest), ranges["force"][1])
     fixed = tuple(leaf.path for i, leaf in enumerate(fit.problem.leaves) if i not in set(fit.problem.free))

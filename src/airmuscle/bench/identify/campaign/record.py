@@ -107,8 +107,7 @@ def static_levels(record: CampaignRecord) -> list[CampaignRecord]:
 
 
 def _cut_at_levels(record: CampaignRecord, sensors: Mapping[str, Sensor]) -> list[CampaignRecord]:
-    """The steps between the pressure levels of a held muscle as records of their own, if there are more levels than a
-    fill explains: those to the supply and to ambient pressure, and one record of the rows that are not used."""
+    """The steps of a held muscle to the supply and to ambient pressure, if it has more levels, and its other rows."""
     recording, levels = record.recording, list[tuple[float, int, int]]()
     usable = all(name in recording for name in ("time", "pressure", "contraction"))
     if record.kind.is_static or not usable or not np.isfinite(recording["pressure"]).all():
@@ -140,8 +139,7 @@ def _cut_at_levels(record: CampaignRecord, sensors: Mapping[str, Sensor]) -> lis
 
 def _classify(inspection: Inspection) -> CampaignRecord:
     recording = inspection.recording
-    unusable = _unusable(recording)
-    if unusable:
+    if unusable := _unusable(recording):
         return CampaignRecord(recording, RecordKind.UNUSED, unusable, inspection)
     if inspection.static_points is not None and "force" in recording:
         return CampaignRecord(recording, RecordKind.STATIC, inspection.static_points.description, inspection)
@@ -153,7 +151,7 @@ def _classify(inspection: Inspection) -> CampaignRecord:
             return CampaignRecord(recording, RecordKind.FILL, reason, inspection, steps)
         motion = find_motion(recording)
         has_length = isinstance(recording.constants.get("resting_length"), float | int)
-        if has_length and motion is not None and motion.is_single:
+        if has_length and motion is not None and abs(motion.travel) > 0.5 * motion.range:  # moved once, and not back
             rest, pressure = float(recording["time"][-1]) - motion.end, recording["pressure"]
             held = _span(pressure) <= RELATIVE_BAND * max(float(np.max(np.abs(pressure))), 1.0)
             if held and rest >= max(MIN_HOLD, MIN_HOLD_RATIO * motion.duration):

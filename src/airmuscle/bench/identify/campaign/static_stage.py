@@ -61,9 +61,17 @@ class ErrorBand:
         return f"95 % band of the force for {self.purpose}: ±{self.half_width:.3g} N, from {source}"
 
 
-def calibrate(fit: Fit, points: Sequence[Recording], records: Sequence[CampaignRecord]) -> tuple[ErrorBand, ...]:
-    """The band for further runs of the measured muscles, and that for other lengths if there are three or more."""
+def calibrate(
+    fit: Fit, points: Sequence[Recording], records: Sequence[CampaignRecord]
+) -> tuple[tuple[ErrorBand, ...], ErrorBand | None]:
+    """The band for further runs of the measured muscles, and that for other lengths if there are three or more; the
+    band for further isometric runs, which are left out at once, where there are some and the others determine the law.
+
+    A ramp of the pressure at a held length has no friction, and another history of creep than a sweep of the length, so
+    that its residuals are of one sign.
+    """
     bands, lengths = list[ErrorBand](), [run.constants.get("resting_length") for run in points]
+    isometric = [("kind", 0) if record.kind is RecordKind.ISOMETRIC else None for record in records]
     for purpose, levels in (
         ("further pressures and speeds of the measured muscles", [record.level for record in records]),
         ("other lengths of the same type", [None if x is None else ("resting length", float(x)) for x in lengths]),
@@ -74,27 +82,14 @@ def calibrate(fit: Fit, points: Sequence[Recording], records: Sequence[CampaignR
             bands.append(_band(purpose, residuals, groups, least))
     if not bands:
         bands.append(_band("the rows of the fit", force_residuals(fit.model, points, force_limit(points)), 0))
-    return tuple(bands)
+    residuals, groups = _left_out_residuals(fit, points, isometric if None in isometric else (), share=1.0)
+    held = _band("further isometric runs", residuals, groups, bands[0].half_width) if groups else None
+    return tuple(bands), held
 
 
 def force_limit(points: Sequence[Recording]) -> float:
     """Limit [N] of the force of laws that give contraction or pressure."""
     return FORCE_MARGIN * max(float(np.nanmax(run["force"])) for run in points)
-
-
-def calibrate_held(
-    fit: Fit, points: Sequence[Recording], records: Sequence[CampaignRecord], band: ErrorBand
-) -> ErrorBand | None:
-    """The band for further isometric runs, from all of them left out at once; not narrower than `band`.
-
-    A ramp of the pressure at a held length has no friction, and another history of creep than a sweep of the length, so
-    that its residuals are of one sign. None where there is no isometric run, or the others do not determine the law.
-    """
-    labels = [("kind", 0) if record.kind is RecordKind.ISOMETRIC else None for record in records]
-    if None not in labels or ("kind", 0) not in labels:
-        return None
-    residuals, groups = _left_out_residuals(fit, points, labels, share=1.0)
-    return _band("further isometric runs", residuals, groups, band.half_width) if groups else None
 
 
 def _band(purpose: str, residuals: Array, groups: int, least: float = 0.0) -> ErrorBand:
@@ -199,31 +194,21 @@ def fit_static_stage(
         remedy = "record the force while the length changes slowly at constant pressure, at three pressures or more"
         return LeftOutStage(NAME, "no record is a slow run with force and length", remedy)
     cleaned = {record: rows for record in used if len(rows := freed_rows(record, friction, creep))}
-    used = list(cleaned)
+    used, parts = list(cleaned), dict[CampaignRecord, Recording]()
     try:
         points = tuple(thin(rows, max(FIT_ROWS // len(used), MIN_FIT_ROWS)) for rows in cleaned.values())
         comparison = compare(points, workers=executor or 1, progress=lambda _, fraction: progress(0.9 * fraction))
-        fit, parts = comparison.recommended.fit, _parts_at_levels(used, points, friction, creep)
-        bands = calibrate(fit, *parts)
-        held = calibrate_held(fit, *parts, bands[0])
+        for record, rows in zip(used, points, strict=True):  # static points are parts of one pressure each
+            levels = static_levels(record)
+            own = [rows] if len(levels) == 1 else [freed_rows(level, friction, creep) for level in levels]
+            parts |= {level: part for level, part in zip(levels, own, strict=True) if len(part)}
+        bands, held = calibrate(comparison.recommended.fit, list(parts.values()), list(parts))
     except AirmuscleError as error:
         return LeftOutStage(NAME, str(error.message), "measure at more levels of pressure and contraction")
     progress(1.0)
     odd = odd_specimen_notes(ranked_specimen_errors(comparison.recommended, [comparison], points))
     notes = (*check_data([record.recording for record in used]).notes, *odd)
     return StaticStage(comparison, points, bands, notes, held)
-
-
-def _parts_at_levels(
-    used: Sequence[CampaignRecord], points: Sequence[Recording], friction: Friction, creep: CreepElements
-) -> tuple[list[Recording], list[CampaignRecord]]:
-    """The rows of the fit and their records, those of static points one for each pressure with tension."""
-    parts: dict[CampaignRecord, Recording] = {}
-    for record, rows in zip(used, points, strict=True):
-        levels = static_levels(record)
-        own = [rows] if len(levels) == 1 else [freed_rows(level, friction, creep) for level in levels]
-        parts |= {level: part for level, part in zip(levels, own, strict=True) if len(part)}
-    return list(parts.values()), list(parts)
 
 
 def freed_rows(record: CampaignRecord, friction: Friction, creep: CreepElements) -> Recording:

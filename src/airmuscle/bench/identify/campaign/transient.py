@@ -32,14 +32,14 @@ NOISE_STEPS, NOISE_RANGE, DEAD_BAND = 4.0, 8.0, 4.0
 band of a motion, in standard deviations of the noise (chosen)."""
 
 
-def thin(recording: Recording, count: int) -> Recording:
-    """The recording reduced to at most `count` rows, evenly spaced by number."""
-    return recording if len(recording) <= count else recording.rows(thinned_rows(len(recording), count))
-
-
 def thinned_rows(size: int, count: int) -> Array:
     """The numbers of at most `count` rows of `size`, evenly spaced."""
     return np.unique(np.linspace(0, size - 1, min(count, size)).round().astype(int))
+
+
+def thin(recording: Recording, count: int) -> Recording:
+    """The recording reduced to at most `count` rows, evenly spaced by number."""
+    return recording if len(recording) <= count else recording.rows(thinned_rows(len(recording), count))
 
 
 def displacement(recording: Recording) -> Array:
@@ -111,34 +111,28 @@ MEDIAN_ROWS = 5
 
 @dataclasses.dataclass(frozen=True)
 class PressureStep:
-    """A step of the pressure: instant of its start [s], duration from 5 % to 95 % [s], and change [Pa]."""
+    """A step of the pressure: instant of its start [s], duration from 5 % to 95 % [s], change, and value at its end
+    [Pa]."""
 
     start: float
     duration: float
     change: float
     final_pressure: float
-    """Gauge pressure at the end of the step [Pa]."""
 
 
 @dataclasses.dataclass(frozen=True)
 class Motion:
-    """The motion of a record: start and end [s] between 2 % and 95 % of its net travel [m]."""
+    """The motion of a record: start and end [s] between 2 % and 95 % of its net travel [m], range of its path [m]."""
 
     start: float
     end: float
     travel: float
     range: float
-    """Range of the displacement in the record [m]."""
 
     @property
     def duration(self) -> float:
         """Duration [s]."""
         return self.end - self.start
-
-    @property
-    def is_single(self) -> bool:
-        """Whether the muscle was moved once, and not back."""
-        return abs(self.travel) > 0.5 * self.range
 
 
 def find_pressure_steps(recording: Recording, sensors: Mapping[str, Sensor]) -> tuple[PressureStep, ...]:
