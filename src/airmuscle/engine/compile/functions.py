@@ -133,13 +133,13 @@ class Printer:
         named: dict[str, tuple[str, int]] = {}
         if self.quantities and set(map(self._argument, self.quantities[0])) <= set(inputs):
             trial = copy.copy(block)  # it prints the quantities, too: those that have values already have their names
-            trial.lines, trial._known, trial.read, trial.loaded = [], dict(block._known), set(), {}
+            trial.lines, trial.known, trial.read, trial.loaded = [], dict(block.known), set(), {}
             code, held, items = self._quantity_code
             values = emission.Emission(trial, list(self.quantities[0]), held, {})
             values.run(items)
-            known = set(block._known.values())
+            computed = set(block.known.values())
             results = ((values.value_of(operand), index) for _, index, operand in code.outputs)
-            named = {value: ("o", index) for value, index in results if value in known}
+            named = {value: ("o", index) for value, index in results if value in computed}
         of_c = [labels[PARAMETERS][parameters[v][1]] if v in parameters else NO_LABEL for v in self._places]
         block.name_values({**labels, "c": of_c}, named, {*inputs, *outputs})
 

@@ -5,15 +5,8 @@ from collections.abc import Mapping, Sequence
 from .ir.emission import FunctionBlock
 
 _NODES = {
-    "+": "Add",
-    "-": "Sub",
-    "*": "Mul",
-    "/": "Div",
-    "<": "Less",
-    "<=": "LessOrEqual",
-    ">": "Greater",
-    "==": "Equal",
-}
+    "+": "Add", "-": "Sub", "*": "Mul", "/": "Div", "<": "Less", "<=": "LessOrEqual", ">": "Greater", "==": "Equal",
+}  # fmt: skip
 
 
 class GraphBody(FunctionBlock):
@@ -36,10 +29,10 @@ class GraphBody(FunctionBlock):
     def node(self, operator: str, *inputs: str) -> str:
         """The output of a node, which is appended unless it exists already."""
         key = f"{operator}({', '.join(inputs)})"
-        if key not in self._known:
-            self._known[key] = self.new_name()
-            self.nodes.append((operator, inputs, self._known[key]))
-        return self._known[key]
+        if key not in self.known:
+            self.known[key] = self.new_name()
+            self.nodes.append((operator, inputs, self.known[key]))
+        return self.known[key]
 
     def constant(self, value: float) -> str:
         return self._constant(f"k{value!r}", value)
@@ -74,15 +67,24 @@ class GraphBody(FunctionBlock):
 
     def call(self, function: str, x: Sequence[str]) -> str:
         """A node, or several for a function that has none."""
-        composed = {"tan": self._tan, "log1p": self._log1p, "expm1": self._expm1, "sinh": self._sinh,
-                    "cosh": self._cosh, "asinh": self._asinh}  # fmt: skip
-        return composed[function](x[0]) if function in composed else self.node(function.capitalize(), *x)
-
-    def _tan(self, x: str) -> str:
-        return self.node("Div", self.node("Sin", x), self.node("Cos", x))
-
-    def _cosh(self, x: str) -> str:
-        return self._half(self.node("Exp", x), self.node("Exp", self.node("Neg", x)))
+        node, number = self.node, x[0]
+        match function:
+            case "tan":
+                return node("Div", node("Sin", number), node("Cos", number))
+            case "cosh":
+                return self._half(node("Exp", number), node("Exp", node("Neg", number)))
+            case "sinh":
+                less = self._expm1(number)
+                return self._half(less, node("Div", less, node("Add", less, self.constant(1.0))))
+            case "asinh":
+                one, size, square = self.constant(1.0), node("Abs", number), node("Mul", number, number)
+                root = node("Add", one, node("Sqrt", node("Add", one, square)))
+                return node("Mul", node("Sign", number), self._log1p(node("Add", size, node("Div", square, root))))
+            case "log1p":
+                return self._log1p(number)
+            case "expm1":
+                return self._expm1(number)
+        return node(function.capitalize(), *x)
 
     def _half(self, a: str, b: str) -> str:
         return self.node("Mul", self.constant(0.5), self.node("Add", a, b))
@@ -101,13 +103,3 @@ class GraphBody(FunctionBlock):
         less = node("Sub", u, one)
         small = node("Where", node("Equal", u, one), x, node("Div", node("Mul", less, x), node("Log", u)))
         return node("Where", node("Equal", less, self.constant(-1.0)), less, small)
-
-    def _sinh(self, x: str) -> str:
-        less = self._expm1(x)
-        return self._half(less, self.node("Div", less, self.node("Add", less, self.constant(1.0))))
-
-    def _asinh(self, x: str) -> str:
-        node, one, size = self.node, self.constant(1.0), self.node("Abs", x)
-        square = node("Mul", x, x)
-        root = node("Add", one, node("Sqrt", node("Add", one, square)))
-        return node("Mul", node("Sign", x), self._log1p(node("Add", size, node("Div", square, root))))

@@ -13,7 +13,7 @@ import numpy as np
 
 from ...core import ParameterError, abridged, cite, leaves, printable
 from ...core.tree import fingerprint
-from ...engine.compile.text.languages import CBody
+from ...engine.compile.text.languages import CLanguage
 
 LONGEST = 48
 """Characters of an identifier: with a prefix it stays within the 63 that C99 and MATLAB distinguish."""
@@ -91,12 +91,12 @@ def _word(name: str) -> str:
 
 _PROGRAM = "add_executable({0}_run main.c)\ntarget_link_libraries({0}_run PRIVATE {0})"
 _PLAIN = frozenset("abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ0123456789 _.,:;[](){}<>+-*/=^%!'|~#$@&")
-_BODIES = {number: CBody(number=number) for number in ("double", "float")}
+_LANGUAGES = {number: CLanguage(number) for number in ("double", "float")}
 
 
 def c_number(value: float, number: str = "double") -> str:
     """A double, which is read back bit by bit, or the nearest float."""
-    return _BODIES[number].constant(float(value)).strip("()")
+    return _LANGUAGES[number].constant(float(value)).strip("()")
 
 
 def c_string(text: str) -> str:

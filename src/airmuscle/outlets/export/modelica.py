@@ -1,13 +1,14 @@
 """Modelica package of a system: a block of equations."""
 
+import dataclasses
 import re
 import textwrap
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from ...engine.compile.ir.emission import FunctionBlock, computed
+from ...engine.compile.ir.emission import computed
 from ...engine.compile.ir.instructions import instructions
-from ...engine.compile.text.body import TextBody
+from ...engine.compile.text.body import TextBody, TextLanguage
 from ...engine.run import Problem
 from .exported_run import ExportedRun
 from .identifiers import block_comment, filled, make_identifiers, template
@@ -28,16 +29,37 @@ _EVENTS = ("abs", "floor")
 """Functions that would cause events."""
 
 
-class ModelicaBody(TextBody):
+@dataclasses.dataclass(frozen=True, eq=False)
+class Modelica(TextLanguage):
     """Equations, of which none causes an event; `variables` are the names of the elements of arrays."""
 
+    variables: Mapping[str, Sequence[str]]
+
     language = "Modelica"
-    margin, unequal = "    ", "<>"
+    margin, branches = "    ", False
     infinity, not_a_number = "1.7976931348623157e308", "(0.0 / 0.0)"
 
+    def element(self, array: str, index: int) -> str:
+        name = self.variables[array][index]
+        return f"der({name})" if array == "f" else name
+
+    def call(self, function: str, x: Sequence[str]) -> str:
+        if function == "pow":
+            whole = _WHOLE.fullmatch(x[1])
+            return f"{x[0]} ^ {whole[1]}" if whole else f"noEvent(if {x[0]} > 0.0 then {x[0]} ^ {x[1]} else 0.0)"
+        value = f"{function}({x[0]})"
+        if function in _OUTSIDE:
+            domain, outside = _OUTSIDE[function]
+            value = f"noEvent(if {domain.format(x[0])} then {value} else {outside})"
+        return f"noEvent({value})" if function in _EVENTS else value
+
+
+class ModelicaBody(TextBody):
+    """The equations of a block, with the names of their values."""
+
     def __init__(self, variables: Mapping[str, Sequence[str]]) -> None:
-        super().__init__()
-        self._variables, self.values = variables, list[str]()
+        super().__init__(Modelica(variables))
+        self.values: list[str] = []
         self._taken = {name.casefold() for names in variables.values() for name in names}
 
     def new_name(self) -> str:
@@ -46,15 +68,8 @@ class ModelicaBody(TextBody):
         self.values.append(name)
         return name
 
-    def remark(self, text: str) -> str:
-        return f"// {text}"
-
     def load(self, array: str, index: int) -> str:
-        return self._variables[array][index]
-
-    def element(self, array: str, index: int) -> str:
-        name = self._variables[array][index]
-        return f"der({name})" if array == "f" else name
+        return self.syntax.element(array, index)
 
     def choose(self, comparison: str, a: str, b: str, when_true: str, when_false: str) -> str:
         test = f"{a} {comparison} {b}"
@@ -62,19 +77,6 @@ class ModelicaBody(TextBody):
             test = f"{a} < {b} or {a} > {b}"
             when_true, when_false = (when_false, when_true) if comparison == "==" else (when_true, when_false)
         return self.put(f"noEvent(if {test} then {when_true} else {when_false})")
-
-    def call(self, function: str, x: Sequence[str]) -> str:
-        if function == "pow":
-            if whole := _WHOLE.fullmatch(x[1]):
-                return self.put(f"{x[0]} ^ {whole[1]}")
-            return self.put(f"noEvent(if {x[0]} > 0.0 then {x[0]} ^ {x[1]} else 0.0)")
-        value = f"{function}({x[0]})"
-        if function in _OUTSIDE:
-            domain, outside = _OUTSIDE[function]
-            value = f"noEvent(if {domain.format(x[0])} then {value} else {outside})"
-        return self.put(f"noEvent({value})" if function in _EVENTS else value)
-
-    unless_zero = FunctionBlock.unless_zero  # equations have no branches
 
 
 def write_modelica(

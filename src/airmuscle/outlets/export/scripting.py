@@ -11,7 +11,7 @@ import numpy as np
 from ...core import printable
 from ...engine.compile.kernel_text import JavaScriptKernels, MatlabKernels
 from ...engine.compile.kernel_text.printer import KernelPrinter
-from ...engine.compile.text.languages import DEFINITION, JavaScriptLanguage, MatlabBody, MatlabLanguage
+from ...engine.compile.text.languages import DEFINITION, JavaScriptLanguage, MatlabLanguage
 from ...engine.run import Integrator
 from .c_source import csv_header
 from .exported_run import BETWEEN, SHAPES, STEP, TABLEAU, ExportedRun, SolverText
@@ -92,7 +92,7 @@ def to_json(value: Any) -> str:
     return json.dumps(value)
 
 
-_BODY = MatlabBody()
+_LANGUAGE = MatlabLanguage()
 _IN_LINE = 6
 """Numbers in a line."""
 
@@ -145,7 +145,7 @@ def _fields(name: str, value: Any) -> str:
 
 def m_number(value: float) -> str:
     """A number as MATLAB text; it is read back bit by bit."""
-    return _BODY.constant(float(value)).strip("()")
+    return _LANGUAGE.constant(float(value)).strip("()")
 
 
 def m_array(values: Any) -> str:

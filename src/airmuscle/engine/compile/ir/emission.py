@@ -46,14 +46,15 @@ class FunctionBlock(abc.ABC):
         self.lines: list[str] = []
         self.scalars = frozenset(scalars)
         self.needed: dict[str, int] = {}
-        self._known: dict[str, str] = {}
+        self.known: dict[str, str] = {}
+        """The names of values by their expressions."""
         self._named = 0
 
     def put(self, expression: str) -> str:
         """The name of the value of `expression`; the instruction is appended unless it exists already."""
-        name = self._known.get(expression)
+        name = self.known.get(expression)
         if name is None:
-            name = self._known[expression] = self.new_name()
+            name = self.known[expression] = self.new_name()
             self.lines.append(self.assignment(name, expression))
         return name
 
@@ -157,11 +158,11 @@ class TargetLanguage(abc.ABC):
     def body(self, scalars: Sequence[str] = ()) -> FunctionBlock:
         """An empty function of which some arguments are numbers, the others arrays."""
 
-    @abc.abstractmethod
-    def function(self, name: str, inputs: Sequence[str], outputs: Sequence[str], body: FunctionBlock) -> str:
-        """The text of a function of arrays and numbers that computes the arrays `outputs`."""
+    def function(self, name: str, inputs: Sequence[str], outputs: Sequence[str], body: Any) -> str:
+        """The text of a function of arrays and numbers that computes `outputs`; in a language without, its lines."""
+        return "\n".join(body.lines)
 
-    def preparation(self, name: str, inputs: Sequence[str], outputs: Sequence[str], body: FunctionBlock) -> str:
+    def preparation(self, name: str, inputs: Sequence[str], outputs: Sequence[str], body: Any) -> str:
         """The text of a function that is called once for a set of parameters."""
         return self.function(name, inputs, outputs, body)
 

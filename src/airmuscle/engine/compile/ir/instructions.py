@@ -14,57 +14,17 @@ ZERO: Operand = ("c", 0.0)
 ONE: Operand = ("c", 1.0)
 
 
-class Operation(enum.IntEnum):
-    """Operations of an instruction list; all but the last three have the meaning that CasADi gives them.
+Operation = enum.IntEnum(
+    "Operation",
+    "ASSIGN ADD SUBTRACT MULTIPLY DIVIDE NEGATE SQUARE TWICE INVERSE SQRT ABS SIGN FLOOR POWER CONSTANT_POWER EXP LOG "
+    "LOG1P EXPM1 SIN COS TAN ASIN ACOS ATAN SINH COSH TANH ASINH FMIN FMAX LESS LESS_EQUAL EQUAL NOT_EQUAL NOT AND OR "
+    "MASK SELECT MAXIMUM MINIMUM",
+)
+"""Operations of an instruction list; all but the last three have the meaning that CasADi gives them.
 
-    MASK(condition, x) is x where the condition is not zero, else 0. SELECT(condition, a, b) is a where the condition
-    is not zero, else b. MAXIMUM and MINIMUM select one of two numbers, as one machine instruction does.
-    """
-
-    ASSIGN = enum.auto()
-    ADD = enum.auto()
-    SUBTRACT = enum.auto()
-    MULTIPLY = enum.auto()
-    DIVIDE = enum.auto()
-    NEGATE = enum.auto()
-    SQUARE = enum.auto()
-    TWICE = enum.auto()
-    INVERSE = enum.auto()
-    SQRT = enum.auto()
-    ABS = enum.auto()
-    SIGN = enum.auto()
-    FLOOR = enum.auto()
-    POWER = enum.auto()
-    CONSTANT_POWER = enum.auto()
-    EXP = enum.auto()
-    LOG = enum.auto()
-    LOG1P = enum.auto()
-    EXPM1 = enum.auto()
-    SIN = enum.auto()
-    COS = enum.auto()
-    TAN = enum.auto()
-    ASIN = enum.auto()
-    ACOS = enum.auto()
-    ATAN = enum.auto()
-    SINH = enum.auto()
-    COSH = enum.auto()
-    TANH = enum.auto()
-    ASINH = enum.auto()
-    FMIN = enum.auto()
-    FMAX = enum.auto()
-    LESS = enum.auto()
-    LESS_EQUAL = enum.auto()
-    EQUAL = enum.auto()
-    NOT_EQUAL = enum.auto()
-    NOT = enum.auto()
-    AND = enum.auto()
-    OR = enum.auto()
-    MASK = enum.auto()
-    SELECT = enum.auto()
-    MAXIMUM = enum.auto()
-    MINIMUM = enum.auto()
-
-
+MASK(condition, x) is x where the condition is not zero, else 0. SELECT(condition, a, b) is a where the condition is not
+zero, else b. MAXIMUM and MINIMUM select one of two numbers, as one machine instruction does.
+"""
 _CASADI_NAMES = {
     Operation.SUBTRACT: "SUB", Operation.MULTIPLY: "MUL", Operation.DIVIDE: "DIV", Operation.NEGATE: "NEG",
     Operation.SQUARE: "SQ", Operation.INVERSE: "INV", Operation.ABS: "FABS", Operation.POWER: "POW",

@@ -71,11 +71,8 @@ class BraceKernels(KernelPrinter):
         return f"{self.prefix}{name}({self.joined(given)});"
 
     def loop(self, variable: str, first: str, limit: ast.expr) -> str:
-        bound = self.expression(limit, 5)
-        return f"for ({self.counter} {variable} = {first}; {variable} < {bound}; {variable}++) {{"
-
-    def branch(self, word: str, test: str) -> str:
-        return f"{word} ({test}) {{"
+        test = f"{variable} < {self.expression(limit, 5)}"
+        return f"for ({self.counter} {variable} = {first}; {test}; {variable}++) {{"
 
 
 def _mentions(name: str, node: ast.AST) -> bool:
@@ -105,8 +102,8 @@ class CKernels(BraceKernels):
 
     reserved = frozenset(_C_KEYWORDS.split())
     spelling: dict[type, str] = {}  # noqa: RUF012
-
-    counter = "int"
+    remark, counter = "/* {} */", "int"
+    infinity, flags = "HUGE_VAL", ("0", "1")
 
     def __init__(self, shapes: Mapping[str, Sequence[str]], prefix: str = "", number: str = "double") -> None:
         self.shapes, self.prefix, self.type = shapes, prefix, number
@@ -121,9 +118,6 @@ class CKernels(BraceKernels):
 
     def comment(self, lines: Sequence[str]) -> list[str]:
         return ["/* " + "\n   ".join(lines).rstrip().replace("\n   \n", "\n\n") + " */"] if lines else []
-
-    def remark(self, text: str) -> str:
-        return f"/* {text} */"
 
     def head(self) -> list[str]:
         kernel, returned = self.kernel, self.kernel.returns
@@ -151,10 +145,7 @@ class CKernels(BraceKernels):
         return f"{names[i]}_out" if names else f"result_{i}"
 
     def number(self, value: float) -> str:
-        return "HUGE_VAL" if math.isinf(value) else f"{value!r}{self.suffix}"
-
-    def flag(self, value: bool) -> str:
-        return "1" if value else "0"
+        return self.infinity if math.isinf(value) else f"{value!r}{self.suffix}"
 
     def size(self, array: str, dimension: int) -> str:
         try:
@@ -201,9 +192,7 @@ class JavaScriptKernels(BraceKernels):
 
     reserved = frozenset(_JAVASCRIPT_KEYWORDS.split())
     spelling: dict[type, str] = {ast.Eq: "===", ast.NotEq: "!=="}  # noqa: RUF012
-
-    counter = "let"
-    joins_results = True
+    infinity, counter, joins_results = "Infinity", "let", True
 
     def declaration(self, name: str, constant: bool) -> str:
         return "const " if constant else "let "
@@ -216,15 +205,9 @@ class JavaScriptKernels(BraceKernels):
             return [f"/** {line} */" for line in lines]
         return ["/**", *(f" * {line}".rstrip() for line in lines), " */"]
 
-    def remark(self, text: str) -> str:
-        return f"// {text}"
-
     def head(self) -> list[str]:
         early = [f"  let {', '.join(map(self.name, self.early))};"] if self.early else []
         return [f"function {self.source.name}({', '.join(map(self.name, self.kernel.arguments))}) {{", *early]
-
-    def number(self, value: float) -> str:
-        return "Infinity" if math.isinf(value) else repr(value).removesuffix(".0")
 
     def size(self, array: str, dimension: int) -> str:
         return f"{self.name(array)}{'[0]' * dimension}.length"

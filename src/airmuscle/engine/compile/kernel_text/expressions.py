@@ -28,10 +28,8 @@ class ExpressionPrinter(abc.ABC):
     """Words that cannot be names; a name that is one of them is followed by an underscore."""
     spelling: dict[type, str]
     """Operators that the language writes otherwise."""
-
-    @abc.abstractmethod
-    def number(self, value: float) -> str:
-        """A finite number or infinity that is not negative."""
+    infinity: str
+    flags = "false", "true"
 
     @abc.abstractmethod
     def element(self, array: ast.Name, at: Sequence[ast.expr]) -> str:
@@ -61,7 +59,7 @@ class ExpressionPrinter(abc.ABC):
     def _expression(self, node: ast.expr) -> tuple[str, int]:
         match node:
             case ast.Constant(value=bool(value)):
-                return self.flag(value), ATOM
+                return self.flags[value], ATOM
             case ast.Constant(value=int(value)):
                 return str(value), ATOM
             case ast.Constant(value=float(value)):
@@ -88,9 +86,9 @@ class ExpressionPrinter(abc.ABC):
                 return self._call(node), ATOM
         raise self.source.unprintable(node, f"the expression {type(node).__name__}")
 
-    def flag(self, value: bool) -> str:
-        """True or false."""
-        return "true" if value else "false"
+    def number(self, value: float) -> str:
+        """A finite number or infinity that is not negative."""
+        return self.infinity if math.isinf(value) else repr(value).removesuffix(".0")
 
     def _named(self, node: ast.Name) -> str:
         name = node.id

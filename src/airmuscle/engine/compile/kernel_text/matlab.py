@@ -1,7 +1,6 @@
 """MATLAB text of kernels, which GNU Octave runs as well: functions that return the arrays that they change."""
 
 import ast
-import math
 from collections.abc import Mapping, Sequence
 
 from .printer import KernelPrinter, used_constants
@@ -21,7 +20,8 @@ class MatlabKernels(KernelPrinter):
 
     reserved = frozenset(_KEYWORDS.split())
     spelling: dict[type, str] = {ast.NotEq: "~=", ast.Not: "~"}  # noqa: RUF012
-    close, otherwise, continuation = "end", "else", " ..."
+    branch, otherwise, close = "{} {}", "else", "end"
+    remark, end, continuation, infinity = "% {}", "", " ...", "Inf"
 
     def __init__(self, shapes: Mapping[str, Sequence[str]] | None = None) -> None:
         self.shapes = shapes or {}
@@ -38,9 +38,6 @@ class MatlabKernels(KernelPrinter):
     def comment(self, lines: Sequence[str]) -> list[str]:
         return [f"% {line}".rstrip() for line in lines]
 
-    def remark(self, text: str) -> str:
-        return f"% {text}"
-
     def head(self) -> list[str]:
         results = self._results(self.kernel)
         names = results[0] if len(results) == 1 else f"[{', '.join(results)}]"
@@ -52,9 +49,6 @@ class MatlabKernels(KernelPrinter):
         """Names of the results of a function, and of the arrays that it changes."""
         names = kernel.returned_names or [f"result_{i}" for i in range(len(kernel.returns))]
         return [self.name(name) for name in (*names, *kernel.changed)]
-
-    def number(self, value: float) -> str:
-        return "Inf" if math.isinf(value) else repr(value).removesuffix(".0")
 
     def element(self, array: ast.Name, at: Sequence[ast.expr]) -> str:
         rank = self.kernel.kinds[array.id].rank
@@ -172,11 +166,5 @@ class MatlabKernels(KernelPrinter):
         lines = [f"{name} = {self.expression(value)};" for name, value in zip(names, values, strict=False)]
         return lines if last else [*lines, "return"]
 
-    def word(self, word: str) -> str:
-        return word
-
     def loop(self, variable: str, first: str, limit: ast.expr) -> str:
         return f"for {variable} = {first}:{self._place(limit, -1)}"
-
-    def branch(self, word: str, test: str) -> str:
-        return f"{word} {test}"

@@ -19,11 +19,14 @@ class KernelPrinter(ExpressionPrinter):
     The functions that a printed function calls are printed before it.
     """
 
-    close = "}"
+    branch, otherwise, close = "{} ({}) {{", "} else {", "}"
+    """Begin, middle and end of a branch, if or while."""
+    remark = "// {}"
+    """A comment at the end of a line."""
+    end, continuation = ";", ""
+    """What ends a statement of one word, and a line that goes on in the next."""
     prefix = ""
     """Beginning of the names of the functions of the system that kernels call."""
-    continuation = ""
-    """What ends a line that goes on in the next."""
 
     def text(self, module: str, names: Sequence[str]) -> str:
         """The functions of a module of `compile/kernels/` with these names, and the constants that they use.
@@ -101,10 +104,6 @@ class KernelPrinter(ExpressionPrinter):
         """The comment before a function."""
 
     @abc.abstractmethod
-    def remark(self, text: str) -> str:
-        """A comment at the end of a line."""
-
-    @abc.abstractmethod
     def head(self) -> list[str]:
         """The first lines of a function."""
 
@@ -125,12 +124,6 @@ class KernelPrinter(ExpressionPrinter):
         """The line that begins a loop from `first` to before `limit`."""
 
     @abc.abstractmethod
-    def branch(self, word: str, test: str) -> str:
-        """The line that begins a branch, `word` is if or while."""
-
-    otherwise = "} else {"
-
-    @abc.abstractmethod
     def begin(self) -> None:
         """Prepare for the function `self.kernel`."""
 
@@ -145,7 +138,7 @@ class KernelPrinter(ExpressionPrinter):
                 continue
             lines += [part for line in self.statement(node) for part in self._wrapped(line)]
             if remark := self.source.comments.get(node.end_lineno or 0):
-                lines[-1] += f"  {self.remark(remark)}"
+                lines[-1] += f"  {self.remark.format(remark)}"
         return lines
 
     def statement(self, node: ast.stmt) -> list[str]:
@@ -154,9 +147,7 @@ class KernelPrinter(ExpressionPrinter):
             case ast.Assign(targets=[ast.Tuple(elts=elements)], value=ast.Call() as call):
                 return self.call_lines(call, elements, node)
             case ast.Assign(targets=[_]):
-                return [
-                    line for target, value in self._checked_pairs(node) for line in self._assigned(target, value, node)
-                ]
+                return [line for pair in self._checked_pairs(node) for line in self._assigned(*pair, node)]
             case ast.AugAssign(target=target, op=operator, value=value):
                 loaded = ast.parse(ast.unparse(target), mode="eval").body
                 return self.assign(target, ast.copy_location(ast.BinOp(loaded, operator, value), node), node)
@@ -170,10 +161,8 @@ class KernelPrinter(ExpressionPrinter):
                 return self.finish(values, last)
             case ast.If() | ast.While(orelse=[]) | ast.For(orelse=[]):
                 return self.compound(node)
-            case ast.Break():
-                return [self.word("break")]
-            case ast.Continue():
-                return [self.word("continue")]
+            case ast.Break() | ast.Continue():
+                return [f"{ast.unparse(node)}{self.end}"]
         raise self.source.unprintable(node, f"the statement {type(node).__name__}")
 
     def call_lines(self, call: ast.Call, targets: Sequence[ast.expr], node: ast.stmt) -> list[str]:
@@ -185,10 +174,6 @@ class KernelPrinter(ExpressionPrinter):
             raise self.source.unprintable(call, "a result of another type than its variable")
         given = {name: self.expression(value) for name, value in called.given(call).items()}
         return [self.called_with(called, given, list(map(self.expression, targets)))]
-
-    def word(self, word: str) -> str:
-        """A statement of one word."""
-        return f"{word};"
 
     def _checked_pairs(self, node: ast.Assign) -> Iterator[tuple[ast.expr, ast.expr]]:
         """Targets and values, which must not read a target before them."""
@@ -209,7 +194,7 @@ class KernelPrinter(ExpressionPrinter):
         if isinstance(node, ast.For):
             lines = [self._for(node)]
         else:
-            lines = [self.branch("if" if isinstance(node, ast.If) else "while", self.expression(node.test))]
+            lines = [self.branch.format("if" if isinstance(node, ast.If) else "while", self.expression(node.test))]
         lines += indented(self.block(node.body))
         if node.orelse:
             lines += [self.otherwise, *indented(self.block(node.orelse))]

@@ -1,6 +1,7 @@
 """Source of kernels: functions and constants of a module of `compile/kernels/` as syntax trees."""
 
 import ast
+import contextlib
 import dataclasses
 import functools
 import inspect
@@ -87,9 +88,9 @@ def plain_kernels(module: str) -> Mapping[str, Callable[..., Any]]:
     """The functions of a module of `compile/kernels/` in plain Python, by name: for few numbers, without numba.
 
     A table is a sequence of rows, which may be mappings from the column."""
-    path = resources.files(_PACKAGE).joinpath(f"{module}.py")
-    tree = _Plain().visit(ast.parse(path.read_text(encoding="utf-8")))
-    defined = read_kernels(module)
+    path, defined = resources.files(_PACKAGE).joinpath(f"{module}.py"), read_kernels(module)
+    nodes = ast.parse(path.read_text(encoding="utf-8")).body
+    tree = ast.Module([_Plain().visit(node) for node in nodes if isinstance(node, ast.FunctionDef)], [])
     names: dict[str, Any] = {"np": math, "sqrt": math.sqrt}
     for source in defined.values():
         names |= source.constants
@@ -102,10 +103,6 @@ def plain_kernels(module: str) -> Mapping[str, Callable[..., Any]]:
 
 class _Plain(ast.NodeTransformer):
     """Functions without decorators, constants known already, and elements of rows of tables."""
-
-    def visit_Module(self, node: ast.Module) -> ast.AST:
-        node.body = [self.visit(each) for each in node.body if isinstance(each, ast.FunctionDef)]
-        return node
 
     def visit_FunctionDef(self, node: ast.FunctionDef) -> ast.AST:
         node.decorator_list = []
@@ -121,22 +118,10 @@ class _Plain(ast.NodeTransformer):
 
 
 def _constants(nodes: list[ast.stmt]) -> dict[str, float]:
-    """The values of the constants of a module."""
-    known = {"np": np, "Status": Status, **vars(kernel_layout)}
-    values = {}
+    """The values of the constants of a module, except those of values that another module computes."""
+    values: dict[str, Any] = {"np": np, "Status": Status, **vars(kernel_layout)}
     for node in nodes:
-        if isinstance(node, ast.Assign) and all(
-            isinstance(n, ast.Name) and n.id.isupper() for n in _flat(node.targets)
-        ):
-            if not {n.id for n in ast.walk(node.value) if isinstance(n, ast.Name)} <= {*known, "int"}:
-                continue  # a value that another module computes
-            value = eval(compile(ast.Expression(node.value), "constant", "eval"), known)
-            names = _flat(node.targets)
-            for name, each in zip(names, [value] if len(names) == 1 else value, strict=True):
-                if isinstance(each, int | float) and isinstance(name, ast.Name):
-                    values[name.id] = each
-    return values
-
-
-def _flat(targets: list[ast.expr]) -> list[ast.expr]:
-    return targets[0].elts if isinstance(targets[0], ast.Tuple) else targets
+        if isinstance(node, ast.Assign):
+            with contextlib.suppress(NameError):
+                exec(compile(ast.Module([node], []), "constants", "exec"), values)
+    return {name: value for name, value in values.items() if name.isupper() and isinstance(value, int | float)}

@@ -74,13 +74,9 @@ def invoked(call: ast.expr) -> tuple[str, list[ast.expr], int] | None:
     """The function of a system that `invoke` calls, its arguments, and how many of them, the last ones, it writes."""
     match call:
         case ast.Call(func=ast.Name(id="invoke"), args=[ast.Name(id=name), ast.Tuple(elts=given)]):
-            arrays = [each.args[0] if _is_pointer(each) else each for each in given]  # type: ignore[attr-defined]
+            arrays = [each.args[0] if isinstance(each, ast.Call) else each for each in given]
             return name, arrays, 2 if name == "jac" else 1
     return None
-
-
-def _is_pointer(node: ast.expr) -> bool:
-    return isinstance(node, ast.Call) and ast.unparse(node.func) == "pointer"
 
 
 def typed(source: KernelSource, calls: Mapping[str, TypedKernel]) -> TypedKernel:

@@ -194,14 +194,14 @@ class FunctionBody(FunctionBlock):
             bits = self.put(f"bitcast {number.mask} {test} to i{number.lanes}")
             any_lane = self.put(f"icmp ne i{number.lanes} {bits}, 0")
         self.lines += [f"  br i1 {any_lane}, label %{here}.then, label %{here}.end", f"{here}.then:"]
-        outside, self._known = self._known, dict(self._known)  # values of the block are not available after it
+        outside, self.known = self.known, dict(self.known)  # values of the block are not available after it
         inside = compute()
         if number.lanes > 1:
             for operand, value in instead.items():
                 inside[operand] = self.put(
                     f"select {number.mask} {test}, {number.text} {inside[operand]}, {number.text} {value}"
                 )
-        self._known = outside
+        self.known = outside
         self.lines += [f"  br label %{here}.end", f"{here}.end:"]
         joined = {}
         for operand, value in instead.items():

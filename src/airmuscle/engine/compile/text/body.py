@@ -5,7 +5,7 @@ import dataclasses
 import math
 import re
 from collections.abc import Callable, Collection, Mapping, Sequence
-from typing import ClassVar, NamedTuple
+from typing import NamedTuple
 
 from ..ir.emission import FunctionBlock, TargetLanguage
 from ..ir.instructions import Operand
@@ -26,31 +26,72 @@ Labels = Mapping[str, Sequence[Label]]
 """The labels of the elements of arrays, by the name of the array."""
 
 
-class TextBody(FunctionBlock, abc.ABC):
-    """The lines of one function in a language with infix operators; a subclass states what its language writes.
+@dataclasses.dataclass(frozen=True)
+class TextLanguage(TargetLanguage):
+    """A language with infix operators; a subclass states what it writes."""
+
+    labels: Labels = dataclasses.field(default_factory=dict, hash=False, kw_only=True)
+
+    language = ""
+    """Name in messages."""
+    equal, unequal, either = "==", "!=", "||"
+    margin, end = "  ", ";"
+    """What stands before and after every statement."""
+    infinity, not_a_number = "INFINITY", "NAN"
+    remark = "// {}"
+    """A comment at the end of a line."""
+    begin_branch, end_branch = "  if ({}) {{", "  }"
+    branches = True
+    """Whether functions have branches."""
+
+    def body(self, scalars: Sequence[str] = ()) -> "TextBody":
+        return TextBody(self, scalars)
+
+    def literal(self, value: float) -> str:
+        """A number that is not negative; it is read back as the same number."""
+        return self.infinity if math.isinf(value) else repr(value)
+
+    def constant(self, value: float) -> str:
+        """A number."""
+        if math.isnan(value):
+            return self.not_a_number
+        text = self.literal(abs(value))
+        return f"(-{text})" if math.copysign(1.0, value) < 0 else text
+
+    def defines(self) -> tuple[str, str]:
+        """What stands before the name of a value at its definition, and of one that a branch may change."""
+        return "", ""
+
+    def element(self, array: str, index: int) -> str:
+        """An array element as an expression."""
+        return f"{array}[{index}]"
+
+    @abc.abstractmethod
+    def call(self, function: str, x: Sequence[str]) -> str:
+        """A function, by its name in C, as an expression."""
+
+    def conditional(self, body: "TextBody", test: str, when_true: str, when_false: str) -> str:
+        """The name of one of two values, by a test."""
+        return body.put(f"({test}) ? {when_true} : {when_false}")
+
+
+class TextBody(FunctionBlock):
+    """The lines of one function in a language `syntax`.
 
     `read` and `written` are the arrays that the function uses so far, `loaded` and `stored` the places of their values
     by name, `sizes` the lengths of the arrays that are written.
     """
 
-    equal, unequal, either = "==", "!=", "||"
-    margin, end = "  ", ";"
-    """What stands before and after every statement."""
-    defines, declares = "", ""
-    """What stands before the name of a value at its definition, and of one that a branch may change."""
-    infinity, not_a_number = "INFINITY", "NAN"
-
-    def __init__(self, scalars: Sequence[str] = ()) -> None:
+    def __init__(self, syntax: TextLanguage, scalars: Sequence[str] = ()) -> None:
         super().__init__(scalars)
-        self.read: set[str] = set()
-        self.written: set[str] = set()
-        self.loaded: dict[str, tuple[str, int]] = {}
-        self.stored: dict[str, tuple[str, int]] = {}
+        self.syntax, self.language = syntax, syntax.language
+        self.read, self.written = set[str](), set[str]()
+        self.loaded, self.stored = dict[str, tuple[str, int]](), dict[str, tuple[str, int]]()
         self.sizes: dict[str, int] = {}
+        self._defines, self._declares = syntax.defines()
 
-    def element(self, array: str, index: int) -> str:
-        """An array element as an expression."""
-        return f"{array}[{index}]"
+    def constant(self, value: float) -> str:
+        return self.syntax.constant(value)
 
     def arithmetic(self, operator: str, a: str, b: str) -> str:
         return self.put(f"{a} {operator} {b}")
@@ -58,39 +99,18 @@ class TextBody(FunctionBlock, abc.ABC):
     def negative(self, a: str) -> str:
         return self.put(f"-{a}")
 
+    def call(self, function: str, x: Sequence[str]) -> str:
+        return self.put(self.syntax.call(function, x))
+
     def choose(self, comparison: str, a: str, b: str, when_true: str, when_false: str) -> str:
-        relation = {"==": self.equal, "!=": self.unequal}.get(comparison, comparison)
-        return self.conditional(f"{a} {relation} {b}", when_true, when_false)
-
-    def conditional(self, test: str, when_true: str, when_false: str) -> str:
-        """The name of one of two values, by a test."""
-        return self.put(f"({test}) ? {when_true} : {when_false}")
-
-    @abc.abstractmethod
-    def remark(self, text: str) -> str:
-        """A comment at the end of a line."""
-
-    def begin_branch(self, test: str) -> str:
-        """The line that opens a branch."""
-        return f"  if ({test}) {{"
-
-    end_branch = "  }"
-
-    def literal(self, value: float) -> str:
-        """A finite number; it is read back as the same number."""
-        return repr(value)
-
-    def constant(self, value: float) -> str:
-        if math.isnan(value):
-            return self.not_a_number
-        text = self.infinity if math.isinf(value) else self.literal(abs(value))
-        return f"(-{text})" if math.copysign(1.0, value) < 0 else text
+        relation = {"==": self.syntax.equal, "!=": self.syntax.unequal}.get(comparison, comparison)
+        return self.syntax.conditional(self, f"{a} {relation} {b}", when_true, when_false)
 
     def load(self, array: str, index: int) -> str:
         self.read.add(array)
         if array in self.scalars:
             return array
-        value = self.put(self.element(array, index))
+        value = self.put(self.syntax.element(array, index))
         self.loaded[value] = array, index
         return value
 
@@ -98,14 +118,13 @@ class TextBody(FunctionBlock, abc.ABC):
         self.written.add(array)
         self.sizes[array] = max(self.sizes.get(array, 0), index + 1)
         self.stored.setdefault(value, (array, index))
-        self.lines.append(self.assigned(self.element(array, index), value))
+        self.lines.append(self._assigned(self.syntax.element(array, index), value))
 
     def assignment(self, name: str, expression: str) -> str:
-        return self.assigned(f"{self.defines}{name}", expression)
+        return self._assigned(f"{self._defines}{name}", expression)
 
-    def assigned(self, variable: str, value: str) -> str:
-        """The line that assigns a value to a variable or an element."""
-        return f"{self.margin}{variable} = {value}{self.end}"
+    def _assigned(self, variable: str, value: str) -> str:
+        return f"{self.syntax.margin}{variable} = {value}{self.syntax.end}"
 
     def name_values(self, labels: Labels, named: Mapping[str, tuple[str, int]], taken: Collection[str]) -> None:
         """Give the values that stand in arrays with labels the names of these, unless a name is taken.
@@ -120,36 +139,25 @@ class TextBody(FunctionBlock, abc.ABC):
             if label and _NUMBERED.fullmatch(value) and label.name not in used and not _NUMBERED.fullmatch(label.name):
                 names[value] = label
                 used.add(label.name)
-        self.lines = [self._with_names(line, names) for line in self.lines]
-
-    def _with_names(self, line: str, names: Mapping[str, Label]) -> str:
-        found = _DEFINED.match(line)
-        remark = names[found[1]].remark if found and found[1] in names else ""
-        text = _NUMBERED.sub(lambda value: names[value[0]].name if value[0] in names else value[0], line)
-        return f"{text}  {self.remark(remark)}" if remark else text
+        for number, line in enumerate(self.lines):
+            found = _DEFINED.match(line)
+            remark = names[found[1]].remark if found and found[1] in names else ""
+            text = _NUMBERED.sub(lambda value: names[value[0]].name if value[0] in names else value[0], line)
+            self.lines[number] = f"{text}  {self.syntax.remark.format(remark)}" if remark else text
 
     def unless_zero(
         self, gates: Sequence[str], compute: Callable[[], dict[Operand, str]], instead: Mapping[Operand, str]
     ) -> dict[Operand, str]:
-        joined = {operand: self.new_name() for operand in instead}
-        self.lines += [self.assigned(f"{self.declares}{joined[operand]}", value) for operand, value in instead.items()]
-        tests = f" {self.either} ".join(f"{gate} {self.unequal} {self.constant(0.0)}" for gate in gates)
-        self.lines.append(self.begin_branch(tests))
-        outside, self._known = self._known, dict(self._known)  # values of the block are not available after it
+        if not self.syntax.branches:
+            return super().unless_zero(gates, compute, instead)
+        syntax, joined = self.syntax, {operand: self.new_name() for operand in instead}
+        self.lines += [self._assigned(f"{self._declares}{joined[o]}", value) for o, value in instead.items()]
+        tests = f" {syntax.either} ".join(f"{gate} {syntax.unequal} {self.constant(0.0)}" for gate in gates)
+        self.lines.append(syntax.begin_branch.format(tests))
+        outside, self.known = self.known, dict(self.known)  # values of the block are not available after it
         begin, inside = len(self.lines), compute()
-        self._known = outside
-        self.lines += [self.assigned(name, inside[operand]) for operand, name in joined.items()]
+        self.known = outside
+        self.lines += [self._assigned(name, inside[operand]) for operand, name in joined.items()]
         self.lines[begin:] = [f"  {line}" for line in self.lines[begin:]]
-        self.lines += [self.end_branch] if self.end_branch else []
+        self.lines += [syntax.end_branch] if syntax.end_branch else []
         return joined
-
-
-@dataclasses.dataclass(frozen=True)
-class TextLanguage(TargetLanguage):
-    """A language of expressions, whose functions have bodies of one class."""
-
-    body_type: ClassVar[Callable[[Sequence[str]], TextBody]]
-    labels: Labels = dataclasses.field(default_factory=dict, hash=False, kw_only=True)
-
-    def body(self, scalars: Sequence[str] = ()) -> TextBody:
-        return type(self).body_type(scalars)
