@@ -10,10 +10,9 @@ from chapter_words import visible_words
 
 from airmuscle.bench import fit
 from airmuscle.engine import ZERO_INPUT, DormandPrince8, RungeKutta4, SampledSignal, simulate
-from airmuscle.papers import hosovsky, hosovsky_fill_claims
+from airmuscle.papers import hosovsky, hosovsky_fill
 from airmuscle.papers import hosovsky_effects as causing
-from airmuscle.papers import hosovsky_fill_and_release as stages
-from airmuscle.papers import hosovsky_joint as joining
+from airmuscle.papers import hosovsky_quick_release as releasing
 from airmuscle.papers.hosovsky_plant import (
     FILLING,
     MATRIX,
@@ -55,7 +54,7 @@ NUMBERS = UnpublishedParameters()
 
 @pytest.fixture(scope="module")
 def fill():
-    return stages.run_fill(NUMBERS)
+    return hosovsky_fill.run_fill(NUMBERS)
 
 
 def verdicts(claims):
@@ -77,35 +76,35 @@ def test_the_muscle_fills_to_the_supply_and_empties_to_the_surroundings(fill):
 
 def test_a_higher_critical_ratio_changes_the_verdict_on_choking(fill):
     claim = r"the flow is choked until \(p_2/p_1 = b\): muscle pressure at which the mass flow begins to decrease"
-    assert verdicts(hosovsky_fill_claims.fill_claims(fill))[claim] == HOLDS
-    other = stages.run_fill(NUMBERS, dataclasses.replace(MATRIX, critical_ratio=0.5))
-    assert verdicts(hosovsky_fill_claims.fill_claims(other))[claim] == DIFFERS
+    assert verdicts(hosovsky_fill.fill_claims(fill))[claim] == HOLDS
+    other = hosovsky_fill.run_fill(NUMBERS, dataclasses.replace(MATRIX, critical_ratio=0.5))
+    assert verdicts(hosovsky_fill.fill_claims(other))[claim] == DIFFERS
 
 
 def test_another_conductance_changes_the_verdict_on_its_usual_unit(fill):
     claim = "sonic conductance of the MATRIX valve in customary units"
-    other = stages.run_fill(NUMBERS, dataclasses.replace(MATRIX, conductance=2.6167e-8))
-    assert verdicts(hosovsky_fill_claims.fill_claims(fill))[claim] == HOLDS
-    assert verdicts(hosovsky_fill_claims.fill_claims(other))[claim] == DIFFERS
+    other = hosovsky_fill.run_fill(NUMBERS, dataclasses.replace(MATRIX, conductance=2.6167e-8))
+    assert verdicts(hosovsky_fill.fill_claims(fill))[claim] == HOLDS
+    assert verdicts(hosovsky_fill.fill_claims(other))[claim] == DIFFERS
 
 
 def test_what_has_no_printed_number_is_never_said_to_hold(fill):
-    assert [c.verdict for c in hosovsky_fill_claims.fill_claims(fill) if c.reproduced is None] == [NOT_TESTABLE]
+    assert [c.verdict for c in hosovsky_fill.fill_claims(fill) if c.reproduced is None] == [NOT_TESTABLE]
 
 
 def test_interchanged_pressures_change_the_verdicts_of_the_release():
-    low, high = stages.release_pair(NUMBERS)
-    ranges = stages.range_table(NUMBERS)
-    right = [c.verdict for c in stages.claims(low, high, ranges)]
-    wrong = [c.verdict for c in stages.claims(high, low, ranges)]
+    low, high = releasing.release_pair(NUMBERS)
+    ranges = releasing.range_table(NUMBERS)
+    right = [c.verdict for c in releasing.claims(low, high, ranges)]
+    wrong = [c.verdict for c in releasing.claims(high, low, ranges)]
     assert right[:2] == [HOLDS, HOLDS]
     assert wrong[:2] == [DIFFERS, DIFFERS]
-    assert all("Each chosen value varied alone over its range: " in c.note for c in stages.claims(low, high, ranges))
+    assert all("Each chosen value varied alone over its range: " in c.note for c in releasing.claims(low, high, ranges))
 
 
 def test_the_release_starts_from_rest_with_the_latch_carrying_the_difference():
-    run = stages.release(NUMBERS, 300e3).run
-    held = run["time"] < stages.RELEASED_AT
+    run = releasing.release(NUMBERS, 300e3).run
+    held = run["time"] < releasing.RELEASED_AT
     assert (run["speed"][held] == 0).all()
     assert (run["contraction"][held] == 0).all()
     free = run["acceleration"][~held][0]
@@ -118,10 +117,10 @@ def test_the_decrement_finds_the_damping_of_a_linear_oscillator():
     decay, w = zeta * omega, omega * np.sqrt(1 - zeta**2)
     y = 1 - np.exp(-decay * t) * (np.cos(w * t) + decay / w * np.sin(w * t))
     v = np.exp(-decay * t) * (decay**2 / w + w) * np.sin(w * t)
-    ratio, rate = stages.damping(t, y, v)
+    ratio, rate = releasing.damping(t, y, v)
     assert ratio == pytest.approx(zeta, rel=1e-3)
     assert rate == pytest.approx(decay, rel=1e-3)
-    assert np.isnan(stages.damping(t, t, np.ones_like(t))).all()
+    assert np.isnan(releasing.damping(t, t, np.ones_like(t))).all()
 
 
 def test_the_surface_follows_its_measured_map():
@@ -203,9 +202,7 @@ def test_every_suspected_cause_is_substituted_and_has_an_effect(effects):
 def test_a_component_in_the_limit_of_the_printed_one_changes_nothing(nothing):
     """Each substituted component contains the printed one as a limit, so the table shows the cause and nothing else."""
     base = causing.run_fill_of(causing.PRINTED, NUMBERS)
-    effect = causing.effect_of(
-        base, null := causing.Substitution("none", "none", nothing), causing.run_fill_of(null, NUMBERS)
-    )
+    effect = causing.effect_of(base, causing.Substitution("none", "none", nothing), NUMBERS)
     assert np.abs(effect.pressure).max() < 1e3
     assert np.abs(effect.contraction).max() < 5e-4
 
@@ -249,7 +246,7 @@ def test_more_heat_transfer_turns_what_the_report_says(effects):
         if e.component in (r"first law, \(hA = 2000\) W/K", "no spring")
     ]
     base = causing.run_fill_of(causing.PRINTED, NUMBERS)
-    heat, spring = (causing.effect_of(base, e, causing.run_fill_of(e, NUMBERS)) for e in chosen)
+    heat, spring = (causing.effect_of(base, e, NUMBERS) for e in chosen)
     assert abs(heat.largest("pressure", FILLING)) < abs(spring.largest("pressure", FILLING))
 
 
@@ -277,58 +274,58 @@ def test_the_chapter_names_the_place_of_each_claim_in_few_words(chapter):
 
 @pytest.fixture(scope="module")
 def joint():
-    return joining.joint_variation(NUMBERS)
+    return releasing.joint_variation(NUMBERS)
 
 
 def test_varied_together_the_chosen_values_break_the_claim_on_relative_damping(joint):
     """Braid 0.5 rad and 500 kPa together give 0.305, although each alone stays below the limit of 0.3."""
     angle, pressure = NUMBERS.with_value("braid_angle", 0.5), NUMBERS.with_value("high_pressure", 500e3)
-    alone = [stages.compare_releases(*stages.release_pair(p))["relative damping"] for p in (angle, pressure)]
+    alone = [releasing.compare_releases(*releasing.release_pair(p))["relative damping"] for p in (angle, pressure)]
     together = angle.with_value("high_pressure", 500e3)
-    both = stages.compare_releases(*stages.release_pair(together))["relative damping"]
-    assert max(alone) < stages.MAX_DAMPING_DIFFERENCE < both
+    both = releasing.compare_releases(*releasing.release_pair(together))["relative damping"]
+    assert max(alone) < releasing.MAX_DAMPING_DIFFERENCE < both
     assert both == pytest.approx(0.305, abs=5e-4)
-    found = {claim.claim: claim for claim in joining.claims(joint)}
-    damping = found[stages.STATEMENTS["relative damping"].text]
+    found = {claim.claim: claim for claim in releasing.joint_claims(joint)}
+    damping = found[releasing.STATEMENTS["relative damping"].text]
     assert damping.verdict == DIFFERS
     assert 50.0 < damping.reproduced < 100.0
-    assert f"{100 * joint.share('relative damping', 'Sobol set'):.3g} %" in damping.note
+    assert f"{100 * releasing.share(joint, 'relative damping', 'Sobol set'):.3g} %" in damping.note
     assert [c.verdict for c in found.values() if c is not damping] == [HOLDS] * 3
 
 
 def test_the_joint_variation_holds_every_corner_for_both_maps_and_the_sobol_set(joint):
-    designs = [case.design for case in joint.cases]
+    designs = [case.design for case in joint]
     assert {d: designs.count(d) for d in dict.fromkeys(designs)} == {
         "corners, dmsp-20-300": 64, "corners, festo-tool-dmsp-20": 64, "Sobol set": 64,
     }  # fmt: skip
-    corner = {tuple(getattr(c.parameters, n).value for n in joining.VARIED) for c in joint.cases[:64]}
+    corner = {tuple(getattr(c.parameters, n).value for n in releasing.VARIED) for c in joint[:64]}
     assert len(corner) == 64
-    inside = np.array([[getattr(c.parameters, n).value for n in joining.VARIED] for c in joint.cases[128:]])
-    for column, name in zip(inside.T, joining.VARIED, strict=True):
+    inside = np.array([[getattr(c.parameters, n).value for n in releasing.VARIED] for c in joint[128:]])
+    for column, name in zip(inside.T, releasing.VARIED, strict=True):
         ranged = getattr(NUMBERS, name)
         assert ranged.low <= column.min() < column.max() <= ranged.high
         assert abs(np.mean(column) - (ranged.low + ranged.high) / 2) < 0.03 * (ranged.high - ranged.low)
 
 
 def test_a_joint_case_is_the_release_of_its_values(joint):
-    case = joint.worst("relative damping")
+    case = releasing.worst_case(joint, "relative damping")
     data = case.design.removeprefix("corners, ")
-    assert case.values == stages.compare_releases(*stages.release_pair(case.parameters, data))
+    assert case.values == releasing.compare_releases(*releasing.release_pair(case.parameters, data))
 
 
 def test_a_missing_value_does_not_hold():
-    values = dict.fromkeys(stages.STATEMENTS, float("nan"))
-    joint = joining.JointVariation((joining.JointCase("Sobol set", NUMBERS, values),))
-    assert [joint.share(key) for key in stages.STATEMENTS] == [0.0] * 4
+    values = dict.fromkeys(releasing.STATEMENTS, float("nan"))
+    joint = [releasing.JointCase("Sobol set", NUMBERS, values)]
+    assert [releasing.share(joint, key) for key in releasing.STATEMENTS] == [0.0] * 4
 
 
 def test_filling_suffers_more_by_a_fifth_only_inside_the_range_of_heat_transfer():
-    ranges = {r.meaning: r for r in hosovsky_fill_claims.ratio_ranges(NUMBERS, causing.SuspectedCauses())}
+    ranges = {r.meaning: r for r in causing.ratio_ranges(NUMBERS, causing.SuspectedCauses())}
     heat = ranges["heat transfer coefficient times area, wall to air"]
     assert heat.ratios == pytest.approx((1.08, 1.40, 1.16), abs=5e-3)
     assert not heat.stronger
     assert ranges["critical pressure ratio of the valve with fittings"].ratios[1] == pytest.approx(3.26, abs=5e-3)
-    text = hosovsky_fill_claims.describe_ranges(tuple(ranges.values()))
+    text = causing.describe_ranges(tuple(ranges.values()))
     assert "wall to air (ratio 1.08, 1.4 and 1.16 at 0.1, 0.5 and 2 W/K)" in text
 
 
@@ -341,7 +338,7 @@ def test_the_volume_flow_of_equation_11_is_the_mass_flow_with_dry_reference_air(
 
 
 def test_ideal_gas_and_reference_density_are_negligible_causes(effects):
-    gas, density = hosovsky_fill_claims.gas_findings(effects)
+    gas, density = hosovsky_fill.gas_findings(effects)
     assert (gas.verdict, density.verdict) == (HOLDS, HOLDS)
     assert density.reproduced == pytest.approx(0.88, abs=5e-3)
     assert 0.5 < gas.reproduced < 0.9
@@ -349,7 +346,7 @@ def test_ideal_gas_and_reference_density_are_negligible_causes(effects):
 
 
 def test_the_step_lies_in_the_range_of_the_sensor_only_as_absolute_pressure():
-    absolute, gauge, hysteresis = (claim for row in hosovsky_fill_claims.MEASUREMENT for claim in row.claims(""))
+    absolute, gauge, hysteresis = (claim for row in hosovsky_fill.MEASUREMENT for claim in row.claims(""))
     assert (absolute.reproduced, absolute.verdict) == (pytest.approx(0.548675), HOLDS)
     assert (gauge.verdict, hysteresis.verdict) == (DIFFERS, NOT_TESTABLE)
 

@@ -31,13 +31,12 @@ SURFACES = (drawn.AS_EXPONENT, drawn.PRINTED, drawn.MISPRINT_CORRECTED, drawn.CO
 
 def chapter() -> Chapter:
     """Return the chapter of the report."""
-    curves = SAM_30X290
-    laws = surfaces(curves)
+    subject = SAM_30X290, surfaces(SAM_30X290)
     return Chapter(
         PAPER,
-        claims=claims(curves, laws),
-        tables=tables(curves, laws),
-        plots=plots(curves, laws),
+        claims=claims(*subject),
+        tables=tables(*subject),
+        plots=plots(*subject),
         references=(BORZIKOVA,),
         **chapter_texts(PAPER),
     )
@@ -51,11 +50,6 @@ def surface_index(curves: PlaneCurves, laws: Laws, name: str) -> tuple[float, st
         note = rf"The index does not exist as SSE > SST; the value is \(1 - \text{{SSE}}/\text{{SST}}\) = {value}."
         return index.r_squared, note
     return index.value, f"Index at 15 evenly spaced pressures of each curve, 0 to {curves.max_pressure / 1e5:g} bar."
-
-
-def design_rank(recording: am.Recording) -> float:
-    """Return the rank of the design matrix of equation (1) [1]."""
-    return float(conditioning(recording, Chebyshev(LoadRange.from_recording(recording))).rank)
 
 
 def linearised_ratio(recording: am.Recording, repeated: bool) -> tuple[float, str]:
@@ -126,7 +120,7 @@ CURVES = tuple(
 )
 _LEAST_INDEX = AtLeast(min(c.printed_index for c in SAM_30X290.curves), 0.0005, derived=True)
 SURFACE = claim_row(PAPER, "index of a surface", surface_index, {name: (name,) for name in SURFACES}, _LEAST_INDEX)
-RANK = claim_row(PAPER, "rank", design_rank)
+RANK = claim_row(PAPER, "rank", lambda data: float(conditioning(data, Chebyshev(LoadRange.from_recording(data))).rank))
 PROCEDURE = claim_row(PAPER, "procedure", linearised_ratio, {
     r"linear fit of \(\ln(1 - k/k_\text{max})\)": (False,), r"repeated linearisation of \(f\) (Gauss-Newton)": (True,),
 })  # fmt: skip

@@ -10,10 +10,9 @@ from ..physics.muscle.characteristic import exponents, maxwell_defect
 from ..report.chapter import Chapter, Plot, Table
 from ..report.claims import claims_of
 from . import hosovsky_effects as causing
-from . import hosovsky_fill_and_release as runs
-from . import hosovsky_fill_claims as claiming
-from . import hosovsky_joint as joining
+from . import hosovsky_fill as filling
 from . import hosovsky_plant as rig
+from . import hosovsky_quick_release as releasing
 from .hosovsky_plant import FORCE_MAPS, surface, surface_fit
 from .run import captioned, chapter_texts, titled
 
@@ -37,35 +36,35 @@ def coefficient_table() -> Table:
 def chapter() -> Chapter:
     """Return the chapter of the report, with the chosen values of what the paper does not print."""
     parameters, suspected = rig.UnpublishedParameters(), causing.SuspectedCauses()
-    fill = runs.run_fill(parameters)
+    fill = filling.run_fill(parameters)
     effects = causing.compute_effects(parameters, suspected)
-    low, high = runs.release_pair(parameters)
-    ranges, joint = runs.range_table(parameters), joining.joint_variation(parameters)
-    ratios = claiming.ratio_ranges(parameters, suspected)
-    explanation = f"{causing.describe_effects(effects)} {claiming.describe_ranges(ratios)}"
-    valve = runs.valve_figure(rig.MATRIX, fill.plant.ambient.temperature)
-    shown = (hill_model(), surface_in_space(), isobars(), valve, runs.figure_3(fill))
+    low, high = releasing.release_pair(parameters)
+    ranges, joint = releasing.range_table(parameters), releasing.joint_variation(parameters)
+    ratios = causing.ratio_ranges(parameters, suspected)
+    explanation = f"{causing.describe_effects(effects)} {causing.describe_ranges(ratios)}"
+    valve = filling.valve_figure(rig.MATRIX, fill.plant.ambient.temperature)
+    shown = (hill_model(), surface_in_space(), isobars(), valve, filling.figure_3(fill))
     return Chapter(
         rig.PAPER,
         claims=(
-            *claims_of(claiming.SURFACE, rig.PAPER, surface_fit()),
-            *claiming.fill_claims(fill, explanation),
-            *claims_of(claiming.MEASUREMENT, rig.PAPER),
-            *runs.claims(low, high, ranges),
-            *joining.claims(joint),
-            *claiming.gas_findings(effects),
+            *claims_of(filling.SURFACE, rig.PAPER, surface_fit()),
+            *filling.fill_claims(fill, explanation),
+            *claims_of(filling.MEASUREMENT, rig.PAPER),
+            *releasing.claims(low, high, ranges),
+            *releasing.joint_claims(joint),
+            *filling.gas_findings(effects),
         ),
         tables=(
             causing.effect_table(effects),
-            claiming.range_table(ratios),
+            causing.range_table(ratios),
             ranges,
-            joining.joint_table(joint),
+            releasing.joint_table(joint),
             coefficient_table(),
             maxwell_table(parameters),
             _extrapolation_table(fill, low, high),
             *_time_series(fill, low, high),
         ),
-        plots=(*shown, causing.effect_plot(effects), runs.figure_4(low, high)),
+        plots=(*shown, causing.effect_plot(effects), releasing.figure_4(low, high)),
         references=(*cite(fill.plant), rig.MATRIX_CATALOGUE, *cite(load_law(FORCE_MAPS[0]))),
         chosen=(*rig.chosen_rows(parameters), *rig.chosen_rows(suspected)),
         **chapter_texts(rig.PAPER),
@@ -94,7 +93,7 @@ def maxwell_table(parameters: rig.UnpublishedParameters) -> Table:
     return titled("hosovsky_maxwell", columns)
 
 
-def _extrapolation_table(fill: runs.FillRun, low: runs.Release, high: runs.Release) -> Table:
+def _extrapolation_table(fill: filling.FillRun, low: releasing.Release, high: releasing.Release) -> Table:
     """Return the times and extents of extrapolation beyond the data of the surface, by run."""
     named = {"fill and discharge": fill.adaptive}
     named |= {f"release from {each.pressure / 1e3:g} kPa": each.run for each in (low, high)}
@@ -102,7 +101,7 @@ def _extrapolation_table(fill: runs.FillRun, low: runs.Release, high: runs.Relea
     return titled("hosovsky_boxes", {"run": [name for name, _ in found], "extrapolation": [note for _, note in found]})
 
 
-def _time_series(fill: runs.FillRun, low: runs.Release, high: runs.Release) -> tuple[Table, ...]:
+def _time_series(fill: filling.FillRun, low: releasing.Release, high: releasing.Release) -> tuple[Table, ...]:
     """Return the time series of Figs. 3 and 4; only written to files."""
     named = {"hosovsky_fill": fill.adaptive, "hosovsky_release_low": low.run, "hosovsky_release_high": high.run}
     names = (("time", "s"), ("pressure", "Pa"), ("contraction", "1"), ("position", "m"), ("force", "N"))

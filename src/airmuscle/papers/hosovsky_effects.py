@@ -6,8 +6,10 @@ then one of each cause together. The parameter values are chosen, as the paper p
 """
 
 import dataclasses
+import itertools
+import math
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -15,7 +17,7 @@ import airmuscle as am
 
 from ..core import DASHES, LINES, Array, new_figure
 from ..report.chapter import Plot, Table
-from ..report.formula import to_mathtext
+from ..report.formatting import format_unit, to_mathtext
 from . import hosovsky_plant as rig
 from .hosovsky_plant import MATRIX, Choice, UnpublishedParameters, hanging_load, plant
 from .run import captioned, titled
@@ -24,6 +26,10 @@ SPACING = 4e-3
 """Output step [s]."""
 PHASES = {"filling": rig.FILLING, "discharging": rig.DISCHARGING}
 """Beginning and end of both phases [s]."""
+STRONGER = 1.2
+"""Ratio above which filling is affected more than discharging, by at least a fifth (chosen)."""
+SMALLEST_EFFECT = 100.0
+"""Pressure change [Pa] below which a ratio has no meaning (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -60,13 +66,6 @@ class Substitution:
     parts: Mapping[str, Any]
     varied: str = ""
     pressure_column: str = "pressure"
-
-    def plant(self, parameters: UnpublishedParameters) -> am.Plant:
-        """Return the plant with the substituted components."""
-        parts = dict(self.parts)
-        if "braid_angle" in parts:
-            parameters = parameters.with_value("braid_angle", parts.pop("braid_angle"))
-        return plant(parameters, hanging_load(parameters), **parts)
 
 
 PRINTED = Substitution("as printed", "isothermal gas, constant spring, rigid wall, no line", {})
@@ -118,42 +117,54 @@ def substitutions(parameters: UnpublishedParameters, suspected: SuspectedCauses)
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Effect:
-    """Changes relative to the printed plant due to a substitution: pressure [Pa] and contraction [1] over time [s]."""
+    """Changes relative to the printed plant due to a substitution: pressure [Pa] and contraction [1] over time [s].
+
+    `delays` are those of filling and discharging [s], at 90 % of the pressure change.
+    """
 
     substitution: Substitution
     time: Array
     pressure: Array
     contraction: Array
-    delays: tuple[float, float]
-    """Delays of filling and discharging [s], at 90 % of the pressure change."""
+    delays: tuple[float, ...]
 
     def largest(self, column: str, phase: tuple[float, float]) -> float:
         """Return the change of largest magnitude within a phase, with its sign."""
         change = getattr(self, column)[(self.time >= phase[0]) & (self.time <= phase[1])]
         return float(change[np.argmax(np.abs(change))])
 
+    @property
+    def filling(self) -> float:
+        """Magnitude of the largest pressure change during filling [Pa]."""
+        return abs(self.largest("pressure", rig.FILLING))
+
+    @property
+    def ratio(self) -> float:
+        """Ratio of the largest pressure changes during filling and during discharging."""
+        return abs(self.largest("pressure", rig.FILLING) / self.largest("pressure", rig.DISCHARGING))
+
 
 def compute_effects(parameters: UnpublishedParameters, suspected: SuspectedCauses) -> tuple[Effect, ...]:
     """Simulate all substitutions and return their changes relative to the printed plant."""
     base = run_fill_of(PRINTED, parameters)
-    return tuple(effect_of(base, item, run_fill_of(item, parameters)) for item in substitutions(parameters, suspected))
+    return tuple(effect_of(base, item, parameters) for item in substitutions(parameters, suspected))
 
 
 def run_fill_of(substitution: Substitution, parameters: UnpublishedParameters) -> am.Recording:
     """Simulate fill and discharge of the plant with a substituted component."""
-    options: dict[str, Any] = {"integrator": am.Rodas4(1e-7), "output_times": SPACING}
-    return am.simulate(substitution.plant(parameters), rig.SCHEDULE, duration=rig.DURATION, **options)
+    parts, method = dict(substitution.parts), am.Rodas4(1e-7)
+    parameters = parameters.with_value("braid_angle", parts.pop("braid_angle", parameters.braid_angle.value))
+    system = plant(parameters, hanging_load(parameters), **parts)
+    return am.simulate(system, rig.SCHEDULE, duration=rig.DURATION, integrator=method, output_times=SPACING)
 
 
-def effect_of(base: am.Recording, substitution: Substitution, run: am.Recording) -> Effect:
-    """Return the changes of a run with a substituted component relative to that of the printed plant."""
+def effect_of(base: am.Recording, substitution: Substitution, parameters: UnpublishedParameters) -> Effect:
+    """Simulate a substitution and return its changes relative to the run of the printed plant."""
+    run = run_fill_of(substitution, parameters)
     time, pressure, contraction = base["time"], run[substitution.pressure_column], run["contraction"]
-    filling, discharging = (
-        _response_time(run["time"], pressure, *phase) - _response_time(time, base["pressure"], *phase)
-        for phase in PHASES.values()
-    )
-    changes = pressure - base["pressure"], contraction - base["contraction"]
-    return Effect(substitution, time, *changes, (filling, discharging))
+    delays = tuple(_response_time(run["time"], pressure, *phase) - _response_time(time, base["pressure"], *phase)
+                   for phase in PHASES.values())  # fmt: skip
+    return Effect(substitution, time, pressure - base["pressure"], contraction - base["contraction"], delays)
 
 
 def _response_time(time: Array, pressure: Array, begin: float, end: float) -> float:
@@ -173,18 +184,13 @@ def effect_table(effects: tuple[Effect, ...]) -> Table:
             columns[heading] = [_round(e.largest(column, phase) / size) for e in effects]
     for i, name in enumerate(PHASES):
         columns[f"{name}: delay at 90 % [ms]"] = [_round(round(e.delays[i] * 1e3, 3)) for e in effects]
-    columns["pressure, ratio of filling to discharging [1]"] = [_round(fill_discharge_ratio(e)) for e in effects]
+    columns["pressure, ratio of filling to discharging [1]"] = [_round(e.ratio) for e in effects]
     return titled("hosovsky_effects", columns)
 
 
 def _round(value: float) -> float:
     """Return the value with three significant digits, the accuracy that chosen parameters justify."""
     return float(f"{value + 0.0:.3g}")
-
-
-def fill_discharge_ratio(effect: Effect) -> float:
-    """Return the ratio of the largest pressure changes during filling and during discharging."""
-    return abs(effect.largest("pressure", rig.FILLING) / effect.largest("pressure", rig.DISCHARGING))
 
 
 def effect_plot(effects: tuple[Effect, ...]) -> Plot:
@@ -196,9 +202,8 @@ def effect_plot(effects: tuple[Effect, ...]) -> Plot:
         panels[0].set_ylabel(f"{cause}\nchange [kPa]")
         panels[2].set_ylabel("change [% of L₀]")
         panels[3].legend(loc="upper left", bbox_to_anchor=(1.02, 1.0), borderaxespad=0.0)
-    titles = [f"{column}\n{phase}" for column in ("pressure", "contraction") for phase in PHASES]
-    for j, title in enumerate(titles):
-        axes[0, j].set_title(title)
+    for j, (column, phase) in enumerate(itertools.product(("pressure", "contraction"), PHASES)):
+        axes[0, j].set_title(f"{column}\n{phase}")
         axes[-1, j].set_xlabel("time since opening [s]")
     figure.align_ylabels(axes[:, 0])
     figure.align_ylabels(axes[:, 2])
@@ -224,20 +229,69 @@ def _draw_row(panels: Any, row: list[Effect]) -> None:
 def describe_effects(effects: tuple[Effect, ...]) -> str:
     """Return a summary of the effects with regard to the larger deviations during filling."""
     single = [e for e in effects if e.substitution.cause in CAUSES]
-    largest = {cause: max((e for e in single if e.substitution.cause == cause), key=_fill_change) for cause in CAUSES}
-    ordered = sorted(largest.items(), key=lambda item: -_fill_change(item[1]))
-    listed = ", ".join(
-        f"{cause} {_fill_change(effect) / 1e3:.3g} kPa ({effect.substitution.component})" for cause, effect in ordered
-    )
-    stronger = [f"{e.substitution.cause} ({e.substitution.component})" for e in single if fill_discharge_ratio(e) > 1.2]
+    largest = dict[str, Effect]()
+    for effect in sorted(single, key=lambda e: -e.filling):
+        largest.setdefault(effect.substitution.cause, effect)
+    listed = ", ".join(f"{c} {e.filling / 1e3:.3g} kPa ({e.substitution.component})" for c, e in largest.items())
+    stronger = [f"{e.substitution.cause} ({e.substitution.component})" for e in single if e.ratio > STRONGER]
     combined = effects[-1]
     return (
         f"Largest pressure change during filling by cause: {listed}. Filling is affected more than discharging, by at "
         f"least a fifth at the chosen values, by: {', '.join(stronger) or 'none'}. All causes combined: "
-        f"{_fill_change(combined) / 1e3:.3g} kPa during filling, {fill_discharge_ratio(combined):.2g} times the "
-        "change during discharging."
+        f"{combined.filling / 1e3:.3g} kPa during filling, {combined.ratio:.2g} times the change during discharging."
     )
 
 
-def _fill_change(effect: Effect) -> float:
-    return abs(effect.largest("pressure", rig.FILLING))
+class RatioRange(NamedTuple):
+    """Ratio of filling to discharging at both ends of a parameter's range and at its chosen value; NaN if no effect.
+
+    `stronger` is whether filling is affected more by at least a fifth at all values that have an effect.
+    """
+
+    meaning: str
+    unit: str
+    values: tuple[float, ...]
+    ratios: tuple[float, ...]
+    stronger: bool
+
+
+def ratio_ranges(parameters: UnpublishedParameters, suspected: SuspectedCauses) -> tuple[RatioRange, ...]:
+    """Simulate fill and discharge at the low end, the chosen value and the high end of each parameter."""
+    base = run_fill_of(PRINTED, parameters)
+
+    def ratio(name: str, value: float) -> float:
+        varied = dataclasses.replace(suspected, **{name: dataclasses.replace(getattr(suspected, name), value=value)})
+        chosen = next(s for s in substitutions(parameters, varied) if s.varied == name)
+        effect = effect_of(base, chosen, parameters)
+        return math.nan if effect.filling < SMALLEST_EFFECT else effect.ratio
+
+    result = []
+    for name in (s.varied for s in substitutions(parameters, suspected) if s.varied):
+        item = getattr(suspected, name)
+        values = (item.low, item.value, item.high)
+        ratios = tuple(ratio(name, value) for value in values)
+        stronger = all(math.isnan(each) or each > STRONGER for each in ratios)
+        result.append(RatioRange(item.meaning, item.unit, values, ratios, stronger))
+    return tuple(result)
+
+
+def range_table(ranges: tuple[RatioRange, ...]) -> Table:
+    """Return the ratios of filling to discharging over the ranges of the parameters."""
+    places = ("low end", "chosen value", "high end")
+    return titled("hosovsky_effect_ranges", {
+        "parameter": [r.meaning for r in ranges],
+        "unit": [format_unit(r.unit) for r in ranges],
+        **{place: [r.values[i] for r in ranges] for i, place in enumerate(places)},
+        **{f"ratio at the {place} [1]": [None if math.isnan(r.ratios[i]) else _round(r.ratios[i]) for r in ranges]
+           for i, place in enumerate(places)},
+    })  # fmt: skip
+
+
+def describe_ranges(ranges: tuple[RatioRange, ...]) -> str:
+    """Return for which parameters filling is affected more by at least a fifth over their whole range."""
+    listed = "{} (ratio {:.3g}, {:.3g} and {:.3g} at {:g}, {:g} and {:g} {})"
+    failing = [listed.format(r.meaning, *r.ratios, *r.values, format_unit(r.unit)).replace(" )", ")")
+               for r in ranges if not r.stronger]  # fmt: skip
+    held = [r.meaning for r in ranges if r.stronger]
+    text = f"Over the whole range of its parameter this holds for: {', '.join(held) or 'none'}."
+    return text + (f" It does not hold over the range of: {', '.join(failing)}." if failing else "")

@@ -17,7 +17,7 @@ from ..engine.processes import process_pool
 from ..files.library.files import complete_name
 from ..report.chapter import Chapter, Plot, Table
 from ..report.claims import AtLeast, AtMost, ClaimRow, Equal, Kind, PublishedValue
-from ..report.write import with_rendered_figures, write_report
+from ..report.write import rendered_figure, write_report
 
 PAPERS: dict[str, str] = {
     "saga2007": "airmuscle.papers.saga2007",
@@ -63,24 +63,20 @@ def reproduce(
 def _chapters(selected: Sequence[str], pool: Executor | None) -> Iterator[tuple[str, Chapter, float]]:
     """Each paper with its chapter and its computing time, as they are completed."""
     if pool is None:
-        for name in selected:
-            yield name, *_compute(PAPERS[name])
+        yield from ((name, *_compute(PAPERS[name])) for name in selected)
         return
-    futures = {pool.submit(_compute_in_worker, PAPERS[name]): name for name in reversed(selected)}  # the longest first
+    futures = {pool.submit(_compute, PAPERS[name]): name for name in reversed(selected)}  # the longest first
     for future in as_completed(futures):
         yield futures[future], *future.result()
 
 
 def _compute(module: str) -> tuple[Chapter, float]:
+    """The chapter of a module, whose figures are rendered, to be sent to another process, and the computing time."""
     start = time.perf_counter()
     chapter = importlib.import_module(module).chapter()
     tables = tuple(dataclasses.replace(table, folded=True) for table in chapter.tables)
-    return dataclasses.replace(chapter, tables=tables), time.perf_counter() - start
-
-
-def _compute_in_worker(module: str) -> tuple[Chapter, float]:
-    chapter, seconds = _compute(module)
-    return with_rendered_figures(chapter), seconds
+    plots = tuple(dataclasses.replace(plot, figure=rendered_figure(plot)) for plot in chapter.plots)
+    return dataclasses.replace(chapter, tables=tables, plots=plots), time.perf_counter() - start
 
 
 def select_papers(papers: Sequence[str] | None) -> list[str]:

@@ -9,7 +9,7 @@ import airmuscle as am
 from ..core import BLACK, DASHES, LINES, legend_outside, new_figure
 from ..physics.muscle.characteristic.saga2007 import RUBBER_TEST_STRAIN
 from ..report.chapter import Plot
-from ..report.formula import to_mathtext
+from ..report.formatting import to_mathtext
 from . import saga2007_muscle as values
 from .run import captioned
 from .saga2007_joint import feed_forward_figure

@@ -15,7 +15,7 @@ import airmuscle as am
 from ..core import BLACK, DASHES, Array, legend_outside, new_figure
 from ..core import LINES as COLOURS
 from ..report.chapter import Plot, Table
-from ..report.formula import to_mathtext
+from ..report.formatting import to_mathtext
 from . import saga2007_muscle as values
 from .run import captioned, titled
 from .saga2007_muscle import LENGTH, LINES, circular_meridian, exact_meridian, pressure_along

@@ -31,12 +31,15 @@ CONTRACTIONS = np.array([0.01, 0.05, 0.10, 0.20, 0.30, 0.40])
 
 
 class ForceBalance(NamedTuple):
-    """Force balance F = p area - rubber."""
+    """Force balance F = p area - rubber: the area is F/p without rubber [m2], the rubber its force [N]."""
 
     area: Array
-    """F/p without rubber [m2]."""
     rubber: Array
-    """Force of the rubber [N]."""
+
+    def pressure(self, force: float) -> Array:
+        """(F + rubber)/area [Pa]; NaN where the area is not positive: beyond the pole there is no equilibrium."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.where(self.area > 0, (force + self.rubber) / self.area, np.nan)
 
 
 @model
@@ -93,12 +96,6 @@ def force_balances(
     }
 
 
-def balance_pressure(balance: ForceBalance, force: float) -> Array:
-    """Return (F + rubber)/area [Pa]; NaN where the area is not positive: beyond the pole there is no equilibrium."""
-    with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(balance.area > 0, (force + balance.rubber) / balance.area, np.nan)
-
-
 Pair = tuple[str, str]
 """Names of an outline and a closure."""
 
@@ -116,7 +113,7 @@ def _all_balances(rubber: am.characteristic.RubberLine, contraction: tuple[float
 def pressures(rubber: am.characteristic.RubberLine, force: float, contraction: Array) -> dict[Pair, Array]:
     """Return the pressure [Pa] of each of the 15 pairs."""
     balances = _all_balances(rubber, tuple(contraction))
-    return {pair: balance_pressure(balance, force) for pair, balance in balances.items()}
+    return {pair: balance.pressure(force) for pair, balance in balances.items()}
 
 
 def ideal_errors(contraction: Array) -> dict[Pair, Array]:

@@ -2,7 +2,7 @@
 
 import dataclasses
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -21,13 +21,6 @@ FIG_1, FIG_1_LOAD = (PRESSURE, 0.16e6), 100.0
 """Gauge pressures [Pa] and load [N] of Fig. 1 (chosen: pressure of the claims, and end of the axis of Fig. 8)."""
 INITIAL_RADIUS_RATIO = 0.9
 """Ratio of initial to end radius in the table, to show the term of the two radii (chosen)."""
-
-
-class Circle(NamedTuple):
-    """Circular meridian: radius R [m] and half angle phi [rad]."""
-
-    radius: Any
-    half_angle: Any
 
 
 @dataclasses.dataclass(frozen=True)
@@ -61,10 +54,10 @@ class Ferraresi2001:
         quarter = self.fibres // 4
         return math.fsum(math.cos(2 * math.pi * n / self.fibres) for n in range(-quarter, quarter + 1))
 
-    def circle(self, contraction: Any) -> Circle:
+    def circle(self, contraction: Any) -> tuple[Any, Any]:
         """Radius [m] and half angle [rad] of the meridian at a contraction, from sin(phi)/phi = 1 - contraction."""
         half_angle = np.sqrt(am.geometry.CircularArc().angle_squared(contraction))
-        return Circle(self.fibre_length / (2 * half_angle), half_angle)
+        return self.fibre_length / (2 * half_angle), half_angle
 
     def middle_radius(self, contraction: Any) -> Any:
         """Radius of the tube in the middle [m]."""
@@ -85,23 +78,12 @@ class Ferraresi2001:
         r0 = self.end_radius
         return radius**2 * angle + 2 * radius * r0 * np.sin(angle) - radius**2 / 2 * np.sin(2 * angle)
 
-    def residuals(self, pressure: Any, contraction: Any, force: Any, fibre_tension: Any) -> tuple[Any, Any]:
-        """Residuals of (A) and (B) [N]."""
-        angle = self.circle(contraction).half_angle
-        radial = self.hoop_force(contraction) + fibre_tension * np.sin(angle) * self.fibre_sum
-        axial = force + np.pi * pressure * self.middle_radius(contraction) ** 2 - self.fibres * fibre_tension
-        return radial - pressure * self.half_section(contraction), axial
-
     def pressure(self, contraction: Any, force: Any) -> Any:
         """Gauge pressure [Pa] at a contraction and a tension [N]; NaN where the balances have no solution."""
-        lever = np.sin(self.circle(contraction).half_angle) * self.fibre_sum / self.fibres
+        lever = np.sin(self.circle(contraction)[1]) * self.fibre_sum / self.fibres
         area = self.half_section(contraction) - lever * np.pi * self.middle_radius(contraction) ** 2
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.where(area > 0, (self.hoop_force(contraction) + lever * force) / area, np.nan)
-
-    def fibre_tension(self, pressure: Any, contraction: Any, force: Any) -> Any:
-        """Tension of one fibre [N] by (B)."""
-        return (force + np.pi * pressure * self.middle_radius(contraction) ** 2) / self.fibres
 
     def contraction(self, pressure: float, force: float) -> float:
         """Smallest contraction [1] in equilibrium at a gauge pressure [Pa] and a tension [N].
@@ -124,7 +106,7 @@ class Ferraresi2001:
 def radii_at_load() -> tuple[float, str]:
     """Return the ratio of the radii of the circle at the two pressures of Fig. 1 and one load [1]."""
     model = Ferraresi2001(RUBBER["A"])
-    first, second = (float(model.circle(model.contraction(p, FIG_1_LOAD)).radius) for p in FIG_1)
+    first, second = (float(model.circle(model.contraction(p, FIG_1_LOAD))[0]) for p in FIG_1)
     note = f"{1e3 * first:.3g} and {1e3 * second:.3g} mm at {FIG_1[0] / 1e6:g} and {FIG_1[1] / 1e6:g} MPa."
     return first / second, note
 
@@ -133,7 +115,7 @@ def radii_at_contraction() -> tuple[float, str]:
     """Return the ratio of the radii of the circle at two loads [N] and 10 % contraction [1]."""
     model, loads = Ferraresi2001(RUBBER["A"]), (50.0, 150.0)
     held = [float(model.pressure(0.1, force)) for force in loads]
-    radii = [float(model.circle(model.contraction(p, f)).radius) for p, f in zip(held, loads, strict=True)]
+    radii = [float(model.circle(model.contraction(p, f))[0]) for p, f in zip(held, loads, strict=True)]
     return radii[0] / radii[1], (
         f"At 10 % contraction with {loads[0]:g} and {loads[1]:g} N, that is at {held[0] / 1e6:.3g} and "
         f"{held[1] / 1e6:.3g} MPa. The circle depends on the contraction only, by sin(φ)/φ = 1 − ε; the pressure of a "
@@ -164,7 +146,8 @@ def previous_model_figure() -> Plot:
     figure, axes = new_figure(height=4.2)
     model = Ferraresi2001(RUBBER["A"])
     for i, pressure in enumerate(FIG_1):
-        radius, angle = (1e3 * model.circle(c := model.contraction(pressure, FIG_1_LOAD)).radius, model.circle(c)[1])
+        c = model.contraction(pressure, FIG_1_LOAD)
+        radius, angle = 1e3 * model.circle(c)[0], model.circle(c)[1]
         centre = 1e3 * model.end_radius - radius * math.cos(angle)
         theta = np.linspace(-angle, angle, 201)
         label = f"{pressure / 1e6:g} MPa, {100 * c:.1f} %"

@@ -11,9 +11,8 @@ from typing import Any
 
 from ..core import Reference, ShortRepr
 from .claims import Claim
+from .formatting import DIGITS
 
-DIGITS = 4
-"""Significant digits of a number in a report."""
 BY_ROW = "by row"
 """Unit of a column whose numbers have the unit in the column "unit" of their row."""
 

@@ -7,10 +7,21 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, ClassVar
 
-from .formula import to_plain
+from .formatting import DIGITS, MISSING, format_number, to_plain
 
 HOLDS, DIFFERS, DEPENDS = "holds", "differs", "depends"
 NOT_TESTABLE, NOT_PRINTED = "not testable", "not printed"
+MARKS = {HOLDS: "✓", DIFFERS: "✗", DEPENDS: "±", NOT_TESTABLE: "?", NOT_PRINTED: "–"}
+"""A sign next to each verdict, so that it does not depend on colour."""
+
+MEANINGS = {
+    HOLDS: "The reproduced value agrees with the expected one within the tolerance, in every reading.",
+    DIFFERS: "The reproduced value does not agree with the expected one, in any reading.",
+    DEPENDS: "It agrees in some readings of the paper and not in others.",
+    NOT_TESTABLE: "Its measurements are lost, its condition is not printed, or every law fulfils it.",
+    NOT_PRINTED: "The paper gives no value to compare with, or no value can be computed.",
+}
+"""Meaning of each verdict."""
 
 
 class Kind(enum.Enum):
@@ -214,3 +225,40 @@ def statements(claims: Iterable[Claim], kind: Kind = Kind.CLAIM) -> tuple[Statem
         if claim.kind is kind:
             cases.setdefault((claim.paper, claim.claim), []).append(claim)
     return tuple(Statement(text, tuple(group)) for (_, text), group in cases.items())
+
+
+def format_published(claim: Claim, *, with_tolerance: bool = True) -> str:
+    """Return the published value with its relation and tolerance: `≥ 4`, `20 ± 0.5`; an en dash if there is none."""
+    if claim.printed is None:
+        return MISSING
+    tolerance = f" ± {format_number(claim.printed.tolerance)}" if claim.printed.tolerance and with_tolerance else ""
+    origin = " (chosen)" if claim.printed.chosen else " (derived)" if claim.printed.derived else ""
+    return f"{claim.printed.relation}{format_number(claim.printed.value)}{tolerance}{origin}"
+
+
+def count_verdicts(claims: Iterable[Claim], kind: Kind = Kind.CLAIM) -> dict[str, int]:
+    """Return the number of statements of one kind with each verdict; the cases of a statement count once."""
+    verdicts = [statement.verdict for statement in statements(claims, kind)]
+    return {verdict: verdicts.count(verdict) for verdict in MARKS}
+
+
+def format_reproduced(statement: Statement, digits: int = DIGITS) -> str:
+    """Return the reproduced value of a statement, or the range of its readings: `1.64 to 41.18`."""
+    if not statement.reproduced:
+        return MISSING
+    low, high = (format_number(end(statement.reproduced), digits) for end in (min, max))
+    return low if low == high else f"{low} to {high}"
+
+
+def format_verdicts(count: int, verdict: str) -> str:
+    """A number of statements or readings with their verdict: `1 holds`, `4 hold`."""
+    plural = {HOLDS: "hold", DIFFERS: "differ", DEPENDS: "depend"}
+    return f"{count} {verdict if count == 1 else plural.get(verdict, verdict)}"
+
+
+def count_readings(statement: Statement) -> str:
+    """The number of cases of a statement with each verdict: `7 readings: 4 hold, 3 differ`."""
+    verdicts = [case.verdict for case in statement.cases]
+    counts = {verdict: verdicts.count(verdict) for verdict in MARKS if verdict in verdicts}
+    texts = [format_verdicts(n, verdict) for verdict, n in counts.items()]
+    return f"{len(verdicts)} readings: {', '.join(texts)}"

@@ -22,7 +22,7 @@ import numpy as np
 
 from ..core import printable
 from .chapter import Chapter, Table
-from .formula import to_plain
+from .formatting import to_plain
 from .shown import shown_columns, value_text
 
 
@@ -125,16 +125,15 @@ def csv_text(table: Table) -> str:
     columns = shown_columns(table, chosen=False)
     writer.writerow([to_plain(each.heading) for each in columns])
     text = functools.cache(lambda cell: printable(to_plain(cell)))  # of many runs the same
-    writer.writerows(zip(*([_csv_value(cell, text) for cell in each.cells] for each in columns), strict=True))
+
+    def cell(value: Any) -> Any:  # both ends of a range with `to` between them
+        if isinstance(value, float):
+            return value if math.isfinite(value) else None
+        if isinstance(value, str):
+            return text(value)
+        if isinstance(value, tuple):
+            return " to ".join(map(str, dict.fromkeys(value)))
+        return int(value) if isinstance(value, bool) else value
+
+    writer.writerows(zip(*(map(cell, each.cells) for each in columns), strict=True))
     return file.getvalue()
-
-
-def _csv_value(value: Any, text: Callable[[str], str]) -> Any:
-    """A cell of a CSV file; both ends of a range with `to` between them."""
-    if isinstance(value, float):
-        return value if math.isfinite(value) else None
-    if isinstance(value, str):
-        return text(value)
-    if isinstance(value, tuple):
-        return " to ".join(map(str, dict.fromkeys(value)))
-    return int(value) if isinstance(value, bool) else value

@@ -1,28 +1,22 @@
-"""Formatting of numbers, units and claims for the page and the terminal."""
+r"""Formatting of numbers, units and formulas for the page and the terminal.
 
+A text of a chapter (claim, caption, table title, column header, cell) may contain formulas: LaTeX between \( and \),
+such as \(k_\text{max}\). The page shows them as MathML, which browsers render without scripts, a figure as Matplotlib
+mathtext; CSV and JSON files, the terminal and alternative texts of figures contain the plain form, k_max.
+"""
+
+import functools
+import html
 import math
 import re
-from collections.abc import Iterable
 from numbers import Integral, Real
-from typing import Any
+from typing import Any, Literal
+from xml.etree import ElementTree
 
 import numpy as np
 
-from .chapter import DIGITS
-from .claims import DEPENDS, DIFFERS, HOLDS, NOT_PRINTED, NOT_TESTABLE, Claim, Kind, Statement, statements
-
-MARKS = {HOLDS: "✓", DIFFERS: "✗", DEPENDS: "±", NOT_TESTABLE: "?", NOT_PRINTED: "–"}
-"""A sign next to each verdict, so that it does not depend on colour."""
-
-MEANINGS = {
-    HOLDS: "The reproduced value agrees with the expected one within the tolerance, in every reading.",
-    DIFFERS: "The reproduced value does not agree with the expected one, in any reading.",
-    DEPENDS: "It agrees in some readings of the paper and not in others.",
-    NOT_TESTABLE: "Its measurements are lost, its condition is not printed, or every law fulfils it.",
-    NOT_PRINTED: "The paper gives no value to compare with, or no value can be computed.",
-}
-"""Meaning of each verdict."""
-
+DIGITS = 4
+"""Significant digits of a number in a report."""
 MISSING = "–"
 P_VALUE, SMALLEST_P = "p-value", 1e-3
 """Header of a column of p-values, and the value below which one is shown as a bound."""
@@ -106,38 +100,117 @@ def typographic(text: str) -> str:
     return re.sub(r"(?<![\w.)])-(?=[\d∞])", "−", _EXPONENT.sub(power, text))
 
 
-def format_published(claim: Claim, *, with_tolerance: bool = True) -> str:
-    """Return the published value with its relation and tolerance: `≥ 4`, `20 ± 0.5`; an en dash if there is none."""
-    if claim.printed is None:
-        return MISSING
-    tolerance = f" ± {format_number(claim.printed.tolerance)}" if claim.printed.tolerance and with_tolerance else ""
-    origin = " (chosen)" if claim.printed.chosen else " (derived)" if claim.printed.derived else ""
-    return f"{claim.printed.relation}{format_number(claim.printed.value)}{tolerance}{origin}"
+# Formulas
+
+_FORMULA = re.compile(r"\\\((.+?)\\\)")
+_FORMULA_WITH_PUNCTUATION = re.compile(r"([(\[]*)\\\((.+?)\\\)([)\],.;:%]*)")
+_NO_WRAP = '<span class="nowrap">{}</span>'
+"""Browsers break lines between a formula and the punctuation next to it."""
+_NAME = re.compile(r"(?P<base>[A-Za-z]+)(?:_(?P<index>[A-Za-z0-9]+(?:_[A-Za-z0-9]+)*))?")
+_UNIT_SPACE = re.compile(r"(?<=\d) (?=%|(?:k?N|[kM]?Pa|[mc]?m|k?g|m?s|bar|K|rad|Hz)\b)")
+_GREEK = {
+    name: rf"\{name}"
+    for name in ("alpha", "beta", "gamma", "delta", "zeta", "eta", "theta", "kappa", "lambda", "mu", "nu", "pi", "rho",
+                 "sigma", "tau", "phi", "psi", "omega", "Delta", "Gamma", "Omega", "Phi")
+} | {"eps": r"\varepsilon"}  # fmt: skip
+_SYMBOL = re.compile(r"[\w^() '-]+")
+"""Characters of a symbol; a label with others, `geometry.radius`, is a name and no formula."""
+_INDICES = re.compile(r"[0-9ijk]+")
+"""Subscripts that count; all others are abbreviations and set upright."""
+_SPACED = "=+-<>≤≥≈≠"
+"""Operators with a space on both sides in plain text."""
 
 
-def count_verdicts(claims: Iterable[Claim], kind: Kind = Kind.CLAIM) -> dict[str, int]:
-    """Return the number of statements of one kind with each verdict; the cases of a statement count once."""
-    verdicts = [statement.verdict for statement in statements(claims, kind)]
-    return {verdict: verdicts.count(verdict) for verdict in MARKS}
+def to_mathml(text: str) -> str:
+    r"""Return HTML: the text escaped, every formula \(...\) replaced by a MathML element."""
+    result, end = "", 0
+    for match in _FORMULA_WITH_PUNCTUATION.finditer(text):
+        before, latex, after = match.groups()
+        formula = _escape(before) + _mathml(latex) + _escape(after)
+        result += _escape(text[end : match.start()]) + (_NO_WRAP.format(formula) if before or after else formula)
+        end = match.end()
+    return result + _escape(text[end:])
 
 
-def format_reproduced(statement: Statement, digits: int = DIGITS) -> str:
-    """Return the reproduced value of a statement, or the range of its readings: `1.64 to 41.18`."""
-    if not statement.reproduced:
-        return MISSING
-    low, high = (format_number(end(statement.reproduced), digits) for end in (min, max))
-    return low if low == high else f"{low} to {high}"
+def _escape(text: str) -> str:
+    """Return HTML with a no-break space between a number and its unit."""
+    return _UNIT_SPACE.sub("\N{NO-BREAK SPACE}", html.escape(text))
 
 
-def format_verdicts(count: int, verdict: str) -> str:
-    """A number of statements or readings with their verdict: `1 holds`, `4 hold`."""
-    plural = {HOLDS: "hold", DIFFERS: "differ", DEPENDS: "depend"}
-    return f"{count} {verdict if count == 1 else plural.get(verdict, verdict)}"
+def to_plain(text: str) -> str:
+    r"""Return the text with every formula \(...\) replaced by its plain form, for example k_max (1 - e^v)."""
+    return _FORMULA.sub(lambda match: _plain_formula(match[1]), text)
 
 
-def count_readings(statement: Statement) -> str:
-    """The number of cases of a statement with each verdict: `7 readings: 4 hold, 3 differ`."""
-    verdicts = [case.verdict for case in statement.cases]
-    counts = {verdict: verdicts.count(verdict) for verdict in MARKS if verdict in verdicts}
-    texts = [format_verdicts(n, verdict) for verdict, n in counts.items()]
-    return f"{len(verdicts)} readings: {', '.join(texts)}"
+def to_mathtext(text: str) -> str:
+    r"""Return the text for a Matplotlib label: formulas between dollar signs."""
+    return _FORMULA.sub(lambda match: f"${match[1]}$", text)
+
+
+def symbol_formula(symbol: str) -> str:
+    r"""Return a declared symbol such as eps_0 as a formula, \(\varepsilon_{0}\), and any other label unchanged."""
+    if not _SYMBOL.fullmatch(symbol):
+        return symbol
+    products = re.sub(r"(?<=\w) (?=\w)", r"\\,", symbol)
+    return rf"\({_NAME.sub(_symbol_latex, products)}\)"
+
+
+def _symbol_latex(match: re.Match[str]) -> str:
+    base, index = match["base"], match["index"]
+    latex = _GREEK.get(base, rf"\text{{{base}}}" if len(base) > 2 else base)  # words are set upright
+    if base == "qm":  # mass flow, ISO 80000-4
+        return r"q_\text{m}"
+    if index is None:
+        return latex
+    parts = [each if _INDICES.fullmatch(each) else rf"\text{{{each}}}" for each in index.split("_")]
+    return f"{latex}_{parts[0]}" if len(parts) == 1 and parts[0] != index else f"{latex}_{{{', '.join(parts)}}}"
+
+
+def to_display_mathml(latex: str) -> str:
+    """Return an equation in LaTeX as a MathML element on a line of its own."""
+    return _mathml(latex, "block")
+
+
+@functools.cache
+def _mathml(latex: str, display: Literal["block", "inline"] = "inline") -> str:
+    from latex2mathml.converter import convert  # needed by reports only
+
+    return convert(latex, display=display).replace("<mo>&#x0002F;</mo>", '<mo lspace="0" rspace="0">&#x0002F;</mo>')
+
+
+@functools.cache
+def _plain_formula(latex: str) -> str:
+    return " ".join(_plain(ElementTree.fromstring(_mathml(latex))).split())
+
+
+def _plain(element: ElementTree.Element) -> str:
+    """Return a MathML element as text."""
+    tag = element.tag.rpartition("}")[2]
+    parts = [_plain(child) for child in element]
+    if tag in ("msub", "munder"):
+        return f"{parts[0]}_{parts[1]}"
+    if tag in ("msup", "mover"):
+        return f"{parts[0]}^{_grouped(parts[1])}"
+    if tag in ("msubsup", "munderover"):
+        return f"{parts[0]}_{parts[1]}^{_grouped(parts[2])}"
+    if tag == "mfrac":
+        return f"{_grouped(parts[0])}/{_grouped(parts[1])}"
+    if tag == "msqrt":
+        return f"sqrt({''.join(parts)})"
+    if tag == "mspace":
+        return " "
+    return _join(list(element), parts) if parts else (element.text or "").replace("\u2212", "-")
+
+
+def _join(elements: list[ElementTree.Element], parts: list[str]) -> str:
+    """Join the parts of a row; a sign at its beginning or after another operator has no space behind it."""
+    text, after_operator = "", True
+    for element, part in zip(elements, parts, strict=True):
+        operator = element.tag.endswith("}mo")
+        text += f" {part} " if operator and part in _SPACED and not after_operator else part
+        after_operator = operator and part not in (")", "|")
+    return text
+
+
+def _grouped(text: str) -> str:
+    return f"({text})" if re.search(r"[ +\-/]", text) else text

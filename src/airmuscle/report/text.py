@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 
 from ..core import printable
 from .chapter import Chapter, NamedValue, Table
-from .formula import to_plain
+from .formatting import to_plain
 from .shown import ShownColumn, shown_columns, value_cells
 
 MAX_WORD = 14

@@ -1,22 +1,21 @@
 """Files of a report: report.html with embedded figures and formulas, claims.json, figures/ and data/."""
 
 import base64
-import dataclasses
+import contextlib
 import datetime
 import functools
 import platform
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from importlib import metadata, resources
 from pathlib import Path
 from typing import Any
 
 from ..core import FileError, atomic_folder, plotting
-from . import formatting
+from . import claims as claiming
 from .chapter import Chapter, Plot, Table
-from .claims import Kind, statements
 from .data import as_json, csv_text
-from .formula import symbol_formula, to_display_mathml, to_mathml, to_plain
+from .formatting import format_cell, format_unit, symbol_formula, to_display_mathml, to_mathml, to_plain, typographic
 from .shown import SYMBOL, ShownColumn, shown_columns, value_table
 
 MAX_SVG_BYTES = 600_000
@@ -45,7 +44,11 @@ def write_into(
     staging: Path, chapters: Sequence[Chapter], *, title: str = "Report", date: datetime.date | None = None
 ) -> None:
     """Write the report's files into a folder made by `atomic_folder`, next to other files of the same command."""
-    _check_unique(chapters)
+    for kind in ("plots", "tables"):  # of two of the same name one would overwrite the other
+        names = [item.name for chapter in chapters for item in getattr(chapter, kind)]
+        invalid = sorted({name for name in names if names.count(name) > 1 or Path(name).name != name})
+        if invalid:
+            raise ValueError(f"{kind}: names must be unique and valid file names; check {', '.join(invalid)}.")
     try:
         for chapter in chapters:
             for plot in chapter.plots:
@@ -69,25 +72,10 @@ def rendered_figure(plot: Plot) -> dict[str, bytes]:
     return drawn if isinstance(drawn, dict) else plotting.rendered(drawn)
 
 
-def with_rendered_figures(chapter: Chapter) -> Chapter:
-    """The chapter with the files of its figures, by format, in place of the figures, to be sent to another process."""
-    plots = tuple(dataclasses.replace(plot, figure=rendered_figure(plot)) for plot in chapter.plots)
-    return dataclasses.replace(chapter, plots=plots)
-
-
 def save_table(table: Table, path: Path) -> None:
     """Write a table as CSV: headers with units, numbers with all digits, an empty cell for NaN and infinity."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text(csv_text(table), encoding="utf-8", newline="")
-
-
-def _check_unique(chapters: Iterable[Chapter]) -> None:
-    """Raise ValueError if two figures or two tables have the same name: one would overwrite the other."""
-    for kind in ("plots", "tables"):
-        names = [item.name for chapter in chapters for item in getattr(chapter, kind)]
-        invalid = sorted({name for name in names if names.count(name) > 1 or Path(name).name != name})
-        if invalid:
-            raise ValueError(f"{kind}: names must be unique and valid file names; check {', '.join(invalid)}.")
 
 
 def render_page(chapters: Sequence[Chapter], figures: Path, *, title: str, date: datetime.date) -> str:
@@ -97,11 +85,11 @@ def render_page(chapters: Sequence[Chapter], figures: Path, *, title: str, date:
         date=date.isoformat(),
         chapters=chapters,
         claims=[claim for chapter in chapters for claim in chapter.claims],
-        kinds=list(Kind),
-        statements=statements,
-        count_verdicts=formatting.count_verdicts,
-        marks=formatting.MARKS,
-        meanings=formatting.MEANINGS,
+        kinds=list(claiming.Kind),
+        statements=claiming.statements,
+        count_verdicts=claiming.count_verdicts,
+        marks=claiming.MARKS,
+        meanings=claiming.MEANINGS,
         versions=versions(),
         zip=zip,
         image=lambda plot: image_data_uri(figures / plot.name),
@@ -123,17 +111,17 @@ def _template() -> Any:
         formulas=lambda text: Markup(to_mathml(text)),
         equation=lambda latex: Markup(to_display_mathml(latex)),
         plain=to_plain,
-        published=lambda claim: formatting.typographic(formatting.format_published(claim)),
-        reproduced=lambda statement: formatting.typographic(formatting.format_reproduced(statement)),
-        unit=formatting.format_unit,
-        anchor=anchor,
-        readings=formatting.count_readings,
-        verdicts=formatting.format_verdicts,
+        published=lambda claim: typographic(claiming.format_published(claim)),
+        reproduced=lambda statement: typographic(claiming.format_reproduced(statement)),
+        unit=format_unit,
+        anchor=lambda text: re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-"),  # identifier of a link target
+        readings=claiming.count_readings,
+        verdicts=claiming.format_verdicts,
         shown=shown_columns,
         rows=lambda shown: list(zip(*(each.cells for each in shown), strict=True)),
-        sentence=as_sentence,
+        sentence=lambda text: f"{text[:1].upper()}{text[1:]}{'' if text.endswith(('.', '!', '?', ':')) else '.'}",
         results=lambda chapter: value_table(f"{chapter.name}-results", "Results", chapter.values),
-        is_short=is_short,
+        is_short=lambda value: isinstance(value, str) and len(to_plain(value)) <= MAX_LINE,
     )
     text = resources.files(__package__).joinpath("template.html").read_text(encoding="utf-8")
     return environment.from_string(text)
@@ -142,7 +130,7 @@ def _template() -> Any:
 def render_cell(value: Any, column: ShownColumn | None = None) -> str:
     """Return the HTML of a cell; the heading of its column decides on the format of symbols, units and p-values."""
     if column is None:
-        return to_mathml(formatting.format_cell(value))
+        return to_mathml(format_cell(value))
     if column.heading == SYMBOL and isinstance(value, str):
         return to_mathml(symbol_formula(value))
     return to_mathml(column.cell_text(value))
@@ -153,7 +141,7 @@ def render_header(header: str) -> str:
     unit = _BRACKETS.search(header)
     if unit is None:
         return to_mathml(header)
-    name, shown = header[: unit.start()], formatting.format_unit(unit[1])
+    name, shown = header[: unit.start()], format_unit(unit[1])
     return to_mathml(f"{name} [{shown}]" if shown else name)
 
 
@@ -165,34 +153,11 @@ def image_data_uri(stem: Path) -> str:
     return f"data:image/{kind};base64,{base64.b64encode(content).decode('ascii')}"
 
 
-def anchor(text: str) -> str:
-    """Return the identifier of a link target within the page."""
-    return re.sub(r"[^a-z0-9]+", "-", text.lower()).strip("-")
-
-
-def as_sentence(text: str) -> str:
-    """Return a note as a sentence: with a capital letter and a full stop."""
-    return f"{text[:1].upper()}{text[1:]}{'' if text.endswith(('.', '!', '?', ':')) else '.'}"
-
-
-def is_short(value: Any) -> bool:
-    """Whether a cell is shown on one line."""
-    return isinstance(value, str) and len(to_plain(value)) <= MAX_LINE
-
-
 @functools.cache
 def versions() -> dict[str, str]:
     """Return the versions of airmuscle, Python and the numerical packages; `not installed` for a missing one."""
-    return {
-        "airmuscle": _version("airmuscle"),
-        "Python": platform.python_version(),
-        **{package: _version(package) for package in _PACKAGES},
-        "machine": f"{platform.system()} {platform.machine()}",
-    }
-
-
-def _version(package: str) -> str:
-    try:
-        return metadata.version(package)
-    except metadata.PackageNotFoundError:
-        return "not installed"
+    found = dict.fromkeys(("airmuscle", "Python", *_PACKAGES), "not installed")
+    for package in ("airmuscle", *_PACKAGES):
+        with contextlib.suppress(metadata.PackageNotFoundError):
+            found[package] = metadata.version(package)
+    return found | {"Python": platform.python_version(), "machine": f"{platform.system()} {platform.machine()}"}

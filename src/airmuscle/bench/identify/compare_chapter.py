@@ -15,7 +15,7 @@ from ...engine.processes import Workers
 from ...recording import Recording
 from ...recording.columns import display_scale
 from ...report.chapter import Chapter, Plot, Table, TableColumn
-from ...report.formula import symbol_formula, to_mathtext
+from ...report.formatting import symbol_formula, to_mathtext
 from . import Fit
 from .candidate_scores import RankedModel
 from .candidates import MIN_POOLED, Candidate

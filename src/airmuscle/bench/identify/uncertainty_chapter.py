@@ -9,7 +9,7 @@ import numpy as np
 
 from ...core import BLACK, BLUE, DASHES, LINES, RED, legend_below, legend_outside, new_figure
 from ...report.chapter import BY_ROW, Chapter, NamedValue, Plot, Table, TableColumn
-from ...report.formula import symbol_formula, to_mathtext
+from ...report.formatting import symbol_formula, to_mathtext
 from . import Bootstrap, Fit, LengthError, ProfileLikelihood, ShapeConstrainedFit
 from .cross_validation import levels_of
 from .length_errors import PRIOR_STD

@@ -9,9 +9,8 @@ from ...engine.processes import available_cores
 from ...papers.run import reproduce as reproduce_papers
 from ...papers.run import select_papers
 from ...report.chapter import Chapter
-from ...report.claims import Kind, Statement, statements
-from ...report.formatting import MARKS, count_verdicts, format_published, format_reproduced
-from ...report.formula import to_plain
+from ...report.claims import MARKS, Kind, count_verdicts, format_published, format_reproduced, statements
+from ...report.formatting import to_plain
 from ...report.text import GAP
 from .options import Folder, argument
 from .terminal import echo, print_table, terminal_width
@@ -72,17 +71,13 @@ def _print_chapter(chapter: Chapter) -> None:
         text = f"{question} {to_plain(answer)}"
         echo(textwrap.fill(text, terminal_width(), subsequent_indent="  ", break_on_hyphens=False))
     found = [(kind, each) for kind in Kind for each in statements(chapter.claims, kind)]
-    values = [
-        (format_published(s.cases[0], with_tolerance=False), _reproduced(s), f"{MARKS[s.verdict]} {s.verdict}")
-        for _, s in found
-    ]
+    values = []
+    for _, s in found:
+        published, unit = format_published(s.cases[0], with_tolerance=False), s.cases[0].unit
+        reproduced = f"{format_reproduced(s, 3)} {unit if s.reproduced and unit != '1' else ''}".rstrip()
+        values.append((published, reproduced, f"{MARKS[s.verdict]} {s.verdict}"))
     columns = zip(HEADERS[1:], *values, strict=True)
     room = max(MIN_CLAIM, terminal_width() - sum(max(len(str(cell)) for cell in column) + GAP for column in columns))
     texts = (f"{PREFIXES[kind]}{to_plain(each.claim)}" for kind, each in found)
     rows = [(textwrap.shorten(text, room, placeholder=" …"), *row) for text, row in zip(texts, values, strict=True)]
     print_table(dict(zip(HEADERS, zip(*rows, strict=True), strict=True)))
-
-
-def _reproduced(statement: Statement) -> str:
-    unit = "" if statement.cases[0].unit == "1" or not statement.reproduced else statement.cases[0].unit
-    return f"{format_reproduced(statement, 3)} {unit}".rstrip()

@@ -1,5 +1,6 @@
 """Expressions: nodes of a formula, shared where they are equal, with the elementary simplifications."""
 
+import itertools
 import math
 import operator
 from collections import Counter, defaultdict
@@ -68,6 +69,12 @@ class Expressions:
 
     def __init__(self) -> None:
         self._nodes: dict[tuple[object, ...], Node] = {}
+        self._simplified: dict[str, Callable[..., Node]] = {
+            "add": self.add, "neg": self.negative, "mul": self.product, "div": self.quotient, "pow": self.power,
+            "not": self.negation, "where": self.where, "assign": lambda a: a, "sq": lambda a: self.product(a, a),
+            "sub": lambda a, b: self.add(a, self.negative(b)), "twice": lambda a: self.product(self.number(2.0), a),
+            "inv": lambda a: self.quotient(self.number(1.0), a),
+        }  # fmt: skip
 
     def node(self, kind: str, *arguments: Node, value: float | str | None = None) -> Node:
         """An operation as it is; with numbers that are not evaluated, a polynomial is expanded exactly."""
@@ -160,12 +167,8 @@ class Expressions:
 
     def apply(self, kind: str, *arguments: Node) -> Node:
         """Any operation by its kind, simplified."""
-        simplified: dict[str, Callable[..., Node]] = {
-            "add": self.add, "neg": self.negative, "mul": self.product, "div": self.quotient, "pow": self.power,
-            "not": self.negation, "where": self.where,
-        }  # fmt: skip
-        if kind in simplified:
-            return simplified[kind](*arguments)
+        if kind in self._simplified:
+            return self._simplified[kind](*arguments)
         if kind == "if" and is_number(arguments[0]):
             return arguments[1] if arguments[0].number != 0.0 else self.number(0.0)
         if kind in COMPARISONS and all(map(is_number, arguments)):
@@ -187,52 +190,42 @@ Polynomial = dict[Monomial, Fraction]
 
 def expand(root: Node, atoms: Collection[Node]) -> Polynomial | None:
     """An expression as a polynomial in these atoms with exact coefficients; None if it is none, or is too long."""
-    return fold(root, lambda node, inner: _expand_one(node, atoms, inner))
+
+    def expanded(node: Node, inner: list[Polynomial | None]) -> Polynomial | None:
+        if node in atoms:
+            return {((node, 1),): Fraction(1)}
+        if is_number(node):
+            return {(): Fraction(node.number)} if node.number else {}
+        if node.kind not in (ADD, NEGATIVE, PRODUCT, QUOTIENT, POWER) or inner[0] is None or inner[-1] is None:
+            return None
+        found = _combined(node.kind, inner[0], inner[-1])
+        return found if found is None or len(found) <= MAX_TERMS else None
+
+    return fold(root, expanded)
 
 
-def _expand_one(node: Node, atoms: Collection[Node], inner: list[Polynomial | None]) -> Polynomial | None:
-    if node in atoms:
-        return {((node, 1),): Fraction(1)}
-    if is_number(node):
-        return {(): Fraction(node.number)} if node.number else {}
-    if node.kind not in ("add", "neg", "mul", "div", "pow"):
-        return None
-    first, last = inner[0], inner[-1]
-    if first is None or last is None:
-        return None
-    if node.kind == "add":
-        return _checked({monomial: first.get(monomial, Fraction()) + last.get(monomial, Fraction())
-                         for monomial in {**first, **last}})  # fmt: skip
-    if node.kind == "neg":
+def _combined(kind: str, first: Polynomial, last: Polynomial) -> Polynomial | None:
+    """The result of an operation without monomials that cancel; None if it is no polynomial, or is too long."""
+    number = last[()] if set(last) == {()} else None
+    if kind == ADD:
+        sums = {monomial: first.get(monomial, 0) + last.get(monomial, 0) for monomial in {**first, **last}}
+        return {monomial: Fraction(c) for monomial, c in sums.items() if c}
+    if kind == NEGATIVE:
         return {monomial: -c for monomial, c in first.items()}
-    if node.kind == "mul":
-        return _product(first, last)
-    if set(last) != {()}:
-        return None
-    number = last[()]
-    if node.kind == "div":
+    if kind == PRODUCT:
+        total: defaultdict[Monomial, Fraction] = defaultdict(Fraction)
+        for (m, c), (n, d) in itertools.product(first.items(), last.items()):
+            powers = (Counter(dict(m)) + Counter(dict(n))).items()
+            total[tuple(sorted(powers, key=lambda item: (str(item[0].value or ""), id(item[0]))))] += c * d
+        return {monomial: c for monomial, c in total.items() if c}
+    if number is not None and kind == QUOTIENT:
         return {monomial: c / number for monomial, c in first.items()}
-    if number.denominator != 1 or not 0 < number <= 20:
+    if number is None or number.denominator != 1 or not 0 < number <= 20:
         return None
     result: Polynomial | None = {(): Fraction(1)}
     for _ in range(int(number)):
-        result = None if result is None else _product(result, first)
+        result = _combined(PRODUCT, result, first) if result is not None and len(result) <= MAX_TERMS else None
     return result
-
-
-def _product(a: Polynomial, b: Polynomial) -> Polynomial | None:
-    total: defaultdict[Monomial, Fraction] = defaultdict(Fraction)
-    for m, c in a.items():
-        for n, d in b.items():
-            powers = (Counter(dict(m)) + Counter(dict(n))).items()
-            total[tuple(sorted(powers, key=lambda item: (str(item[0].value or ""), id(item[0]))))] += c * d
-    return _checked(total)
-
-
-def _checked(polynomial: Polynomial) -> Polynomial | None:
-    """The polynomial without monomials that cancel; None if it is too long."""
-    kept = {monomial: c for monomial, c in polynomial.items() if c}
-    return kept if len(kept) <= MAX_TERMS else None
 
 
 def coefficients_by_monomial(polynomial: Polynomial, parameters: Collection[Node]) -> dict[Monomial, Node] | None:

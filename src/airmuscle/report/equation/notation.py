@@ -5,7 +5,7 @@ import math
 from collections.abc import Collection, Mapping
 from typing import ClassVar
 
-from ..formula import symbol_formula
+from ..formatting import symbol_formula
 from .expression import ADD, NEGATIVE, NUMBER, POWER, PRODUCT, QUOTIENT, SYMBOL, WHERE, Node, fold, in_order, is_number
 
 SUM, TERM, BASE, ATOM = 1, 2, 3, 4

@@ -1,6 +1,10 @@
-"""Fill and discharge, Fig. 3 of Hošovský et al., and the quick release of their load."""
+"""Quick release, Fig. 4 of Hošovský et al.: four claims, with the chosen values varied alone and together."""
 
 import dataclasses
+import functools
+import itertools
+from collections import Counter
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -8,82 +12,13 @@ import numpy.typing as npt
 
 import airmuscle as am
 
-from ..core import BLACK, DASHES, LINES, legend_below, new_figure
+from ..core import DASHES, LINES, legend_below, new_figure
+from ..design.study import Sobol, Uniform
 from ..report import AtLeast, AtMost, Claim, Plot, Table
-from ..report.formatting import format_unit
+from ..report.formatting import format_quantity, format_unit
 from . import hosovsky_plant as rig
-from .hosovsky_plant import FORCE_MAPS, MATRIX, UnpublishedParameters, hanging_load, latched_load, plant
-from .run import captioned, claim_row
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class FillRun:
-    """The simulation of Fig. 3 with the printed and with an adaptive integrator."""
-
-    plant: am.Plant
-    printed_method: am.Solution
-    adaptive: am.Recording
-
-    @property
-    def filled(self) -> float:
-        """Absolute pressure [Pa] when the fill valve closes."""
-        row = np.searchsorted(self.adaptive["time"], rig.FILLING[1])
-        return float(self.adaptive["pressure"][row]) + self.plant.ambient.pressure
-
-    def difference(self, name: str) -> float:
-        """Return the largest difference of both integrators in a quantity."""
-        return float(np.abs(self.printed_method.recording[name] - self.adaptive[name]).max())
-
-
-def run_fill(parameters: UnpublishedParameters, valve: am.Valve = MATRIX) -> FillRun:
-    """Simulate 25 s with ode8 at 1e-4 s, as printed, and with Rodas4 at rtol = 1e-8."""
-    system = plant(parameters, hanging_load(parameters), valve=valve)
-    printed, adaptive = (
-        am.solve(am.Problem(system, rig.SCHEDULE, rig.DURATION, integrator=method))
-        for method in (am.DormandPrince8(1e-4), am.Rodas4(1e-8))
-    )
-    return FillRun(system, printed, adaptive.recording)
-
-
-def figure_3(fill: FillRun) -> Plot:
-    """Return Fig. 3: muscle pressure and displacement over time; the paper gives no values of its curve."""
-    run = fill.adaptive
-    figure, axes = new_figure(2, 1, height=4.6, sharex=True)
-    axes[0].plot(run["time"], (run["pressure"] + fill.plant.ambient.pressure) / 1e3, color=LINES[0])
-    axes[0].axhline(650.0, color=BLACK, linewidth=0.8, linestyle=":")
-    axes[0].annotate("supply", (0.1, 650.0), xytext=(0, -10), textcoords="offset points")
-    axes[0].set_ylabel("absolute pressure [kPa]")
-    axes[1].plot(run["time"], run["position"] * 1e3, color=LINES[1])
-    axes[1].set(ylabel="displacement [mm]", xlabel="time [s]")
-    for axis in axes:
-        for begin, end in (rig.FILLING, rig.DISCHARGING):
-            axis.axvspan(begin, end, color="0.93", zorder=0)
-    return captioned("hosovsky_fig3", figure)
-
-
-def valve_figure(valve: am.Valve, temperature: float) -> Plot:
-    """Return the mass flow of the valve over the pressure ratio: choked, subsonic, laminar."""
-    upstream = 650e3
-    ratio = np.linspace(0.0, 1.0, 2001)
-    flow = valve.mass_flow(upstream, ratio * upstream, 1.0, temperature)
-    figure, axes = new_figure()
-    axes.plot(ratio, np.asarray(flow) * 1e3, color=LINES[0])
-    axes.axvline(valve.critical_ratio, color=BLACK, linewidth=0.8, linestyle=":")
-    axes.annotate("choked", (valve.critical_ratio / 2, 0.35), ha="center")
-    axes.annotate("subsonic", ((1 + valve.critical_ratio) / 2, 0.35), ha="center")
-    axes.set(xlabel="pressure ratio $p_2/p_1$", ylabel="mass flow [g/s]", ylim=(0, None), xlim=(0, 1))
-    return captioned("hosovsky_valve", figure)
-
-
-def end_of_choked_flow(plant: am.Plant) -> tuple[float, float]:
-    """Return the absolute muscle pressure [Pa] at which the choked flow ends, and the pressure step of a row [Pa]."""
-    instants = np.append(np.arange(rig.FILLING[0], rig.FILLING[0] + 1.0, 1e-4), rig.DURATION)
-    run = am.simulate(plant, rig.SCHEDULE, duration=rig.DURATION, integrator=am.Rodas4(1e-8), output_times=instants)
-    filling = (run["time"] >= rig.FILLING[0]) & (run["time"] < rig.FILLING[0] + 1.0)
-    flow, pressure = run["mass_flow"][filling], run["pressure"][filling] + plant.ambient.pressure
-    subsonic = int(np.argmax(flow < flow.max() * (1 - 1e-9)))
-    return float(pressure[subsonic]), float(np.diff(pressure).max())
-
+from .hosovsky_plant import FORCE_MAPS, UnpublishedParameters, latched_load, plant
+from .run import captioned, claim_row, titled
 
 RELEASED_AT, RELEASE_DURATION = 0.5, 6.0
 RELEASE_SCHEDULE = am.Schedule({"latched": ((0.0, 1.0), (RELEASED_AT, 0.0))})
@@ -157,15 +92,13 @@ def release_pair(parameters: UnpublishedParameters, data: str = FORCE_MAPS[0]) -
 
 def compare_releases(low: Release, high: Release) -> dict[str, float]:
     """Return the four statements as values: two differences that must be positive, two relative damping differences."""
-
-    def relative_difference(a: float, b: float) -> float:
-        return abs(a - b) / max(abs(a), abs(b))
-
+    dampings = ((high.damping_ratio, low.damping_ratio), (high.decay_rate, low.decay_rate))
+    relative, absolute = (abs(a - b) / max(abs(a), abs(b)) for a, b in dampings)
     return {
         "acceleration": high.initial_acceleration - low.initial_acceleration,
         "contraction": (high.max_contraction - low.max_contraction) * 100,
-        "relative damping": relative_difference(high.damping_ratio, low.damping_ratio),
-        "absolute damping": relative_difference(high.decay_rate, low.decay_rate),
+        "relative damping": relative,
+        "absolute damping": absolute,
     }
 
 
@@ -214,3 +147,89 @@ def figure_4(low: Release, high: Release) -> Plot:
     axes[1].set(ylabel="acceleration [m/s²]", xlabel="time after the release [s]", xlim=(-0.2, 3.0))
     legend_below(figure, axes[0])
     return captioned("hosovsky_fig4", figure)
+
+
+VARIED = ("stiffness", "damping", "length", "braid_angle", "low_pressure", "high_pressure")
+"""The chosen values on which the quick release depends."""
+SOBOL_POINTS = 64
+"""Number of Sobol points within the ranges (chosen)."""
+CASE = "all chosen values varied together: share that holds"
+"""Case of a claim for the joint variation."""
+OBSERVED = 1.5
+"""Time after the release [s] that contains the first four turning points of all cases (chosen)."""
+
+
+@dataclasses.dataclass(frozen=True)
+class JointCase:
+    """One combination of the chosen values, and the values of the four statements for it."""
+
+    design: str
+    parameters: UnpublishedParameters
+    values: dict[str, float]
+
+    def describe(self) -> str:
+        """The varied parameters with their values."""
+        items = [(name.replace("_", " "), getattr(self.parameters, name)) for name in VARIED]
+        scaled = [(name, item.value / 1e3, "kPa") if item.unit == "Pa" else (name, item.value, item.unit)
+                  for name, item in items]  # fmt: skip
+        return ", ".join(f"{name} {format_quantity(value, unit)}" for name, value, unit in scaled)
+
+
+def share(cases: Sequence[JointCase], key: str, design: str | None = None) -> float:
+    """The share [1] of the cases, of one design or of all, for which a statement holds; a missing value does not."""
+    return float(np.mean([agrees(key, case.values[key]) for case in cases if design in (None, case.design)]))
+
+
+def worst_case(cases: Sequence[JointCase], key: str) -> JointCase:
+    """The case that is nearest to a violation of a statement, or violates it most."""
+    values = np.array([case.values[key] for case in cases])
+    margin = values if agrees(key, np.inf) else -values
+    return cases[int(np.argmin(np.where(np.isnan(values), -np.inf, margin)))]
+
+
+def joint_variation(parameters: UnpublishedParameters) -> list[JointCase]:
+    """Return the four statements at all corners of the ranges, for both force maps, and at Sobol points within them."""
+    run = functools.cache(release)  # corners share their releases
+    nominal = {"low_pressure": parameters.low_pressure, "high_pressure": parameters.high_pressure}
+
+    def case(design: str, values: Sequence[float], data: str) -> JointCase:
+        point = parameters
+        for name, value in zip(VARIED, values, strict=True):
+            point = point.with_value(name, value)
+        shared = dataclasses.replace(point, **nominal)
+        low, high = (run(shared, pressure.value, data, RELEASED_AT + OBSERVED)
+                     for pressure in (point.low_pressure, point.high_pressure))  # fmt: skip
+        return JointCase(design, point, compare_releases(low, high))
+
+    ranges = [(getattr(parameters, name).low, getattr(parameters, name).high) for name in VARIED]
+    sobol = Sobol(SOBOL_POINTS).values([Uniform(low, high) for low, high in ranges]).tolist()
+    corners = [case(f"corners, {data}", point, data) for data in FORCE_MAPS for point in itertools.product(*ranges)]
+    return [*corners, *(case("Sobol set", point, FORCE_MAPS[0]) for point in sobol)]
+
+
+def joint_table(cases: Sequence[JointCase]) -> Table:
+    """Return the share of the joint variations for which each statement holds, and its extreme values."""
+    columns: dict[str, list[Any]] = {"statement": list(STATEMENTS)}
+    for design, count in Counter(case.design for case in cases).items():
+        columns[f"holds, {design}, {count} cases [%]"] = [100 * share(cases, key, design) for key in STATEMENTS]
+    values = {key: [case.values[key] for case in cases] for key in STATEMENTS}
+    columns["minimum"] = [float(np.nanmin(each)) for each in values.values()]
+    columns["maximum"] = [float(np.nanmax(each)) for each in values.values()]
+    columns["worst case"] = [worst_case(cases, key).describe() for key in STATEMENTS]
+    return titled("hosovsky_release_joint", columns)
+
+
+def joint_claims(cases: Sequence[JointCase]) -> list[Claim]:
+    """Return the share of the joint variations for which each claim on Fig. 4 holds, as a case of that claim."""
+    result, designs = [], dict.fromkeys(case.design for case in cases)
+    for key, row in STATEMENTS.items():
+        values, worst = [case.values[key] for case in cases], worst_case(cases, key)
+        shares = "; ".join(f"{design} {100 * share(cases, key, design):.3g} %" for design in designs)
+        note = (
+            f"Share of {len(cases)} combinations of all chosen values for which it holds: {shares}. Values "
+            f"{np.nanmin(values):.3g} to {np.nanmax(values):.3g} {format_unit(row.unit)}".rstrip()
+            + f"; worst case: {worst.describe()} ({worst.design})."
+        )
+        joint = dataclasses.replace(row, printed=AtLeast(100.0, derived=True), unit="%")
+        result.append(joint.claim(rig.PAPER, CASE, 100 * share(cases, key), note))
+    return result
