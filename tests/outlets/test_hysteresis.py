@@ -29,8 +29,8 @@ from airmuscle.bench import (
 from airmuscle.bench.identify.campaign import creep_force
 from airmuscle.bench.identify.hysteresis import hysteresis_chapters, plot_loops
 from airmuscle.files import load, load_scenario, save
-from airmuscle.files.library import Location, build_muscle
-from airmuscle.physics import CreepElements, MaxwellSlip
+from airmuscle.files.library import PLANT_READER, Location
+from airmuscle.physics import CreepElements, MaxwellSlip, Muscle
 from airmuscle.recording import Recording
 
 SLIP = MaxwellSlip((2e4, 1e4, 3e3), (3e-4, 1.2e-3, 5e-3))
@@ -170,7 +170,9 @@ def test_without_a_muscle_the_friction_stands_in_a_table_that_a_plant_takes(two,
     assert found["recommended"] in {row["law"] for row in found["laws"]}
     assert "rms_error_on_second_run" not in found["laws"][0], "one run has no second"
     table = tomllib.loads((tmp_path / "friction.toml").read_text(encoding="utf-8"))
-    muscle = build_muscle({"library": MUSCLE, **table}, Location("scenario.toml", "plant.muscle", tmp_path))
+    muscle = PLANT_READER.build(
+        {"library": MUSCLE, **table}, Location("scenario.toml", "plant.muscle", tmp_path), kind=Muscle
+    )
     assert type(muscle.friction.inner).__name__ == found["recommended"]
 
 

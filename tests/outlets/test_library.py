@@ -16,7 +16,7 @@ from airmuscle.bench import fit
 from airmuscle.core import cite
 from airmuscle.errors import AirmuscleError, AirmuscleWarning, FileError, ParameterError, UnitError, UnknownNameError
 from airmuscle.files import Entry, library
-from airmuscle.files.library import Location, build_muscle, files, model_class, model_names, write
+from airmuscle.files.library import PLANT_READER, Location, files, model_class, model_names, write
 from airmuscle.physics import (
     BoucWen,
     Braid,
@@ -31,6 +31,7 @@ from airmuscle.physics import (
     LinearSpring,
     LuGre,
     MaxwellSlip,
+    Muscle,
     NoFriction,
     PrandtlIshlinskii,
     PressureDamper,
@@ -162,8 +163,10 @@ def test_a_plant_takes_over_the_friction_of_its_muscle_file_unless_it_states_ano
     write.save(entry, tmp_path / "muscle.toml")
     table = {"library": "muscle.toml", "damper": {"model": "LinearDamper", "damping": 100.0}}
     place = Location("scenario.toml", "plant.muscle", tmp_path)
-    assert build_muscle(table, place).friction == FRICTION[0]
-    assert build_muscle({**table, "friction": {"model": "NoFriction"}}, place).friction == NoFriction()
+    assert PLANT_READER.build(table, place, kind=Muscle).friction == FRICTION[0]
+    assert (
+        PLANT_READER.build({**table, "friction": {"model": "NoFriction"}}, place, kind=Muscle).friction == NoFriction()
+    )
 
 
 def test_a_muscle_file_carries_wall_stop_and_creep(tmp_path: Path):

@@ -13,7 +13,7 @@ from ..bench.identify import LoadRange, fit_monotone
 from ..bench.identify.statistics import CorrelationIndex, correlation_index
 from ..core import AirmuscleWarning, Array, autodiff, bar
 from ..core.plotting import BLACK, BLUE, DASHES, LINES, MARKERS, ORANGE, RED, legend_outside, new_figure
-from ..files.library.entry_file import load_law
+from ..files.library.loading import load_law
 from ..physics.muscle.characteristic.borzikova import SAM_30X290, PlaneCurves
 from ..report.chapter import Plot
 from .run import captioned

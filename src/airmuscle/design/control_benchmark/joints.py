@@ -8,7 +8,7 @@ from typing import Any
 
 from ...core import ParameterError, ShortRepr, check_field_types, leaves
 from ...engine.loop import ColumnSensor, Driver, SolenoidDriver
-from ...files.library.entry_file import load_law
+from ...files.library.loading import load_law
 from ...physics import Dahl, JointWithExternalTorque, LinearDamper, Plant
 from ...physics.equilibrium import find_equilibrium
 from ...physics.pneumatics import FillDischarge, Orifice, Polytropic, Supply, TubeOrifice, Valve

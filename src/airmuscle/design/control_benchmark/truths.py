@@ -10,7 +10,7 @@ import numpy as np
 
 from ...core import Reference, ShortRepr, Value, model, ops, parameter, published
 from ...engine.loop import Driver, SolenoidDriver
-from ...files.library.entry_file import load_law
+from ...files.library.loading import load_law
 from ...physics import FillDischarge, ForceLaw, LinearDamper, Orifice, Plant, SubsonicIndexValve, TonduLopez2000
 from ...physics.mechanism import AntagonisticJoint, JointWithExternalTorque
 from ...physics.muscle.friction import BoucWen, Friction, LuGre, MaxwellSlip

@@ -5,10 +5,6 @@ from .entry import PlantEntry as PlantEntry
 from .entry import ProductEntry as ProductEntry
 from .entry import ValveEntry as ValveEntry
 from .entry import verify as verify
-from .entry_file import build_entry as build_entry
-from .entry_file import load_law as load_law
-from .entry_file import load_product as load_product
-from .entry_file import load_valve as load_valve
 from .fields import PACKAGES as PACKAGES
 from .fields import allow_code as allow_code
 from .fields import is_code_allowed as is_code_allowed
@@ -27,12 +23,15 @@ from .files import list_valves as list_valves
 from .files import located_errors as located_errors
 from .files import read_toml as read_toml
 from .fitted_entry import list_files as list_files
-from .plant_file import PLANT_READER as PLANT_READER
-from .plant_file import build_muscle as build_muscle
-from .plant_file import build_plant as build_plant
-from .plant_file import load as load
-from .plant_file import load_data as load_data
-from .plant_file import plant_tables as plant_tables
+from .loading import PLANT_READER as PLANT_READER
+from .loading import build_entry as build_entry
+from .loading import build_plant as build_plant
+from .loading import load as load
+from .loading import load_data as load_data
+from .loading import load_law as load_law
+from .loading import load_product as load_product
+from .loading import load_valve as load_valve
+from .loading import plant_tables as plant_tables
 from .scaling import scale_entry as scale_entry
 from .scaling import scale_to_length as scale_to_length
 from .uncertainty import ParameterUncertainty as ParameterUncertainty
@@ -44,11 +43,9 @@ from .write import write_text as write_text
 
 # isort: split
 # For the other rooms, not in __all__
-from . import plant_file as plant_file
 from .build import TableReader as TableReader
 from .build import only_class as only_class
 from .entry_display import PARTS as PARTS
-from .entry_file import kind_of as kind_of
 from .evaluation import UNITS as UNITS
 from .evaluation import evaluate as evaluate
 from .fields import custom_field as custom_field
@@ -64,7 +61,9 @@ from .fitted_entry import campaign_entry as campaign_entry
 from .fitted_entry import find_initial_law as find_initial_law
 from .fitted_entry import missing_geometry as missing_geometry
 from .fitted_entry import resting_lengths as resting_lengths
-from .plant_file import SCENARIO_TABLES as SCENARIO_TABLES
+from .loading import SCENARIO_TABLES as SCENARIO_TABLES
+from .loading import SIZES as SIZES
+from .loading import kind_of as kind_of
 from .scaling import own_length as own_length
 from .uncertainty import PREDICTED as PREDICTED
 from .write import model_table as model_table

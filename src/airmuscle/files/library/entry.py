@@ -38,10 +38,6 @@ CONDITIONS = {
 """Quantities of a check, each with its unit and the quantities on which it depends; a flow is that of a valve."""
 
 
-def _condition(unit: str, symbol: str, meaning: str) -> Any:
-    return parameter(unit, symbol, meaning, default=None)
-
-
 @dataclasses.dataclass(frozen=True)
 class Check:
     """Published value that an entry must reproduce within a tolerance: a quantity at given values of others, all SI.
@@ -53,11 +49,11 @@ class Check:
     source: str
     equals: float = parameter("1", "x", "published value")
     tolerance: float = parameter("1", "dx", "permitted deviation")
-    pressure: float | None = _condition("Pa", "p", "gauge pressure")
-    contraction: float | None = _condition("1", "eps", "contraction")
-    force: float | None = _condition("N", "F", "force")
-    upstream: float | None = _condition(ABSOLUTE, "p_1", "absolute pressure upstream of a valve")
-    downstream: float | None = _condition(ABSOLUTE, "p_2", "absolute pressure downstream of a valve")
+    pressure: float | None = parameter("Pa", "p", "gauge pressure", default=None)
+    contraction: float | None = parameter("1", "eps", "contraction", default=None)
+    force: float | None = parameter("N", "F", "force", default=None)
+    upstream: float | None = parameter(ABSOLUTE, "p_1", "absolute pressure upstream of a valve", default=None)
+    downstream: float | None = parameter(ABSOLUTE, "p_2", "absolute pressure downstream of a valve", default=None)
 
     def __post_init__(self) -> None:
         check_field_types(self)
@@ -91,10 +87,9 @@ def _conditions_of(quantity: Any) -> tuple[str, tuple[str, ...]]:
 class Entry(EntryDisplay):
     """Library entry of a muscle or a law, all numbers SI; `muscle` is the Muscle for use in a plant.
 
-    `provenance` is the origin of the numbers, words of PROVENANCES between commas, `warning` a restriction of use,
-    which is issued when the entry is loaded, `validity_range` the range of the measurements or the publication,
-    `uncertainty` the standard errors and correlations of fitted parameters, if the file states them, `error_band` the
-    95 % band of the predicted quantity, `ratings` the values that the maker of the muscle permits, if known.
+    `validity_range` is the range of the measurements or the publication, `uncertainty` the standard errors and
+    correlations of fitted parameters, if the file states them, `error_band` the 95 % band of the predicted quantity,
+    `ratings` the values that the maker of the muscle permits, if known.
     """
 
     characteristic: Characteristic
@@ -137,10 +132,7 @@ class SwitchingTimes:
 
 @dataclasses.dataclass(frozen=True, repr=False)
 class ValveEntry(EntryDisplay):
-    """Library entry of a valve, all numbers SI; `valve` and `exhaust` are the orifices for use in a circuit.
-
-    `provenance` is the origin of the numbers, `note` states what was published and how it was converted.
-    """
+    """Library entry of a valve, all numbers SI; `valve` and `exhaust` are the orifices for use in a circuit."""
 
     valve: Orifice
     exhaust: Orifice | None = None
@@ -191,7 +183,7 @@ class PlantEntry(EntryDisplay):
     """Plant of the library, all numbers SI; its file has the tables of a scenario, and the source of each number.
 
     `sources` are pairs of a path in the file, such as mechanism.radius, and the source of the numbers under it:
-    "chosen" if no publication states them. `warning` is issued when the plant is loaded.
+    "chosen" if no publication states them.
     """
 
     plant: Plant
@@ -235,13 +227,10 @@ class CheckResult:
 
 def verify(entry: Entry) -> tuple[CheckResult, ...]:
     """Results of all checks of a library entry. Raises SolveError if the model has no solution."""
-    return tuple(CheckResult(check, _compute(entry, check)) for check in entry.checks)
-
-
-def _compute(entry: Entry, check: Check) -> float:
-    conditions = dict(check.conditions)
-    if check.quantity != "volume":
-        return float(getattr(entry.characteristic, check.quantity)(**conditions))
-    if entry.geometry is None:
-        raise ParameterError(f"{entry.name}: a check of the volume requires a [geometry] in the file.")
-    return float(entry.geometry.volume(**conditions))
+    results = []
+    for check in entry.checks:
+        model: Any = entry.geometry if check.quantity == "volume" else entry.characteristic
+        if model is None:
+            raise ParameterError(f"{entry.name}: a check of the volume requires a [geometry] in the file.")
+        results.append(CheckResult(check, float(getattr(model, check.quantity)(**dict(check.conditions)))))
+    return tuple(results)

@@ -39,8 +39,8 @@ FLOW_SUPPLY = 7e5
 class EntryDisplay(Reported, abc.ABC):
     """Base of the library entries: what all of them state, the check of their fields, and their description.
 
-    `provenance` is the origin of the numbers, words of PROVENANCES between commas, `warning` a restriction of use,
-    which is issued when the entry is loaded.
+    `provenance` is the origin of the numbers, words of PROVENANCES between commas, `note` what was published and how it
+    was converted, `warning` a restriction of use, which is issued when the entry is loaded.
     """
 
     name: str = dataclasses.field(metadata={"key": ""})

@@ -9,7 +9,7 @@ from typing import Any
 from ...bench.reported import Reported
 from ...core import check_above_vacuum, contraction_text, quantity, quantity_text
 from ...core.errors import AirmuscleWarning, GeometryLimitError, ParameterError, PhysicsError, RatingError, SolveError
-from ...physics.muscle.characteristic import Characteristic, ForceLaw, ValidityRange, validity_range_of
+from ...physics.muscle.characteristic import ForceLaw, ValidityRange, validity_range_of
 from ...physics.muscle.isobars import Isobars, WorkingPoint, compute_isobars, describe_point, isobar_figure
 from ...report.chapter import Chapter, NamedValue, Plot, Table, TableColumn
 from . import Entry, own_length
@@ -58,13 +58,13 @@ class Evaluation(Reported):
             values.append(NamedValue("stiffness per contraction", stiffness, "N", brief=False))
         elif stiffness is not None:
             values.append(NamedValue("stiffness per contraction", stiffness, "N", "N/%", remark="at constant pressure"))
-        caption = f"{self.entry.title}: force over contraction at constant gauge pressure."
-        caption += f" Working point: {describe_point(point)}."
+        law, title = self.entry.characteristic, self.entry.title
+        caption = f"{title}: force over contraction at constant gauge pressure. Working point: {describe_point(point)}."
         inside = None if limits is None else bool(limits.contains(point.pressure, point.contraction))
         permitted = None if ratings is None else not ratings.excesses(**point._asdict())
         return Chapter(
             name="evaluation",
-            title=f"{self.entry.name}: {self.entry.title}",
+            title=f"{self.entry.name}: {title}",
             summary="",
             values=(
                 *values,
@@ -73,13 +73,8 @@ class Evaluation(Reported):
                 NamedValue("inside the validity range", inside, brief=False),
                 NamedValue("permitted", permitted, brief=False),
             ),
-            plots=(Plot("isobars", caption, self._figure),),
+            plots=(Plot("isobars", caption, lambda: isobar_figure(law, title, self.isobars(), limits, point)),),
         )
-
-    def _figure(self) -> Any:
-        """The isobars with the point and the validity range."""
-        law, title = self.entry.characteristic, self.entry.title
-        return isobar_figure(law, title, self.isobars(), self.validity_range, self.point)
 
     def isobars(self) -> Isobars:
         """The isobars of the law, with that of the point."""
@@ -88,12 +83,10 @@ class Evaluation(Reported):
     def isobar_table(self) -> Table:
         """The isobars as a table with one column of tensions per pressure."""
         curves = self.isobars()
-        columns = {
-            f"force at {pressure / 1e3:.6g} kPa": TableColumn(forces, "N")
-            for pressure, forces in zip(curves.pressures, curves.forces, strict=True)
-        }
-        first = {"contraction": TableColumn(curves.contractions, "1")}
-        return Table("isobars", "Isobars", first | columns, "Gauge pressures.", series=True)
+        columns = {"contraction": TableColumn(curves.contractions, "1")}
+        for pressure, forces in zip(curves.pressures, curves.forces, strict=True):
+            columns[f"force at {pressure / 1e3:.6g} kPa"] = TableColumn(forces, "N")
+        return Table("isobars", "Isobars", columns, "Gauge pressures.", series=True)
 
 
 def evaluate(entry: Entry, given: Mapping[str, Any]) -> Evaluation:
@@ -110,8 +103,17 @@ def evaluate(entry: Entry, given: Mapping[str, Any]) -> Evaluation:
     law, solved = entry.characteristic, unknown[0]
     if "pressure" in values:
         check_above_vacuum(values["pressure"])
-    if "contraction" in values and isinstance(law, ForceLaw):  # the other laws check it themselves
-        _check_contraction(law, values["contraction"])
+    if (contraction := values.get("contraction")) is not None and isinstance(
+        law, ForceLaw
+    ):  # others check it themselves
+        low, high = law.contraction_range
+        if not low <= contraction <= high:
+            as_percentage = contraction >= 1.0 and contraction / 100 <= high
+            hint = f" For a percentage, write '{contraction:g} %'." if as_percentage else ""
+            raise GeometryLimitError(
+                f"contraction: {100 * contraction:.6g} % is outside the range of {type(law).__name__}, "
+                f"{100 * low:.4g} to {100 * high:.4g} %.{hint}"
+            )
     point = WorkingPoint(**values, **{solved: float(getattr(law, solved)(*values.values()))})
     if not math.isfinite(sum(point)) or (solved == "contraction" and not -0.5 <= point.contraction < 1.0):
         raise SolveError(
@@ -124,22 +126,8 @@ def evaluate(entry: Entry, given: Mapping[str, Any]) -> Evaluation:
     return found
 
 
-def _check_contraction(law: Characteristic, contraction: float) -> None:
-    low, high = law.contraction_range
-    if not low <= contraction <= high:
-        as_percentage = contraction >= 1.0 and contraction / 100 <= high
-        hint = f" For a percentage, write '{contraction:g} %'." if as_percentage else ""
-        raise GeometryLimitError(
-            f"contraction: {100 * contraction:.6g} % is outside the range of {type(law).__name__}, {100 * low:.4g} to "
-            f"{100 * high:.4g} %.{hint}"
-        )
-
-
 def _warnings(found: Evaluation) -> Iterator[str]:
-    """That a point is measured but not permitted, slack, or extrapolated.
-
-    Raises RatingError for one that is neither permitted nor measured.
-    """
+    """That a point is measured but not permitted, slack, or extrapolated. Raises RatingError as `evaluate`."""
     point, ratings, limits = found.point, found.entry.ratings, found.validity_range
     is_measured = limits is not None and limits.contains(point.pressure, point.contraction)
     if excesses := "; ".join(ratings.excesses(**point._asdict()) if ratings is not None else ()):

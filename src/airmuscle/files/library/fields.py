@@ -31,11 +31,11 @@ PACKAGES = (characteristic, estimation, friction, geometry, laws, loop, mechanis
 def _registry() -> dict[str, type[Any]]:
     """All model classes by name."""
     exported = {name: getattr(package, name) for package in PACKAGES for name in package.__all__}
-    return {name: thing for name, thing in exported.items() if inspect.isclass(thing) and _is_file_model(thing)}
+    return {name: thing for name, thing in exported.items() if _is_file_model(thing)}
 
 
-def _is_file_model(cls: type[Any]) -> bool:
-    return getattr(cls, "from_file", False) and not inspect.isabstract(cls)
+def _is_file_model(cls: Any) -> bool:
+    return inspect.isclass(cls) and getattr(cls, "from_file", False) and not inspect.isabstract(cls)
 
 
 @functools.cache
@@ -113,9 +113,10 @@ def _class_of_code(name: str, where: str) -> type[Any]:
         ) from None
     finally:
         sys.path.remove("")
-    if not (inspect.isclass(cls) and _is_file_model(cls)):
+    if not _is_file_model(cls):
         raise UnknownNameError(f"{where}: '{one_line(name)}' is no class that is declared with @model.")
-    return cls
+    found: type[Any] = cls
+    return found
 
 
 Reader = Callable[[Any, Any, Location], Any]
@@ -149,20 +150,15 @@ def check_required(
         key = field.metadata.get("key", field.name)
         hint = hints[field.name]
         if is_named:
-            text = f"{cls.__name__} needs '{key}' {_describe_field(field, hint)}; it is missing"
+            facts = field.metadata
+            unit = f"[{facts['unit']}] ({facts['symbol']}, " if "unit" in facts else "("
+            text = f"{cls.__name__} needs '{key}' {unit}{facts.get('meaning') or describe_type(hint)}); it is missing"
         elif "meaning" in field.metadata:
             text = f"'{key}' is missing: {field.metadata['meaning']}"
         else:
             what = f"the table [{key}]" if describes_tables(hint) else f"'{key}'"
             text = f"{what} is missing; it must be {describe_type(hint)}"
         raise ParameterError(f"{location}: {text}.")
-
-
-def _describe_field(field: dataclasses.Field[Any], hint: Any) -> str:
-    facts = field.metadata
-    if "unit" in facts:
-        return f"[{facts['unit']}] ({facts['symbol']}, {facts['meaning']})"
-    return f"({facts.get('meaning') or describe_type(hint)})"
 
 
 def read_parameter(value: Any, declared: Parameter, hint: Any, location: Location) -> Any:
@@ -172,24 +168,18 @@ def read_parameter(value: Any, declared: Parameter, hint: Any, location: Locatio
     """
     where, many = location.at(declared.name), origin(hint) is tuple
     unit, about = declared.unit, f" ({declared.symbol}, {declared.meaning})"
-    if isinstance(value, Mapping) and many:
-        return _read_column(value, where)
+    if isinstance(value, Mapping) and many:  # a column of a data file, in the SI unit of recordings
+        if set(value) != {"file", "column"} or not all(isinstance(v, str) for v in value.values()):
+            example = 'write a column of a file as { file = "data/map.csv", column = "force" }'
+            raise ParameterError(f"{where} is {abridged(value)}; {example}.")
+        with located_errors(where):
+            return tuple(float(v) for v in read_csv(where.folder / value["file"])[value["column"]])
     if isinstance(value, list) != many:
         expected = "a list of numbers" if many else "one number"
         raise ParameterError(f"{where} is {abridged(value)}; it must be {expected} in {unit}{about}.")
     if many:
         return tuple(read_number(item, unit, f"{where}[{i}]", about) for i, item in enumerate(value))
     return read_number(value, unit, where, about)
-
-
-def _read_column(value: Mapping[str, Any], where: Location) -> tuple[float, ...]:
-    """Column of a data file as a tuple, in the SI unit of recordings."""
-    if set(value) != {"file", "column"} or not all(isinstance(v, str) for v in value.values()):
-        raise ParameterError(
-            f'{where} is {abridged(value)}; write a column of a file as {{ file = "data/map.csv", column = "force" }}.'
-        )
-    with located_errors(where):
-        return tuple(float(v) for v in read_csv(where.folder / value["file"])[value["column"]])
 
 
 def options(hint: Any) -> tuple[Any, ...]:

@@ -168,7 +168,10 @@ def complete_name(name: str, known: Iterable[str], kind: str) -> str:
     if len(matches) > 1:
         raise UnknownNameError(f"'{one_line(name)}' is ambiguous: {', '.join(matches)}. Write more of the name.")
     if not matches:
-        hint = _file_in_folder(name) or suggestion(folded, known) or _names_with(folded, known)
+        words = [word for word in (folded, *folded.split("-")) if len(word) > 2]
+        similar = list(dict.fromkeys(name for word in words for name in known if word in name.lower()))[:3]
+        containing = f" Did you mean {' or '.join(map(repr, similar))}?" if similar else ""
+        hint = _file_in_folder(name) or suggestion(folded, known) or containing
         raise UnknownNameError(f"no {kind} '{one_line(name)}'; there are {listed(known)}.{hint}")
     return matches[0]
 
@@ -178,13 +181,6 @@ def _file_in_folder(name: str) -> str:
     files = (Path(name) / file for file in ("muscle.toml", "scenario.toml"))
     found = next((file.as_posix() for file in files if 0 < len(name) <= MAX_NAME and file.is_file()), "")
     return f" '{name}' is a folder; write {found}." if found else ""
-
-
-def _names_with(part: str, known: Iterable[str]) -> str:
-    """A sentence with up to three names that contain `part` or one of its words; empty if there are none."""
-    words = [word for word in (part, *part.split("-")) if len(word) > 2]
-    similar = list(dict.fromkeys(name for word in words for name in known if word in name.lower()))[:3]
-    return f" Did you mean {' or '.join(repr(name) for name in similar)}?" if similar else ""
 
 
 def is_path(name_or_path: str | Path) -> bool:

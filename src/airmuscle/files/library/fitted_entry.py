@@ -40,12 +40,19 @@ def find_initial_law(
     initial values cannot be estimated, and for an entry that cannot be scaled.
     """
     if name not in model_names():
-        entry, lengths = _load_law(name), resting_lengths(recordings)
+        try:
+            entry, lengths = load_law(name), resting_lengths(recordings)
+        except UnknownNameError as error:  # the message also lists the laws
+            if is_path(name):
+                raise
+            laws = model_names(Characteristic)
+            text = f" Or name a law: {', '.join(laws)}.{suggestion(name, laws)}"
+            raise UnknownNameError(HintedText(error.message, text)) from None
         return InitialLaw(entry_at_length(entry, *lengths, f"{option} {name}") if len(lengths) == 1 else entry)
     cls = model_class(name, option)
     if not issubclass(cls, Characteristic):
-        laws = ", ".join(model_names(Characteristic))
-        raise ParameterError(f"{option}: {name} is not a characteristic; there are {laws}.")
+        known = ", ".join(model_names(Characteristic))
+        raise ParameterError(f"{option}: {name} is not a characteristic; there are {known}.")
     if issubclass(cls, ContractileSurface):
         return InitialLaw(Entry(name, name, "chosen", cls.guess(recordings, degree)))
     for candidate in standard_candidates(recordings):
@@ -57,18 +64,6 @@ def find_initial_law(
         f"{option}: {name} needs initial values, which cannot be estimated from these data. Give a library entry of "
         f"this model (see airmuscle list) or a muscle file with initial values.{length}"
     )
-
-
-def _load_law(name: str) -> Entry:
-    """A library entry or muscle file; the error for another name also lists the laws."""
-    try:
-        return load_law(name)
-    except UnknownNameError as error:
-        if is_path(name):
-            raise
-        laws = model_names(Characteristic)
-        text = f" Or name a law: {', '.join(laws)}.{suggestion(name, laws)}"
-        raise UnknownNameError(HintedText(error.message, text)) from None
 
 
 def resting_lengths(recordings: Sequence[Recording]) -> tuple[float, ...]:
@@ -123,19 +118,15 @@ def _error_band(
     source = f"95 % quantile of the residuals of {size} rows of the fit"
     if ratio != 1.0:
         source += f", times {ratio:.3g}, the ratio of the rms errors of rows left out and of all rows"
-    return band_of_others(band_range(StatedBand(result.fitted_quantity.name, half, source), recordings), errors)
+    return _complete_band(StatedBand(result.fitted_quantity.name, half, source), recordings, errors)
 
 
-def band_of_others(band: StatedBand, errors: SpecimenErrors | None) -> StatedBand:
-    """The band with that of specimens that were not measured; unchanged without errors, or for a law without force."""
-    if errors is None or band.quantity != "force":
-        return band
-    return dataclasses.replace(band, new_specimen_half_width=errors.half_width, new_specimen_source=str(errors))
-
-
-def band_range(band: StatedBand, recordings: Sequence[Recording]) -> StatedBand:
-    """The band with the specimens, the resting lengths and the maximum rates of the records that it holds for."""
+def _complete_band(band: StatedBand, recordings: Sequence[Recording], errors: SpecimenErrors | None) -> StatedBand:
+    """The band with the specimens, resting lengths and maximum rates of the records that it holds for, and, of a force,
+    with that of specimens that were not measured, if their errors are known."""
     timed = [run for run in recordings if "time" in run]
+    if errors is not None and band.quantity == "force":
+        band = dataclasses.replace(band, new_specimen_half_width=errors.half_width, new_specimen_source=str(errors))
     return dataclasses.replace(
         band,
         specimens=specimens_of(recordings),
@@ -171,6 +162,9 @@ def campaign_entry(campaign: Campaign, title: str, resting_length: float | None 
         cause = reason if isinstance(stage, StaticStage) else stage.reason
         raise IdentificationError(f"no muscle can be written, because there is no static law for the force: {cause}.")
     friction, creep = campaign.friction, campaign.creep_elements
+    used = sum(record.kind.value != "unused" for record in campaign.records)
+    note = f"Identified from {used} of {len(campaign.records)} records. {stage.band}"
+    left_out = [name for name, result in campaign.stages if hasattr(result, "remedy")]
     return Entry(
         name="muscle",
         title=title,
@@ -180,32 +174,25 @@ def campaign_entry(campaign: Campaign, title: str, resting_length: float | None 
         damper=campaign.release.damper if isinstance(campaign.release, ReleaseStage) else None,
         friction=None if isinstance(friction, NoFriction) else friction,
         creep=creep if creep.stiffnesses else None,
-        note=_note(campaign, stage),
+        note=f"{note} Not identified: {', '.join(left_out)}." if left_out else note,
         validity_range=stage.fit.validity_range,
         uncertainty=_uncertainty(campaign, stage),
         error_band=_stated_band(campaign, stage, length),
     )
 
 
-def _note(campaign: Campaign, stage: StaticStage) -> str:
-    used = sum(record.kind.value != "unused" for record in campaign.records)
-    left_out = [name for name, result in campaign.stages if hasattr(result, "remedy")]
-    text = f"Identified from {used} of {len(campaign.records)} records. {stage.band}"
-    return f"{text} Not identified: {', '.join(left_out)}." if left_out else text
-
-
 def _stated_band(campaign: Campaign, stage: StaticStage, length: float | None) -> StatedBand:
     """The bands of the muscle of a resting length [m], whose specimens are those of this length."""
     held, runs = stage.held_band, [record.recording for record in campaign.records if record.kind.is_static]
-    band = band_range(StatedBand("force", stage.band.half_width, str(stage.band)), runs)
+    errors = ranked_specimen_errors(stage.comparison.recommended, [stage.comparison], stage.points)
+    band = _complete_band(StatedBand("force", stage.band.half_width, str(stage.band)), runs, errors)
     if held is not None and held.half_width != stage.band.half_width:
         band = dataclasses.replace(band, source=f"{stage.band} {held}", held_half_width=held.half_width)
     if length is not None:
         lengths = resting_lengths_of(runs)
         own = tuple(n for n in band.specimens if abs(lengths.get(n, length) - length) <= LENGTH_TOLERANCE)
         band = dataclasses.replace(band, specimens=own)
-    errors = ranked_specimen_errors(stage.comparison.recommended, [stage.comparison], stage.points)
-    return band_of_others(band, errors)
+    return band
 
 
 def _uncertainty(campaign: Campaign, stage: StaticStage) -> ParameterUncertainty | None:
@@ -216,21 +203,17 @@ def _uncertainty(campaign: Campaign, stage: StaticStage) -> ParameterUncertainty
     known = [i for i, estimate in enumerate(fit.estimates) if np.isfinite(estimate.stderr)]
     names = [f"characteristic.{fit.estimates[i].name}" for i in known]
     errors = [fit.estimates[i].stderr for i in known]
-    blocks = [fit.correlations[np.ix_(known, known)]]
     if isinstance(campaign.release, ReleaseStage):
         damping = campaign.release.fit["muscle.damper.damping"]
         if np.isfinite(damping.stderr):
             names.append("damper.damping")
             errors.append(damping.stderr)
-            blocks.append(np.eye(1))
     if isinstance(campaign.creep, CreepStage):
         count = len(campaign.creep.elements.stiffnesses)
-        paths = [f"creep.{field}[{i}]" for field in ("stiffnesses", "relaxation_times") for i in range(count)]
-        names += paths
+        names += [f"creep.{field}[{i}]" for field in ("stiffnesses", "relaxation_times") for i in range(count)]
         errors += campaign.creep.standard_errors.tolist()
-        blocks += [np.eye(1)] * len(paths)
     if not names:
         return None
-    correlations = block_diag(*blocks)
+    correlations = block_diag(fit.correlations[np.ix_(known, known)], np.eye(len(names) - len(known)))
     np.fill_diagonal(correlations, 1.0)
     return ParameterUncertainty(tuple(names), tuple(errors), tuple(map(tuple, correlations.tolist())))

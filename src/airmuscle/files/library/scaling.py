@@ -53,15 +53,11 @@ def scale_entry(
         f"Scaled to {' and '.join(sizes)}; not measured at this size.",
         f"Not scaled, but as at the original size: {', '.join(parts)}." if parts else "",
     )
-    uncertainty = entry.uncertainty if _fitted_values(entry) == _fitted_values(original) else None
+    old, new = ({f"characteristic.{leaf.path}": leaf.value for leaf in leaves(each.characteristic)}
+                for each in (original, entry))  # fmt: skip
+    fitted = () if entry.uncertainty is None else entry.uncertainty.parameters
+    uncertainty = entry.uncertainty if all(old.get(name) == new.get(name) for name in fitted) else None
     return dataclasses.replace(entry, checks=(), note=" ".join(filter(None, texts)), uncertainty=uncertainty)
-
-
-def _fitted_values(entry: Entry) -> list[float]:
-    """The values of the parameters of which the uncertainty is stated."""
-    names = () if entry.uncertainty is None else entry.uncertainty.parameters
-    values = {f"characteristic.{leaf.path}": leaf.value for leaf in leaves(entry.characteristic)}
-    return [values[name] for name in names if name in values]
 
 
 def own_length(entry: Entry) -> float | None:
@@ -111,12 +107,10 @@ def scale_to_length(thing: T, resting_length: float, where: str) -> T:
     length is returned unchanged. Raises ParameterError, which begins with `where`, for a law or geometry that is not of
     this length and cannot be scaled.
     """
-    different = _different_lengths(thing, resting_length)
-    if not different:
+    if not _different_lengths(thing, resting_length):
         return thing
     scaled = _scale(thing, resting_length)
-    remaining = _different_lengths(scaled, resting_length)
-    if remaining:
+    if remaining := _different_lengths(scaled, resting_length):
         path, length = next(iter(remaining.items()))
         raise ParameterError(
             f"{where}: {path} of {type(thing).__name__} is {length:.4g} m, but the resting length of the data is "

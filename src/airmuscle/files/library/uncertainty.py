@@ -16,22 +16,20 @@ WIDTHS = ("half_width", "held_half_width", "new_specimen_half_width")
 """The half widths, in the unit of the quantity."""
 
 
-def _width(meaning: str, **field: Any) -> Any:
-    return parameter("1", "h", meaning, **field)
-
-
 @dataclasses.dataclass(frozen=True)
 class StatedBand:
     """The half width [SI] of the 95 % band of a predicted quantity, and the rows or groups that it comes from."""
 
     quantity: str
-    half_width: float = _width("half width of the 95 % band for further records of the measured specimens")
+    half_width: float = parameter("1", "h", "half width of the 95 % band for further records of the measured specimens")
     source: str = ""
-    held_half_width: float | None = _width("half width for isometric runs, if it differs", default=None)
+    held_half_width: float | None = parameter("1", "h", "half width for isometric runs, if it differs", default=None)
     specimens: tuple[str, ...] = ()
     """The measured specimens; empty where they are not known."""
     resting_lengths: tuple[float, ...] = parameter("m", "L_0", "their resting lengths, if known", default=())
-    new_specimen_half_width: float | None = _width("half width for other specimens, if known", default=None)
+    new_specimen_half_width: float | None = parameter(
+        "1", "h", "half width for other specimens, if known", default=None
+    )
     new_specimen_source: str = ""
     """The specimens left out of the fit that it comes from."""
     max_contraction_rate: float | None = parameter(

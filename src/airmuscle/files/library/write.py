@@ -110,27 +110,18 @@ def entry_of(thing: Savable) -> Entry:
     if isinstance(thing, Entry):
         return thing
     if isinstance(thing, Fit):
-        return fitted_entry(thing, _of_law(thing.model), [Path(thing.recording.origin)])
-    if isinstance(thing, Muscle):
-        return _of_muscle(thing)
+        return fitted_entry(thing, entry_of(thing.model), [Path(thing.recording.origin)])
     if isinstance(thing, Characteristic):
-        return _of_law(thing)
+        name = type(thing).__name__
+        return Entry(name, name, "chosen", thing, validity_range=getattr(thing, "validity_range", None))
+    if isinstance(thing, Muscle):  # the elements that differ from those of a muscle without any
+        absent = {field.name: field.default for field in dataclasses.fields(Muscle)}
+        parts = {name: getattr(thing, name) for name in OPTIONAL_PARTS if getattr(thing, name) != absent[name]}
+        return Entry(
+            thing.name, f"{thing.name}: {type(thing.contractile).__name__}", "chosen", thing.contractile,
+            thing.geometry, validity_range=thing.validity_range, ratings=thing.ratings, **parts,
+        )  # fmt: skip
     remedy = ""
     if isinstance(thing, Plant):
         remedy = " A plant is written with its run: airmuscle.files.save_scenario(scenario, path)."
     raise ParameterError(f"save: {one_line(thing)} is no muscle, characteristic, fit or entry of the library.{remedy}")
-
-
-def _of_law(law: Characteristic) -> Entry:
-    name = type(law).__name__
-    return Entry(name, name, "chosen", law, validity_range=getattr(law, "validity_range", None))
-
-
-def _of_muscle(muscle: Muscle) -> Entry:
-    """The entry with the elements that differ from those of a muscle without any."""
-    absent = {field.name: field.default for field in dataclasses.fields(Muscle)}
-    parts = {name: getattr(muscle, name) for name in OPTIONAL_PARTS if getattr(muscle, name) != absent[name]}
-    return Entry(
-        muscle.name, f"{muscle.name}: {type(muscle.contractile).__name__}", "chosen", muscle.contractile,
-        muscle.geometry, validity_range=muscle.validity_range, ratings=muscle.ratings, **parts,
-    )  # fmt: skip

@@ -47,85 +47,74 @@ class RecordTable:
     plant: Mapping[str, Any] = custom_field(read_table, "parts of the plant that differ", default_factory=dict)
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Record:
-    """One [[record]] of a file, with the tables and the plant that all records share."""
-
-    row: Any
-    location: Location
-    tables: Mapping[str, Any]
-    shared: Plant
-    given: Recording | None = None
-    """The recording, if it was read before; then the table needs no file."""
-    predicted: bool = False
-    """Whether the record is predicted: then its ambient air replaces that of the plant, which was found elsewhere."""
-
-    def build_experiment(self, observed: Mapping[str, tuple[float, str]]) -> tuple[Experiment, Mapping[str, Any]]:
-        """The record as an experiment, and its table [input]; `observed` has the column of each output.
-
-        Raises FileError, ParameterError, UnitError, UnknownNameError or ColumnError with the location.
-        """
-        row: RecordTable = values.table_reader(self.shared).build(self.row, self.location, kind=RecordTable)
-        table = dict(values.optional_table(self.tables, "input", self.location) if row.input is None else row.input)
-        if "file" in table:  # absolute, because the table is also written to other folders
-            table["file"] = str((self.location.folder / str(table["file"])).resolve())
-        in_input = self.location.inside("input")
-        recording = self._read_recording(row, observed) if self.given is None else self.given
-        kept = (recording["time"] >= row.first) & (recording["time"] <= row.last)
-        if not kept.any():
-            raise ParameterError(f"{recording.origin}: no row from first, {row.first:g} s, to last, {row.last:g} s.")
-        recording = recording.rows(kept)
-        plant = self._build_plant(recording, row)
-        with ambient_pressure(plant.ambient.pressure):
-            signal = build_input_signal(table, plant.input_variables, in_input)
-            with located_errors(in_input):
-                check_signal(plant, signal, 0.0, max(float(recording["time"][-1]) - row.start_time, 1e-9))
-            place = self.location.inside("initial_state")
-            conditions = build_initial_conditions(row.initial_state, plant, recording, place)
-        return Experiment(recording, signal, conditions, row.start_time, plant), table
-
-    def _build_plant(self, recording: Recording, row: RecordTable) -> Plant:
-        """The shared plant with the parts that this record replaces, in the ambient air of the recording unless the
-        file states another one."""
-        tables = {**self.tables["plant"], **row.plant}
-        plant = build_plant(tables, self.location.inside("plant")) if row.plant else self.shared
-        stated = {} if self.predicted else values.optional_table(tables, "ambient", self.location.inside("plant"))
-        measured = stated_ambient(recording, plant.ambient)
-        free = {name: value for name, value in vars(measured).items() if name not in stated}
-        ambient = dataclasses.replace(plant.ambient, **free)
-        return plant if ambient == plant.ambient else dataclasses.replace(plant, ambient=ambient)
-
-    def _read_recording(self, row: RecordTable, observed: Mapping[str, tuple[float, str]]) -> Recording:
-        """The recording of the file, with the observed columns under the names of the outputs."""
-        if not row.file.strip():
-            raise ParameterError(f"{self.location}: 'file' is missing; it must be a text in quotes.")
-        stated = {"resting_length": row.resting_length, "ambient": row.ambient}
-        mapping = mapping_of_tables(stated, f"{self.location}", row.mapping)
-        with located_errors(self.location):
-            runs = read(self.location.folder / row.file, mapping)
-            if len(runs) != 1:
-                raise ParameterError(f"{row.file} contains {len(runs)} runs; give one file for each record.")
-            return with_observed(runs[0], observed, self.shared)
+Observed = Mapping[str, tuple[float, str]]
+"""Standard deviation of the sensor and column of each observed output."""
 
 
 def build_records(
-    tables: Mapping[str, Any], shared: Mapping[str, Any], plant: Plant, observed: Mapping[str, tuple[float, str]],
-    location: Location, predicted: bool = False,
+    tables: Mapping[str, Any], shared: Mapping[str, Any], plant: Plant, observed: Observed, location: Location,
+    predicted: bool = False,
 ) -> list[tuple[Experiment, Mapping[str, Any]]]:  # fmt: skip
-    """The experiments of all [[record]] of a file, with their tables [input]; `shared` has the plant and the input.
-
-    Raises FileError, ParameterError, UnitError, UnknownNameError or ColumnError with the location.
-    """
+    """The experiments of all [[record]] of a file, with their tables [input]; as `build_experiment`."""
     rows = tables.get("record")
     if not isinstance(rows, list) or not rows:
         raise ParameterError(f'{location}: no record is given; write [[record]] with file = "fill.csv" for each.')
     return [
-        Record(row, location.inside(f"record {i}"), shared, plant, predicted=predicted).build_experiment(observed)
+        build_experiment(row, location.inside(f"record {i}"), shared, plant, observed, predicted=predicted)
         for i, row in enumerate(rows, 1)
     ]
 
 
-def with_observed(recording: Recording, observed: Mapping[str, tuple[float, str]], plant: Plant) -> Recording:
+def build_experiment(
+    table: Any, location: Location, shared: Mapping[str, Any], plant: Plant, observed: Observed,
+    recording: Recording | None = None, predicted: bool = False,
+) -> tuple[Experiment, Mapping[str, Any]]:  # fmt: skip
+    """One [[record]] of a file as an experiment, and its table [input].
+
+    shared     tables with the plant and the input of all records
+    recording  if it was read before; then the table needs no file
+    predicted  whether the record is predicted: its ambient air replaces that of the plant, which was found elsewhere
+
+    Raises FileError, ParameterError, UnitError, UnknownNameError or ColumnError with the location.
+    """
+    row: RecordTable = values.table_reader(plant).build(table, location, kind=RecordTable)
+    given = dict(values.optional_table(shared, "input", location) if row.input is None else row.input)
+    if "file" in given:  # absolute, because the table is also written to other folders
+        given["file"] = str((location.folder / str(given["file"])).resolve())
+    recording = _read_recording(row, location, observed, plant) if recording is None else recording
+    kept = (recording["time"] >= row.first) & (recording["time"] <= row.last)
+    if not kept.any():
+        raise ParameterError(f"{recording.origin}: no row from first, {row.first:g} s, to last, {row.last:g} s.")
+    recording = recording.rows(kept)
+    tables, in_plant = {**shared["plant"], **row.plant}, location.inside("plant")
+    plant = build_plant(tables, in_plant) if row.plant else plant
+    stated = {} if predicted else values.optional_table(tables, "ambient", in_plant)
+    measured = vars(stated_ambient(recording, plant.ambient))
+    ambient = dataclasses.replace(plant.ambient, **{n: v for n, v in measured.items() if n not in stated})
+    plant = plant if ambient == plant.ambient else dataclasses.replace(plant, ambient=ambient)
+    with ambient_pressure(plant.ambient.pressure):
+        signal = build_input_signal(given, plant.input_variables, location.inside("input"))
+        with located_errors(location.inside("input")):
+            check_signal(plant, signal, 0.0, max(float(recording["time"][-1]) - row.start_time, 1e-9))
+        place = location.inside("initial_state")
+        conditions = build_initial_conditions(row.initial_state, plant, recording, place)
+    return Experiment(recording, signal, conditions, row.start_time, plant), given
+
+
+def _read_recording(row: RecordTable, location: Location, observed: Observed, plant: Plant) -> Recording:
+    """The recording of the file, with the observed columns under the names of the outputs."""
+    if not row.file.strip():
+        raise ParameterError(f"{location}: 'file' is missing; it must be a text in quotes.")
+    stated = {"resting_length": row.resting_length, "ambient": row.ambient}
+    mapping = mapping_of_tables(stated, f"{location}", row.mapping)
+    with located_errors(location):
+        runs = read(location.folder / row.file, mapping)
+        if len(runs) != 1:
+            raise ParameterError(f"{row.file} contains {len(runs)} runs; give one file for each record.")
+        return with_observed(runs[0], observed, plant)
+
+
+def with_observed(recording: Recording, observed: Observed, plant: Plant) -> Recording:
     """The recording with the observed columns under the names of the outputs [SI]. Raises ColumnError, UnitError."""
     columns = {name: (column, values.signal_unit(name, plant)) for name, (_, column) in observed.items()}
     return recording.with_columns(**{name: recording.in_unit(*column) for name, column in columns.items()})
@@ -140,8 +129,7 @@ class DynamicFitSetup(ShortRepr):
     experiments: tuple[Experiment, ...]
     input_tables: tuple[Mapping[str, Any], ...]
     """The table [input] of each record as written in its file, for the scenarios of the result."""
-    observed: Mapping[str, tuple[float, str]]
-    """Standard deviation of the sensor and column of each observed output."""
+    observed: Observed
     search: values.FitTable
     origin: str = ""
     """Name of the file, for messages."""
@@ -171,26 +159,23 @@ class DynamicFitSetup(ShortRepr):
     def scenario(self, fit: DynamicFit, record: int = 0, cross: Sequence[CrossPrediction] = ()) -> str:
         """Text of a scenario with the fitted plant, the input, the initial state and the duration of a record, and the
         uncertainty of the fit, with the predictions of the records by each other."""
-        plant, origin = fit.plant(record), self.experiments[record].recording.origin
-        note = f"{self.title}: parameters estimated from {', '.join(e.recording.origin for e in self.experiments)}."
+        plant, model = fit.plant(record), fit.problem.record_models[record]
         assert isinstance(plant, Plant)
-        record_model = fit.problem.record_models[record]
-        known = dict(record_model.experiment.initial_conditions.known)
-        for k in record_model.unknown_indices:
-            what = record_model.unknowns[k].target
-            if isinstance(what, InitialValue):
+        origins = [each.recording.origin for each in self.experiments]
+        note = f"{self.title}: parameters estimated from {', '.join(origins)}."
+        known = dict(model.experiment.initial_conditions.known)
+        for k in model.unknown_indices:
+            if isinstance(what := model.unknowns[k].target, InitialValue):
                 known[what.name] = float(fit.values[k])
-        coordinates = plant.mechanism.coordinates
-        given = {name for c in coordinates for name in (c.name, c.speed) if c.name in known}
+        given = {name for c in plant.mechanism.coordinates for name in (c.name, c.speed) if c.name in known}
         start = {name: value for name, value in known.items() if name in given or name in pressure_names(plant)}
-        duration = float(record_model.times[-1]) - record_model.start_time(fit.values)
-        run = {"duration": duration, "initial_state": start}
+        run = {"duration": float(model.times[-1]) - model.start_time(fit.values), "initial_state": start}
         observed = {
             name: deviation if column == name else {"deviation": deviation, "column": column}
             for name, (deviation, column) in self.observed.items()
         }
         fitted = {"observed": observed, "uncertainty": fit_uncertainty(fit, [each.rms for each in cross])}
-        return scenario_toml(f"{self.title}, {origin}", plant, self.input_tables[record], run, note, fitted)
+        return scenario_toml(f"{self.title}, {origins[record]}", plant, self.input_tables[record], run, note, fitted)
 
 
 def load_dynamic_fit(path: str | Path) -> DynamicFitSetup:

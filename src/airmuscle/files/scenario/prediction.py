@@ -19,7 +19,7 @@ from ...physics.muscle.muscle import LENGTH_TOLERANCE
 from ...recording import Recording
 from ...recording.columns import split_unit
 from ..library import Entry, Location, check_keys, located_errors, read_toml, scale_to_length
-from .identification import Record, build_records, with_observed
+from .identification import build_experiment, build_records, with_observed
 from .initial_state import first_value, pressure_names, recorded_pressures
 from .scenario import Scenario, build_scenario, scenario_tables
 from .values import FitTable, optional_table, read_observed, table_reader
@@ -61,7 +61,8 @@ class PlantModel:
                 raise ColumnError(f"no column can be predicted; the plant gives {', '.join(known)}.")
             row = {"start_time": start_time, "initial_state": self._initial_state(recording)}
         place = Location(recording.origin, "", self.location.folder)
-        experiment, _ = Record(row, place, self.tables, self.scenario.plant, recording, True).build_experiment({})
+        plant = self.scenario.plant
+        experiment, _ = build_experiment(row, place, self.tables, plant, {}, recording, predicted=True)
         return self._predict(experiment, {name: self._observed.get(name, (0.0, name))[0] for name in names}, own)
 
     def predict_file(self, path: Path) -> list[RecordPrediction]:
@@ -91,8 +92,7 @@ class PlantModel:
         return {name: (0.0, name) for name in stated} | dict(self.scenario.observed)
 
     def _outputs(self) -> Mapping[str, Any]:
-        plant = self.scenario.plant
-        state = dict(self.scenario.initial_state)
+        plant, state = self.scenario.plant, dict(self.scenario.initial_state)
         return {**plant.outputs(state, dict.fromkeys(plant.inputs, 0.0)), **state}
 
     def _initial_state(self, recording: Recording) -> dict[str, float]:
@@ -111,10 +111,11 @@ class PlantModel:
         self, experiment: Experiment, observed: Mapping[str, float], own: Sequence[RecordUnknown],
         method: Integrator | None = None,
     ) -> RecordPrediction:  # fmt: skip
-        method = method or self.scenario.problem.integrator
+        scenario = self.scenario
+        method = method or scenario.problem.integrator
         with located_errors(experiment.recording.origin):
             return predict_dynamic(
-                self.scenario.plant, experiment, observed, uncertainty=self.scenario.uncertainty, own=own, method=method
+                scenario.plant, experiment, observed, uncertainty=scenario.uncertainty, own=own, method=method
             )
 
 

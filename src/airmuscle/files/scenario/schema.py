@@ -17,7 +17,7 @@ from typing import Any
 from ...core import Parameter, parameters
 from ...engine.loop import RELATIVE, Controller, Driver
 from ...physics import Muscle, Orifice, Plant
-from ..library import PREDICTED, StatedBand, is_code_allowed, model_class, model_names, only_class, plant_file
+from ..library import PREDICTED, SIZES, StatedBand, is_code_allowed, model_class, model_names, only_class
 from ..library.entry import CONDITIONS, PATHS, Check, Entry
 from ..library.fields import is_required, options, origin
 from . import controller, initial_state, plant_uncertainty, scenario, values
@@ -166,7 +166,7 @@ class _ModelSchemas:
         muscle = self.table(Muscle, model_needed=False)
         name = {"description": "a library entry, or a muscle file relative to this file", **_TEXT}
         required = muscle.pop("required")
-        muscle["properties"] |= {"library": name, **{size: _quantity("m", 0.0) for size in plant_file.SIZES}}
+        muscle["properties"] |= {"library": name, **{size: _quantity("m", 0.0) for size in SIZES}}
         return {"anyOf": [name, {**muscle, "anyOf": [{"required": ["library"]}, {"required": required}]}]}
 
     def part(self, hint: Any) -> Schema:

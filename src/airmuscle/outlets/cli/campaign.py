@@ -25,10 +25,10 @@ from ...core.tree import fingerprint
 from ...engine.compile.cache.store import cache_folder, read_private
 from ...files.library import Entry, campaign_entry, resting_lengths, to_toml
 from ...files.scenario.write import campaign_scenarios
-from ...physics.muscle.geometry import Geometry
+from ...physics.muscle.geometry import Braid, Geometry
 from ...recording import Recording
 from ...report.data import as_json
-from ..requests import BraidSize, ReadingRequest, braid_of_length, check_one_length, many, optional, read_braid, request
+from ..requests import ReadingRequest, braid_of_length, check_one_length, many, optional, read_braid, request
 from .delivery import Execution, deliver
 from .measurements import print_row_notes, reading_chapters
 from .options import Folder, Json, argument, with_requests
@@ -61,8 +61,8 @@ class KeptStages:
     def load(self, names: Sequence[str]) -> dict[str, Any]:
         """The results of the stages that an interrupted run has finished, by name."""
         known = {}
-        for name in names:
-            content = None if self._folder is None else read_private(self._path(name))
+        for name, path in self._paths(names).items():
+            content = read_private(path)
             if content is None or hashlib.sha256(content[_HASH:]).digest() != content[:_HASH]:
                 continue
             with contextlib.suppress(Exception):  # written with other versions of the packages
@@ -71,22 +71,22 @@ class KeptStages:
 
     def save(self, name: str, result: object) -> None:
         """Keep the result of a finished stage; a result that cannot be stored is fitted again."""
-        if self._folder is None:
-            return
-        with contextlib.suppress(Exception):  # CasADi raises none of the usual errors
-            content = pickle.dumps(result, protocol=pickle.HIGHEST_PROTOCOL)
-            with atomic_file(self._path(name)) as unfinished:
-                unfinished.write_bytes(hashlib.sha256(content).digest() + content)
+        for path in self._paths([name]).values():
+            with contextlib.suppress(Exception):  # CasADi raises none of the usual errors
+                content = pickle.dumps(result, protocol=pickle.HIGHEST_PROTOCOL)
+                with atomic_file(path) as unfinished:
+                    unfinished.write_bytes(hashlib.sha256(content).digest() + content)
 
     def remove(self, names: Sequence[str]) -> None:
         """Remove the stages of a campaign that is complete."""
-        for name in names if self._folder is not None else ():
+        for path in self._paths(names).values():
             with contextlib.suppress(OSError):
-                self._path(name).unlink(missing_ok=True)
+                path.unlink(missing_ok=True)
 
-    def _path(self, name: str) -> Path:
-        assert self._folder is not None
-        return self._folder / f"campaign-{self._key}-{name.replace(' ', '-')}.stage"
+    def _paths(self, names: Sequence[str]) -> dict[str, Path]:
+        if self._folder is None:
+            return {}
+        return {name: self._folder / f"campaign-{self._key}-{name.replace(' ', '-')}.stage" for name in names}
 
 
 @request
@@ -94,7 +94,7 @@ class CampaignRequest:
     """What a campaign is asked for."""
 
     validate: tuple[Path, ...] = many("Record that is kept aside and predicted; repeatable.", metavar="FILE")
-    braid: BraidSize | None = optional(
+    braid: Braid | None = optional(
         "Braid at rest, such as 'radius=10 mm, angle=24.4 deg'; default: the volume follows from the static law and "
         "fills at several lengths.", metavar="SIZE", read=read_braid,
     )  # fmt: skip

@@ -205,7 +205,18 @@ WRITERS_BY_TARGET: Mapping[str, Callable[[str, Path, ExportRequest], Exported]] 
 
 def _export_program(source: str, out: Path, request: ExportRequest) -> Exported:
     """A law, a controller, or a plant with its run, which is built and run if that is asked for."""
-    paths = _write(source, out, request)
+    if request.law:
+        entry, target = load_law(source), TARGETS[request.to]
+        paths = outlet.write_law(entry.characteristic, out, target, name=request.name, title=entry.title)
+    else:
+        scenario = load_scenario(source)
+        common: dict[str, Any] = {"name": request.name, "title": scenario.title}
+        if request.controller:
+            common |= {"precision": request.precision, "arduino": request.to == "arduino"}
+            paths = outlet.write_controller(scenario.problem, out, tunable=request.tunable, **common)
+        else:
+            common |= {"tunable": request.tunable or None, "columns": scenario.columns}
+            paths = outlet.write_program(scenario.problem, out, TARGETS[request.to], **common)
     instruction = f"run: {_instruction(request.to, paths, request.law, request.controller)}"
     if not request.build:
         return Exported(paths, [instruction])
@@ -217,22 +228,6 @@ def _export_program(source: str, out: Path, request: ExportRequest) -> Exported:
     stack = f", stack {built.stack_size} bytes, both without the C library" if known else ""
     stated = {"output": built.output, "code_bytes": built.code_size, **known}
     return Exported(paths, [f"program: {text}; code {size}{stack}", instruction], stated)
-
-
-def _write(source: str, out: Path, request: ExportRequest) -> tuple[Path, ...]:
-    """Write a law, a controller, or a plant with its run."""
-    if request.law:
-        entry = load_law(source)
-        return outlet.write_law(entry.characteristic, out, TARGETS[request.to], name=request.name, title=entry.title)
-    scenario = load_scenario(source)
-    common: dict[str, Any] = {"name": request.name, "title": scenario.title}
-    if request.controller:
-        return outlet.write_controller(
-            scenario.problem, out, tunable=request.tunable, precision=request.precision,
-            arduino=request.to == "arduino", **common,
-        )  # fmt: skip
-    target, tunable = TARGETS[request.to], request.tunable or None
-    return outlet.write_program(scenario.problem, out, target, tunable=tunable, columns=scenario.columns, **common)
 
 
 def _instruction(to: str, paths: tuple[Path, ...], law: bool, controller: bool) -> str:

@@ -10,7 +10,7 @@ import typer
 
 from ...bench.identify import approximate as approximate_law
 from ...bench.identify.approximation import GRID_POINTS, sample_on_grid
-from ...bench.identify.volume_fit import VolumeFit, fit_volume, volume_chapter, volume_points, volume_summary
+from ...bench.identify.volume_fit import fit_volume, volume_chapter, volume_points, volume_summary
 from ...core import ParameterError, PhysicsError, check_writable
 from ...files.library import Entry, find_initial_law, list_files, load_law, part_toml, resting_lengths, save, to_toml
 from ...physics.muscle.characteristic import ValidityRange, maxwell_defect, validity_range_of
@@ -94,7 +94,11 @@ def fit_volume_command(
         chapter = volume_chapter(fit, f"Volume fitted to {list_files([f.stem for f in files])}", None, None, None)
         contents = {"geometry.toml": part_toml("geometry", fit.geometry)}
     else:
-        law, limits, defect = entry.characteristic, _limits(entry, fit), None
+        law, limits, defect = entry.characteristic, None, None
+        stated, data = validity_range_of(law, entry.validity_range), fit.points.contraction
+        if stated is not None:  # within the contractions of the data
+            low, high = max(stated.min_contraction, float(data.min())), min(stated.max_contraction, float(data.max()))
+            limits = ValidityRange(stated.min_pressure, stated.max_pressure, low, high) if low < high else None
         with contextlib.suppress(PhysicsError):  # slack everywhere
             defect = None if limits is None else maxwell_defect(law, fit.geometry, limits)
         chapter = volume_chapter(fit, entry.title, None if limits is None else law, limits, defect)
@@ -120,16 +124,6 @@ def _length(recordings: Sequence[Recording], entry: Entry | None) -> float:
     if len(lengths) != 1:
         check_one_length(lengths)
     return float(lengths[0])
-
-
-def _limits(entry: Entry, fit: VolumeFit) -> ValidityRange | None:
-    """The validity range of the force law within the contractions of the data; None if there is none."""
-    stated = validity_range_of(entry.characteristic, entry.validity_range)
-    if stated is None:
-        return None
-    low = max(stated.min_contraction, float(fit.points.contraction.min()))
-    high = min(stated.max_contraction, float(fit.points.contraction.max()))
-    return ValidityRange(stated.min_pressure, stated.max_pressure, low, high) if low < high else None
 
 
 LIMIT = "Limit of the validity range; default: that of the muscle."

@@ -88,7 +88,14 @@ def _follow(fit: RecursiveFit, reader: RowReader, request: LiveRequest, json: bo
             if row is None:
                 continue
             if fit.samples + fit.outside == 0:
-                _check_columns(reader, row)
+                for note in reader.notes:
+                    echo(f"note: {note}", err=True)
+                if name := next((each for each in QUANTITIES if each not in row), ""):
+                    remedy = " or a length with --resting-length" if name == "contraction" else ""
+                    raise ColumnError(
+                        f"{reader.origin}: there is no {name}{remedy}; the columns are {', '.join(row)}. Name it with "
+                        f"--column 'NUMBER={name} [unit]'."
+                    )
             fit = fit.updated(*(row[name] for name in QUANTITIES))
             if fit.samples >= printed + request.every:
                 printed = fit.samples
@@ -96,18 +103,6 @@ def _follow(fit: RecursiveFit, reader: RowReader, request: LiveRequest, json: bo
     except KeyboardInterrupt:
         echo("interrupted; the fit to the rows so far follows", err=True)
     return fit
-
-
-def _check_columns(reader: RowReader, row: dict[str, float]) -> None:
-    for note in reader.notes:
-        echo(f"note: {note}", err=True)
-    for name in QUANTITIES:
-        if name not in row:
-            remedy = " or a length with --resting-length" if name == "contraction" else ""
-            raise ColumnError(
-                f"{reader.origin}: there is no {name}{remedy}; the columns are {', '.join(row)}. Name it with "
-                f"--column 'NUMBER={name} [unit]'."
-            )
 
 
 def _report(fit: RecursiveFit, json: bool) -> None:

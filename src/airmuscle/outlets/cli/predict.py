@@ -3,7 +3,7 @@
 from pathlib import Path
 from typing import Annotated, Any
 
-from ...bench import RecordPrediction, StartTime
+from ...bench import StartTime
 from ...bench.identify.prediction.prediction_chapter import prediction_chapters
 from ...core import FileError, check_writable
 from ...files.library import PlantEntry, is_path, kind_of, list_plants, load_law, read_toml
@@ -64,32 +64,23 @@ def predict(
     """
     check_writable(out)
     is_file = is_path(model) or Path(model).exists()
+    tables = [path for path in files if path.suffix == ".toml"]
+    measured = [path for path in files if path not in tables]
+    thing: Any
     if kind_of(read_toml(Path(model))) is PlantEntry if is_file else model in list_plants():
-        thing, predictions = _transient(model, files, reading, request)
+        loaded, margin = load_plant_model(model), request.start_margin
+        recordings = read_recordings(measured, reading) if measured else []
+        own: list[Any] = [*request.own, *([] if margin is None else [StartTime(margin)])]
+        predictions = [loaded.predict_recording(each, request.start_time or 0.0, own) for each in recordings]
+        predictions += (each for path in tables for each in loaded.predict_file(path))
+        thing = loaded.scenario.plant
     elif request.given:
         raise RequestError(f"{', '.join(request.given)} is for a scenario; MODEL is a muscle or a law")
     else:
-        thing, predictions = _static(model, files, reading)
+        thing = load_law(model)
+        if tables:
+            raise FileError(f"{tables[0]}: a file of records is for a scenario; give measurement files for a muscle.")
+        predictions = [predict_with_entry(thing, recording) for recording in read_recordings(files, reading)]
     chapters = prediction_chapters(Path(model).name, thing, predictions)
     chapters += reading_chapters(each.recording for each in predictions)
     deliver("predict", chapters, json=json, out=out, title="Prediction")
-
-
-def _static(model: str, files: list[Path], reading: ReadingRequest) -> tuple[Any, list[RecordPrediction]]:
-    entry = load_law(model)
-    tables = [path for path in files if path.suffix == ".toml"]
-    if tables:
-        raise FileError(f"{tables[0]}: a file of records is for a scenario; give measurement files for a muscle.")
-    return entry, [predict_with_entry(entry, recording) for recording in read_recordings(files, reading)]
-
-
-def _transient(
-    model: str, files: list[Path], reading: ReadingRequest, request: PredictRequest
-) -> tuple[Any, list[RecordPrediction]]:
-    loaded = load_plant_model(model)
-    measured = [path for path in files if path.suffix != ".toml"]
-    recordings = read_recordings(measured, reading) if measured else []
-    unknowns: list[Any] = [*request.own, *([] if request.start_margin is None else [StartTime(request.start_margin)])]
-    predictions = [loaded.predict_recording(each, request.start_time or 0.0, unknowns) for each in recordings]
-    predictions += (each for path in files if path not in measured for each in loaded.predict_file(path))
-    return loaded.scenario.plant, predictions

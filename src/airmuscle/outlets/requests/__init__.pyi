@@ -21,7 +21,6 @@ from .size import SizeRequest as SizeRequest
 from .declaration import Where as Where
 from .fit import SPLITS as SPLITS
 from .fit import WEAK as WEAK
-from .fit import BraidSize as BraidSize
 from .fit import braid_of_length as braid_of_length
 from .fit import check_one_length as check_one_length
 from .fit import problem_of_lengths as problem_of_lengths

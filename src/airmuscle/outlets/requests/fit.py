@@ -5,23 +5,14 @@ The geometry of its muscle is a braid, as --braid or as two fields of a form.
 
 import dataclasses
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 from ...bench.identify import BlockSplit, GroupSplit, Huber, LeastSquares, LevelSplit, Loss, RunSplit, SpecimenSplit
 from ...core import ParameterError, quantity, tree
-from ...files.library import Entry, resting_lengths
+from ...files.library import Entry, located_errors, resting_lengths
 from ...physics.muscle.geometry import Braid, Geometry
 from ...recording import Recording
 from .declaration import RequestError, Where, check_rules, many, option, optional, request
-
-_UNITS = {"radius": "m", "angle": "rad"}
-
-
-class BraidSize(NamedTuple):
-    """Radius [m] and braid angle [rad] at rest."""
-
-    radius: float
-    angle: float
 
 
 @request
@@ -43,38 +34,38 @@ class BraidRequest:
         if len(missing) == 1:
             raise RequestError("a braid needs its radius and its angle.", missing[0])
         try:
-            if self.size is not None:
-                Braid(*self.size, 1.0)
+            _ = self.braid
         except ParameterError as error:
             field = "braid_angle" if "angle" in error.message else "braid_radius"
             raise RequestError(error.message, field) from None
 
     @property
-    def size(self) -> BraidSize | None:
-        """The size of the braid; None if none is stated."""
+    def braid(self) -> Braid | None:
+        """The braid, of unit length; None if none is stated."""
         if self.braid_radius is None or self.braid_angle is None:
             return None
-        return BraidSize(self.braid_radius, self.braid_angle)
+        return Braid(self.braid_radius, self.braid_angle, 1.0)
 
 
-def read_braid(text: str, where: str) -> BraidSize:
-    """The braid that a text describes. Raises RequestError, UnitError or ParameterError."""
-    parts = [(name.strip(), value.strip()) for name, _, value in (part.partition("=") for part in text.split(","))]
-    if sorted(name for name, _ in parts) != sorted(_UNITS):
+def read_braid(text: str, where: str) -> Braid:
+    """The braid of unit length that a text describes. Raises RequestError, UnitError or ParameterError."""
+    parts = {name.strip(): value.strip() for name, _, value in (part.partition("=") for part in text.split(","))}
+    if sorted(parts) != ["angle", "radius"] or text.count(",") > 1:
         raise RequestError(
             f"{where} must give radius and angle once each, such as 'radius=10 mm, angle=24.4 deg', not '{text}'"
         )
-    size = BraidSize(**{name: quantity(value, _UNITS[name], where=f"{where}, {name}") for name, value in parts})
-    braid_of_length(size, 1.0)  # the bounds are checked before any file is read
-    return size
+    units = {"radius": "m", "angle": "rad"}
+    size = {name: quantity(value, units[name], where=f"{where}, {name}") for name, value in parts.items()}
+    with located_errors("--braid"):  # the bounds are checked before any file is read
+        return Braid(size["radius"], size["angle"], 1.0)
 
 
-def with_braid(entry: Entry, size: BraidSize | None, recordings: Sequence[Recording]) -> Entry:
+def with_braid(entry: Entry, braid: Braid | None, recordings: Sequence[Recording]) -> Entry:
     """The entry of an initial law with the braid of --braid as its geometry; unchanged without it.
 
     Raises ParameterError for a law with a geometry of its own, and where the resting length is not known.
     """
-    if size is None:
+    if braid is None:
         return entry
     law = entry.characteristic
     if isinstance(getattr(law, "geometry", None), Geometry):
@@ -84,7 +75,7 @@ def with_braid(entry: Entry, size: BraidSize | None, recordings: Sequence[Record
         )
     inside = {float(leaf.value) for leaf in tree.leaves(law) if leaf.declared.name == "resting_length"}
     length = check_one_length(resting_lengths(recordings) or tuple(inside))
-    return dataclasses.replace(entry, geometry=braid_of_length(size, length))
+    return dataclasses.replace(entry, geometry=braid_of_length(braid, length))
 
 
 def check_one_length(lengths: Sequence[float]) -> float:
@@ -101,11 +92,9 @@ def problem_of_lengths(lengths: Sequence[float]) -> str:
     return "" if len(lengths) == 1 else f"a braid has exactly one resting length; the data state {stated}."
 
 
-def braid_of_length(size: BraidSize, resting_length: float) -> Braid:
-    try:
-        return Braid(size.radius, size.angle, resting_length)
-    except ParameterError as error:
-        raise error.located("--braid") from None
+def braid_of_length(braid: Braid, resting_length: float) -> Braid:
+    with located_errors("--braid"):
+        return dataclasses.replace(braid, resting_length=resting_length)
 
 
 # The fit
@@ -170,7 +159,7 @@ class FitRequest:
         "With --shape: a point of zero force (free contraction), such as '3 bar=18 %'. Repeatable.",
         metavar="PRESSURE=CONTRACTION", read=read_free_contraction,
     )  # fmt: skip
-    braid: BraidSize | None = optional(
+    braid: Braid | None = optional(
         "Braid at rest, such as 'radius=10 mm, angle=24.4 deg' (outer radius; angle between threads and axis): the "
         "[geometry] of a muscle whose law contains none. Requires the resting length.", metavar="SIZE", read=read_braid,
     )  # fmt: skip

@@ -17,7 +17,7 @@ from ...bench.segment.outliers import Outlier, kept_rows, leave_out
 from ...core import AirmuscleError, quantity
 from ...files.library.files import list_laws
 from ..requests import SPLITS as GROUPS
-from ..requests import BraidRequest, BraidSize, ReadingRequest, RequestError, build, form_fields
+from ..requests import BraidRequest, ReadingRequest, RequestError, build, form_fields
 
 MAX_RULES, MAX_CHOICES = 200, 500
 """Maximum number of selections of rows; of corrected columns, or of files with facts of their own (chosen)."""
@@ -82,9 +82,9 @@ class FitSettings:
             raise RequestError(error.message, getattr(error, "field", "") or named) from None
 
     @property
-    def braid(self) -> BraidSize | None:
-        """The size of the braid; None if none is stated. Raises RequestError."""
-        return build(BraidRequest, {name: self.texts[name] for name in BRAID}, _words).size
+    def braid(self) -> am.geometry.Braid | None:
+        """The braid, of unit length; None if none is stated. Raises RequestError."""
+        return build(BraidRequest, {name: self.texts[name] for name in BRAID}, _words).braid
 
 
 def _words(name: str) -> str:

@@ -18,7 +18,7 @@ from ...core import AirmuscleError, Array, ParameterError, is_known_unit
 from ...design.sizing.chapter import product_of, sizing_chapter
 from ...design.sizing.scenario import sizing_scenario
 from ...files.library import Location, is_path, list_plants, plant_tables, read_toml
-from ...files.library.entry_file import build_entry, check_describes_law, load_law
+from ...files.library.loading import build_entry, check_describes_law, load_law
 from ...physics.muscle.characteristic.validity_range import validity_range_of
 from ...physics.muscle.isobars import compute_isobars
 from ...report.data import as_sheet, csv_text
