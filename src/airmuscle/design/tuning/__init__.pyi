@@ -11,7 +11,11 @@ from .process_models import first_order_of_step as first_order_of_step
 from .process_models import integrator_of_step as integrator_of_step
 from .process_models import ultimate_point as ultimate_point
 from .result import CaseMetrics as CaseMetrics
+from .result import IntegralAbsoluteError as IntegralAbsoluteError
+from .result import IntegralTimeAbsoluteError as IntegralTimeAbsoluteError
 from .result import RobustObjective as RobustObjective
+from .result import RootMeanSquareError as RootMeanSquareError
+from .result import TrackingIndex as TrackingIndex
 from .result import Tuning as Tuning
 from .result import TuningHistory as TuningHistory
 from .rules import RuleSettings as RuleSettings
@@ -26,7 +30,3 @@ from .rules import tyreus_luyben as tyreus_luyben
 from .rules import ziegler_nichols as ziegler_nichols
 from .scenario_loop import ScenarioLoop as ScenarioLoop
 from .scenario_loop import load_scenario_loop as load_scenario_loop
-from .tracking import IntegralAbsoluteError as IntegralAbsoluteError
-from .tracking import IntegralTimeAbsoluteError as IntegralTimeAbsoluteError
-from .tracking import RootMeanSquareError as RootMeanSquareError
-from .tracking import TrackingIndex as TrackingIndex

@@ -42,7 +42,8 @@ class GainRange:
             inside = self.low * (self.high / self.low) ** coordinates
         else:
             inside = self.low + (self.high - self.low) * coordinates
-        return np.clip(rounded(inside), self.low, self.high)
+        rounded = [float(f"{value:.{DIGITS - 1}e}") for value in np.ravel(inside).tolist()]
+        return np.asarray(np.clip(rounded, self.low, self.high).reshape(np.shape(inside)))
 
 
 def gain_ranges(controller: Controller, bounds: Any) -> tuple[GainRange, ...]:
@@ -56,10 +57,10 @@ def gain_ranges(controller: Controller, bounds: Any) -> tuple[GainRange, ...]:
         raise ParameterError(f'bounds: they are {what}; give a range for each gain, {{"gain": (0.1, 10.0)}}.')
     known = {leaf.path: leaf for leaf in leaves(controller)}
     check_known(f"bounds: {type(controller).__name__} has no parameter", bounds, known)
-    return tuple(_range(known[path], pair) for path, pair in bounds.items())
+    return tuple(_gain_range(known[path], pair) for path, pair in bounds.items())
 
 
-def _range(leaf: Leaf, pair: Any) -> GainRange:
+def _gain_range(leaf: Leaf, pair: Any) -> GainRange:
     declared, where = leaf.declared, f"bounds: '{leaf.path}' ({leaf.declared.symbol}, {leaf.declared.meaning})"
     try:
         low, high = (float(bound) for bound in pair)
@@ -73,11 +74,6 @@ def _range(leaf: Leaf, pair: Any) -> GainRange:
     if low < smallest or high > greatest:
         raise ParameterError(f"{where} is {low:g} to {high:g}; allowed range: {smallest:g} to {greatest:g}.")
     return GainRange(leaf.path, low, high)
-
-
-def rounded(values: Array) -> Array:
-    """Numbers (E,) with DIGITS significant digits."""
-    return np.array([float(f"{value:.{DIGITS - 1}e}") for value in np.ravel(values).tolist()]).reshape(np.shape(values))
 
 
 def to_gains(ranges: Sequence[GainRange], coordinates: Array) -> Array:

@@ -1,31 +1,24 @@
 """Evaluation of sets of gains: the loops of all cases in batches, and the metrics of their runs."""
 
 import dataclasses
-from collections.abc import Iterator, Mapping, Sequence
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from ...core import AirmuscleError, Array, flatten, leaves, structure
-from ...engine.distribution import DistributedCalls
 from ...engine.loop import COMMAND, SETPOINT, ControlLaw, ControlLoop, with_designed_laws
 from ...engine.run.batch import CONTROLLER, BatchSolution, hidden_progress, simulate_batch
 from ...engine.run.integrators import Integrator
-from ...physics.plant.plant import Plant
 from . import CaseMetrics, TrackingIndex
 from .case import LoopCase, loop_with_gains, with_gains
 
 MAX_VALUES = 20_000_000
 """Values of all columns of one batch, which is 160 MB; more sets of gains are simulated in several batches (chosen)."""
-SETS_OF_A_TASK = 4
-"""Sets of gains of one task of an executor (chosen: a generation has eight or more)."""
 AIR_MASS = "air_mass"
 """Last part of the name of the states that hold the air of a muscle."""
-
-
-class Interrupted(Exception):
-    """The user stopped the simulation of a batch; never leaves this package."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -35,6 +28,7 @@ class CaseGroup:
     places          the cases among all
     varied          values (m,) of the parameters in which the m plants differ, by path
     initial_states  values (m,) by state
+    scales          the controlled columns with their scales
     """
 
     places: npt.NDArray[np.intp]
@@ -44,24 +38,16 @@ class CaseGroup:
     scales: Mapping[str, float]
 
     @property
-    def plant(self) -> Plant:
-        return self.cases[0].plant
-
-    @property
-    def loop(self) -> ControlLoop:
-        return self.cases[0].loop
-
-    @property
     def kept(self) -> tuple[str, ...]:
         """The columns from which metrics are computed."""
         errors = (column for name in self.scales for column in (name, f"{SETPOINT}{name}"))
-        commands = (f"{COMMAND}{name}" for name in self.loop.controller.inputs)
+        commands = (f"{COMMAND}{name}" for name in self.cases[0].loop.controller.inputs)
         return (*errors, *commands, *self.air_states)
 
     @property
     def air_states(self) -> tuple[str, ...]:
         """The states that hold the air of the muscles."""
-        return tuple(s.name for s in self.plant.states if s.name.rpartition(".")[2] == AIR_MASS)
+        return tuple(s.name for s in self.cases[0].plant.states if s.name.rpartition(".")[2] == AIR_MASS)
 
 
 def group_cases(cases: Sequence[LoopCase], index: TrackingIndex) -> tuple[CaseGroup, ...]:
@@ -89,13 +75,9 @@ def _group(cases: list[LoopCase], places: npt.NDArray[np.intp], index: TrackingI
     return CaseGroup(places, tuple(cases), varied, states, scales)
 
 
-@dataclasses.dataclass(eq=False)
+@dataclasses.dataclass(frozen=True, eq=False)
 class Evaluator:
-    """Simulation of sets of gains (E, D) in all cases.
-
-    `reasons` are why sets of gains were refused or runs failed, with the number of each, for the message where nothing
-    can be found.
-    """
+    """Simulation of sets of gains, which have these paths, in all cases."""
 
     cases: tuple[LoopCase, ...]
     groups: tuple[CaseGroup, ...]
@@ -104,52 +86,39 @@ class Evaluator:
     index: TrackingIndex
     integrator: Integrator | None
     start_time: float = 0.0
-    reasons: dict[str, int] = dataclasses.field(default_factory=dict)
 
-    def metrics(self, gains: Array) -> CaseMetrics:
-        """The metrics (E, M) of gains (E, D). Raises Interrupted if the user stops the simulation."""
+    def metrics(self, gains: Array) -> tuple[CaseMetrics, Counter[str]]:
+        """The metrics (E, M) of gains (E, D), and why sets of gains were refused or runs failed, with their numbers.
+
+        Raises KeyboardInterrupt if the user stops the simulation.
+        """
         shape = len(gains), len(self.cases)
         air, travel = np.full((2, *shape), np.nan)
         metrics = CaseMetrics(np.full(shape, np.inf), air, travel, np.zeros(shape, bool))
-        possible = np.array([i for i, row in enumerate(gains.tolist()) if self._is_possible(row)], dtype=np.intp)
+        possible, reasons = list[int](), Counter[str]()
+        for i, row in enumerate(gains.tolist()):
+            try:
+                with_gains(self.cases[0].controller, dict(zip(self.paths, row, strict=True)))
+            except AirmuscleError as error:  # the controller does not accept these gains together
+                reasons[str(error)] += 1
+            else:
+                possible.append(i)
+        rows = np.array(possible, dtype=np.intp)
         for group in self.groups:
-            for part in self._parts(possible, group):
-                self._evaluate(group, gains, part, metrics)
-        return metrics
+            samples = self.duration / group.cases[0].loop.sample_time + 2
+            each = max(1, int(MAX_VALUES / (samples * len(group.kept) * len(group.cases))))
+            for i in range(0, rows.size, each):
+                reasons.update(self._evaluate(group, gains, rows[i : i + each], metrics))
+        return metrics, reasons
 
-    def distributed_metrics(self, calls: DistributedCalls, gains: Array) -> CaseMetrics:
-        """The metrics (E, M) by an executor, which calls `metrics_and_reasons`; they do not depend on it."""
-        parts = calls.results([gains[i : i + SETS_OF_A_TASK] for i in range(0, len(gains), SETS_OF_A_TASK)])
-        for _, reasons in parts:
-            for reason, count in reasons.items():
-                self._note(reason, count)
-        return joined_metrics([metrics for metrics, _ in parts])
-
-    def _is_possible(self, row: list[float]) -> bool:
-        """Whether the controller accepts these gains together."""
-        try:
-            with_gains(self.cases[0].controller, dict(zip(self.paths, row, strict=True)))
-        except AirmuscleError as error:
-            self._note(str(error))
-            return False
-        return True
-
-    def _note(self, reason: str, count: int = 1) -> None:
-        self.reasons[reason] = self.reasons.get(reason, 0) + count
-
-    def _parts(self, rows: npt.NDArray[np.intp], group: CaseGroup) -> Iterator[npt.NDArray[np.intp]]:
-        samples = self.duration / group.loop.sample_time + 2
-        each = max(1, int(MAX_VALUES / (samples * len(group.kept) * len(group.cases))))
-        return (rows[i : i + each] for i in range(0, rows.size, each))
-
-    def _evaluate(self, group: CaseGroup, gains: Array, rows: npt.NDArray[np.intp], metrics: CaseMetrics) -> None:
-        """Write the metrics of some sets of gains in the cases of a group."""
+    def _evaluate(
+        self, group: CaseGroup, gains: Array, rows: npt.NDArray[np.intp], metrics: CaseMetrics
+    ) -> Iterable[str]:
+        """Write the metrics of some sets of gains in the cases of a group; the reasons of failed runs."""
         batch = self._simulate(group, gains[rows])
         if batch.interrupted:
-            raise Interrupted
-        for reason in batch.reasons.values():
-            self._note(reason)
-        shape, at = (rows.size, len(group.cases)), np.ix_(rows, group.places)
+            raise KeyboardInterrupt
+        first, shape, at = group.cases[0], (rows.size, len(group.cases)), np.ix_(rows, group.places)
         with np.errstate(invalid="ignore", over="ignore"):
             index = self.index.values(batch.time - batch.time[0], batch.columns, group.scales)
         completed = (batch.status == 0) & np.isfinite(index)
@@ -159,19 +128,20 @@ class Evaluator:
         metrics.air[at] = air.reshape(shape) / self.duration
         strokes = [
             np.abs(np.diff(batch[f"{COMMAND}{name}"], axis=1)).sum(axis=1) / (high - low)
-            for name, (low, high) in group.loop.command_ranges(group.plant).items()
+            for name, (low, high) in first.loop.command_ranges(first.plant).items()
         ]
         travel = np.where(batch.status == 0, np.sum(strokes, axis=0), np.nan)
         metrics.travel[at] = travel.reshape(shape) / self.duration
         metrics.completed[at] = completed.reshape(shape)
+        return batch.reasons.values()
 
     def _simulate(self, group: CaseGroup, gains: Array) -> BatchSolution:
         """The loops of sets of gains (E, D) and m cases as a batch of E m rows, the cases of one set together."""
         sets, m = len(gains), len(group.cases)
         first = group.cases[0]
         variations = {path: np.tile(values, sets) for path, values in group.varied.items()}
-        loop: ControlLoop | list[ControlLoop] = group.loop
-        controller = group.loop.controller
+        loop: ControlLoop | list[ControlLoop] = first.loop
+        controller = first.loop.controller
         if isinstance(controller, ControlLaw) and with_designed_laws(controller) is controller:
             for i, path in enumerate(self.paths):
                 variations[f"{CONTROLLER}{first.full_path(path)}"] = np.repeat(gains[:, i], m)
@@ -180,16 +150,10 @@ class Evaluator:
             loop = [each for each in of_set for _ in range(m)]
         with hidden_progress():
             return simulate_batch(
-                group.plant, variations, loop, duration=self.duration, output_times=group.loop.sample_time,
+                first.plant, variations, loop, duration=self.duration, output_times=first.loop.sample_time,
                 initial_states={name: np.tile(values, sets) for name, values in group.initial_states.items()},
                 integrator=self.integrator, keep=group.kept, start_time=self.start_time,
             )  # fmt: skip
-
-
-def metrics_and_reasons(evaluator: Evaluator, gains: Array) -> tuple[CaseMetrics, dict[str, int]]:
-    """The metrics of gains (E, D) as a task of an executor, and the reasons of failures."""
-    fresh = dataclasses.replace(evaluator, reasons={})
-    return fresh.metrics(gains), fresh.reasons
 
 
 def joined_metrics(parts: Sequence[CaseMetrics]) -> CaseMetrics:

@@ -1,6 +1,7 @@
 """Search for the gains with the smallest objective, by an evolution strategy."""
 
 import math
+from collections import Counter
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from typing import Any
@@ -12,9 +13,8 @@ from ...engine.distribution import DistributedCalls
 from ...engine.processes import Workers, process_pool
 from ...engine.run.integrators import Integrator
 from .case import GainRange, LoopCase, check_cases, gain_ranges, to_coordinates, to_gains
-from .evaluation import Evaluator, Interrupted, group_cases, joined_metrics, metrics_and_reasons
-from .result import CaseMetrics, Objective, RobustObjective, Tuning, TuningHistory
-from .tracking import RootMeanSquareError, TrackingIndex
+from .evaluation import Evaluator, group_cases, joined_metrics
+from .result import CaseMetrics, Objective, RobustObjective, RootMeanSquareError, TrackingIndex, Tuning, TuningHistory
 
 FIRST_WIDTH = 0.25
 """Standard deviation of the first generation, in parts of the range (chosen)."""
@@ -82,6 +82,8 @@ class EvolutionStrategy:
         self._step *= math.exp(self._step_rate / self._damping * (length / self._usual - 1))
 
 
+SETS_OF_A_TASK = 4
+"""Sets of gains of one task of an executor (chosen: a generation has eight or more)."""
 MIN_SETS = 8
 """Smallest first generation, and smallest number of sets of gains of a budget (chosen)."""
 PATIENCE, TOLERANCE = 8, 0.005
@@ -130,18 +132,19 @@ def tune(
     ranges = gain_ranges(family[0].controller, bounds)
     paths = tuple(each.path for each in ranges)
     evaluator = Evaluator(family, group_cases(family, index), paths, duration, index, integrator, start_time)
-    search = _Search(evaluator, ranges, objective, budget, progress or (lambda done, total: None))
-    given = search.given(start)
     with process_pool(workers) as executor:
-        interrupted = search.run(given, seed, executor)
+        search = _Search(evaluator, ranges, objective, budget, progress or (lambda done, total: None), executor)
+        interrupted = search.run(search.given(start), seed)
     if not search.values:
         raise KeyboardInterrupt
+    gains, values = np.concatenate(search.gains), np.concatenate(search.values)
+    history = TuningHistory(paths, gains, values, joined_metrics(search.metrics))
     result = Tuning(
-        family, ranges, index, evaluator.groups[0].scales, objective, duration, start_time, seed, budget,
-        search.history(), search.present_count, search.converged, interrupted,
+        family, ranges, index, evaluator.groups[0].scales, objective, duration, start_time, seed, budget, history,
+        search.present_count, search.converged, interrupted,
     )  # fmt: skip
     if not math.isfinite(result.objective):
-        reason = max(evaluator.reasons, key=evaluator.reasons.__getitem__, default="the index is not finite")
+        reason = next((each for each, _ in search.reasons.most_common(1)), "the index is not finite")
         raise SimulationError(
             f"tune: each of {len(result.history)} sets of gains fails in at least one case; most frequent reason: "
             f"{reason}. Narrow the bounds, check the set point, or leave out the cases that no controller can hold."
@@ -167,15 +170,15 @@ class _Search:
     """One search: it evaluates populations and records them."""
 
     def __init__(
-        self, evaluator: Evaluator, ranges: tuple[GainRange, ...], objective: Objective, budget: int, progress: Progress
-    ) -> None:
+        self, evaluator: Evaluator, ranges: tuple[GainRange, ...], objective: Objective, budget: int,
+        progress: Progress, executor: Executor | None,
+    ) -> None:  # fmt: skip
         self.evaluator, self.ranges, self.objective, self.progress = evaluator, ranges, objective, progress
         self.budget, self.sets = budget, budget // len(evaluator.cases)
-        self.present_count, self.converged = 0, False
-        self._calls: DistributedCalls | None = None
-        self.gains: list[Array] = []
-        self.metrics: list[CaseMetrics] = []
-        self.values: list[Array] = []
+        self.present_count, self.converged, self.reasons = 0, False, Counter[str]()
+        self.gains, self.metrics, self.values = list[Array](), list[CaseMetrics](), list[Array]()
+        self._calls = DistributedCalls(executor, Evaluator.metrics, evaluator)
+        self._sets_of_a_task = SETS_OF_A_TASK if executor else self.sets
 
     @property
     def population(self) -> int:
@@ -201,12 +204,10 @@ class _Search:
             raise ParameterError(f"tune: {len(start)} starts; at most {self.population - 1} fit the first generation.")
         return points
 
-    def run(self, given: list[Array], seed: int, executor: Executor | None) -> bool:
+    def run(self, given: list[Array], seed: int) -> bool:
         """Search until two descents agree or the budget is used; whether the user interrupted."""
         from scipy.stats import qmc
 
-        if executor is not None:
-            self._calls = DistributedCalls(executor, metrics_and_reasons, self.evaluator)
         first = qmc.Sobol(d=len(self.ranges), scramble=True, seed=np.random.default_rng(seed)).random(self.population)
         first[: len(given)] = given if given else first[:0]
         random, ends = np.random.default_rng([seed, 1]), list[float]()
@@ -218,7 +219,7 @@ class _Search:
                 ends.append(self._descend(strategy))
                 best, *others = sorted(ends)
                 self.converged = bool(others) and others[0] - best <= AGREEMENT * abs(best)
-        except (Interrupted, KeyboardInterrupt):
+        except KeyboardInterrupt:
             return True
         return False
 
@@ -241,8 +242,11 @@ class _Search:
     def _energies(self, coordinates: Array) -> Array:
         """The energies (S,) of points (S, D): the objective, or a large number by the share of failed runs."""
         gains = to_gains(self.ranges, np.clip(coordinates, 0.0, 1.0))
-        calls, evaluator = self._calls, self.evaluator
-        metrics = evaluator.metrics(gains) if calls is None else evaluator.distributed_metrics(calls, gains)
+        size = self._sets_of_a_task
+        parts = self._calls.results([gains[i : i + size] for i in range(0, len(gains), size)])
+        metrics = joined_metrics([found for found, _ in parts])
+        for _, reasons in parts:
+            self.reasons.update(reasons)
         values = np.asarray(self.objective(metrics), dtype=float)
         if values.shape != (len(gains),):
             raise ParameterError(f"tune: the objective returned {values.shape}; it must return ({len(gains)},) values.")
@@ -253,11 +257,6 @@ class _Search:
         self.progress(sum(map(len, self.values)) * len(self.evaluator.cases), self.budget)
         failed = 1.0 - metrics.completed.mean(axis=1)
         return np.where(np.isfinite(values), values, 1e30 * (1.0 + failed))
-
-    def history(self) -> TuningHistory:
-        """All that was simulated."""
-        gains, values = np.concatenate(self.gains), np.concatenate(self.values)
-        return TuningHistory(self.evaluator.paths, gains, values, joined_metrics(self.metrics))
 
 
 def _starts(points: Array, energies: Array) -> Iterator[Array]:

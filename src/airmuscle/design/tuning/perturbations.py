@@ -3,13 +3,13 @@
 import dataclasses
 import math
 import re
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ...bench.identify.prediction import PlantUncertainty
-from ...core import AirmuscleError, Array, Leaf, ParameterError, check_field_types, leaves, with_parameters, within
+from ...core import AirmuscleError, ParameterError, check_field_types, leaves, with_parameters, within
 from ...engine.loop import MAX_DELAY, ColumnSensor, ControlLaw, ControlLoop, WithSensors
 from ...files.library import ParameterUncertainty, located_errors
 from ...files.scenario.plant_uncertainty import SEPARATOR, parameter_uncertainty
@@ -88,8 +88,10 @@ def perturbed_family(
     ):  # fmt: skip
         if factors and not chosen:
             notes.append(f"no case with another {symbol}: the plant has no parameter of that kind")
-        elif chosen:
-            changed += [(f"{symbol} x {factor:g}", _multiplied(plant, chosen, factor, symbol)) for factor in factors]
+        for factor in factors if chosen else ():
+            values = [leaf.value * (factor if leaf.path in chosen else 1.0) for leaf in leaves(plant)]
+            with located_errors(f"{symbol} x {factor:g}"):
+                changed.append((f"{symbol} x {factor:g}", with_parameters(plant, values)))
     if perturbations.leak:
         leaking = _leaking(plant, perturbations.leak)
         notes += [] if leaking else ["no case with a leak: a circuit has no conductance"]
@@ -109,12 +111,6 @@ def perturbed_family(
         delayed = dataclasses.replace(loop, controller=WithSensors(law, sensors))
         cases.append(LoopCase(f"delay {perturbations.delay}", plant, delayed, cases[0].initial_state, "law"))
     return PerturbedFamily(tuple(cases), tuple(notes))
-
-
-def _multiplied(plant: Plant, chosen: Collection[str], factor: float, what: str) -> Plant:
-    """The plant with some of its parameters multiplied by a factor, validated."""
-    with located_errors(f"{what} x {factor:g}"):
-        return with_parameters(plant, [x.value * (factor if x.path in chosen else 1.0) for x in leaves(plant)])
 
 
 def _leaking(plant: Plant, share: float) -> Plant | None:
@@ -149,8 +145,7 @@ def _drawn(
     plant: Plant, uncertainties: Sequence[ParameterUncertainty | None], of_plant: ParameterUncertainty | None,
     random: np.random.Generator,
 ) -> Plant:  # fmt: skip
-    known = list(leaves(plant))
-    message = "no draw"
+    known, message = {leaf.path: leaf for leaf in leaves(plant)}, "no draw"
     for _ in range(MAX_ATTEMPTS):
         deviations: dict[ParameterUncertainty, Any] = {}
         shifts: dict[str, float] = {}
@@ -164,32 +159,21 @@ def _drawn(
             shifts |= dict(zip(muscle_paths(uncertainty, prefix), deviations[uncertainty].tolist(), strict=True))
         if of_plant is not None:
             deviates = random.standard_normal(len(of_plant.parameters))
-            shifts |= _within_ranges(of_plant, of_plant.deviations(deviates), known)
-        _check_known(shifts, known)
+            for name, shift in zip(of_plant.parameters, of_plant.deviations(deviates), strict=True):
+                for leaf in map(known.__getitem__, name.split(SEPARATOR)):  # as far as the declared ranges permit
+                    shifts[leaf.path] = float(np.clip(leaf.value + shift, *leaf.declared.bounds)) - leaf.value
+        if unknown := [path for path in shifts if path not in known]:
+            raise ParameterError(
+                f"perturbed_family: the plant has no parameter '{unknown[0]}', of which an uncertainty is given; "
+                "remove it from the uncertainty, or restore the part of the muscle that the plant replaces."
+            )
         try:
-            return with_parameters(plant, [leaf.value + shifts.get(leaf.path, 0.0) for leaf in known])
+            return with_parameters(plant, [leaf.value + shifts.get(path, 0.0) for path, leaf in known.items()])
         except AirmuscleError as error:
             message = str(error)
     raise ParameterError(f"perturbed_family: {MAX_ATTEMPTS} draws of parameters are impossible; the last: {message}")
 
 
-def _within_ranges(fitted: ParameterUncertainty, deviations: Array, known: Sequence[Leaf]) -> dict[str, float]:
-    """Deviations by path of the parameters of a plant, as far as the declared ranges permit."""
-    leaves = {leaf.path: leaf for leaf in known}
-    paths = [(path, d) for name, d in zip(fitted.parameters, deviations, strict=True) for path in name.split(SEPARATOR)]
-    return {p: float(np.clip(leaves[p].value + d, *leaves[p].declared.bounds)) - leaves[p].value for p, d in paths}
-
-
 def muscle_paths(uncertainty: ParameterUncertainty, prefix: str) -> list[str]:
     """The paths of uncertain parameters in a plant; in a muscle file the contractile element is the characteristic."""
     return [f"{prefix}{re.sub('^characteristic[.]', 'contractile.', name)}" for name in uncertainty.parameters]
-
-
-def _check_known(shifts: Mapping[str, float], known: Sequence[Leaf]) -> None:
-    paths = {leaf.path for leaf in known}
-    unknown = [path for path in shifts if path not in paths]
-    if unknown:
-        raise ParameterError(
-            f"perturbed_family: the plant has no parameter '{unknown[0]}', of which an uncertainty is given; remove it "
-            "from the uncertainty, or restore the part of the muscle that the plant replaces."
-        )

@@ -1,19 +1,119 @@
-"""Result of a tuning: gains, history of the search, and the objective that was minimised."""
+"""Tracking index, metrics and objective of a tuning, and its result: gains and history of the search."""
 
+import abc
 import dataclasses
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
 
 from ...core import Array, ColumnError, ParameterError, Reference, ShortRepr, check_field_types, cite, published, within
-from ...core.errors import check_known
-from ...engine.loop.control_loop import ControlLoop
+from ...core.errors import check_known, suggestion
+from ...engine.loop import SETPOINT, ControlLoop
 from .case import GainRange, LoopCase, loop_with_gains
-from .tracking import TrackingIndex
 
 HANSEN2016 = published("hansen-2016")
+
+
+@dataclasses.dataclass(frozen=True)
+class TrackingIndex(abc.ABC):
+    """An index of the control error e = r - y of a run, with set point r and controlled column y of the plant.
+
+    scales  column and the size [SI] by which its error is divided. Without scales the only set point that is a column
+            of the plant is used, and the index has its unit
+    begin   the error before this time [s] from the start of the run is not counted
+
+    With several columns, the magnitude of the error at one instant is sqrt(sum (e/scale)^2). The column y is the true
+    one, not that which a sensor delivers.
+    """
+
+    references: ClassVar[tuple[Reference, ...]] = ()
+
+    time_unit: ClassVar[str] = ""
+    """What an integral over time adds to the unit of the error."""
+    scales: Mapping[str, float] = dataclasses.field(default_factory=dict)
+    begin: float = 0.0
+
+    def __post_init__(self) -> None:
+        check_field_types(self)
+        for name, scale in self.scales.items():
+            if not 0 < scale < math.inf:
+                raise ParameterError(f"{type(self).__name__}: scale of '{name}' is {scale}; it must be positive.")
+        if not 0 <= self.begin < math.inf:
+            raise ParameterError(f"{type(self).__name__}: begin is {self.begin} s; it must be 0 or positive.")
+
+    def __str__(self) -> str:
+        scales = [f"{name} divided by {scale:.4g} (SI)" for name, scale in self.scales.items()]
+        begin = [f"from {self.begin:.4g} s"] if self.begin else []
+        return ", ".join([type(self).__name__, *scales, *begin])
+
+    def scales_for(self, setpoints: Sequence[str], columns: Sequence[str]) -> dict[str, float]:
+        """The controlled columns with their scales, for the set points of a loop and the columns of a plant."""
+        controlled = [name for name in setpoints if name in columns]
+        for name in self.scales:
+            if name not in controlled:
+                raise ParameterError(
+                    f"{type(self).__name__}: '{name}' is not both a set point and a column of the plant; "
+                    f"{', '.join(controlled) or 'none'} is.{suggestion(name, controlled)}"
+                )
+        if not self.scales and len(controlled) != 1:
+            what = " and ".join(controlled) or "no set point"
+            raise ParameterError(
+                f"{type(self).__name__}: {what} can be compared with columns of the plant; state scales, the columns "
+                'and the sizes by which their errors are divided: {"angle": 0.1}.'
+            )
+        return dict(self.scales) or {controlled[0]: 1.0}
+
+    def values(self, time: Array, columns: Mapping[str, Array], scales: Mapping[str, float]) -> Array:
+        """The index (N,) of N runs with rows at `time` (T,) [s] from the start; columns (N, T), with those of the set
+        points. NaN for a run that ended early."""
+        rows = time >= self.begin - 1e-12
+        if np.count_nonzero(rows) < 2:
+            raise ParameterError(
+                f"{type(self).__name__}: fewer than two samples follow begin, {self.begin:g} s; the run ends at "
+                f"{time[-1]:g} s."
+            )
+        squares = [
+            ((columns[f"{SETPOINT}{name}"] - columns[name])[:, rows] / scale) ** 2 for name, scale in scales.items()
+        ]
+        with np.errstate(over="ignore", invalid="ignore"):
+            return self.of_magnitude(time[rows], np.sqrt(np.sum(squares, axis=0)))
+
+    @abc.abstractmethod
+    def of_magnitude(self, time: Array, magnitude: Array) -> Array:
+        """The index (N,) of the magnitude (N, T) of the error at times (T,) [s]."""
+
+    def unit(self, column_unit: str) -> str:
+        """The unit of the index, given that of the error."""
+        return f"{column_unit} {self.time_unit}".strip().removeprefix("1 ")
+
+
+class RootMeanSquareError(TrackingIndex):
+    """Root mean square error (RMSE): sqrt((1/T) integral e^2 dt), trapezoidal rule between the samples."""
+
+    def of_magnitude(self, time: Array, magnitude: Array) -> Array:
+        return np.asarray(np.sqrt(np.trapezoid(magnitude**2, time, axis=1) / (time[-1] - time[0])))
+
+
+class IntegralAbsoluteError(TrackingIndex):
+    """Integral of the absolute error (IAE): integral |e| dt, trapezoidal rule between the samples."""
+
+    time_unit: ClassVar[str] = "s"
+
+    def of_magnitude(self, time: Array, magnitude: Array) -> Array:
+        return np.asarray(np.trapezoid(magnitude, time, axis=1))
+
+
+class IntegralTimeAbsoluteError(TrackingIndex):
+    """Integral of time-multiplied absolute error (ITAE): integral (t - t_begin) |e| dt; Graham and Lathrop (1953)."""
+
+    references: ClassVar[tuple[Reference, ...]] = (published("graham-lathrop-1953"),)
+    time_unit: ClassVar[str] = "s^2"
+
+    def of_magnitude(self, time: Array, magnitude: Array) -> Array:
+        return np.asarray(np.trapezoid((time - time[0]) * magnitude, time, axis=1))
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)

@@ -62,25 +62,20 @@ class ScenarioLoop(ShortRepr):
     def _uncertainties(self) -> list[ParameterUncertainty | None]:
         """The uncertainty of each muscle, of the parameters that the scenario takes from the muscle file unchanged."""
         tables = self.tables["plant"].get("muscle", [])
-        named = tables if isinstance(tables, list) else [tables]
-        muscles = self.scenario.plant.muscles
-        if len(named) != len(muscles):  # the muscles of a plant of the library
-            return [None] * len(muscles)
-        return [self._uncertainty(value, i) for i, value in enumerate(named)]
-
-    def _uncertainty(self, value: Any, index: int) -> ParameterUncertainty | None:
-        name = value.get("library") if isinstance(value, Mapping) else value
-        if not isinstance(name, str):
-            return None
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", AirmuscleWarning)  # it was issued when the scenario was loaded
-            entry = load_law(self.path.parent / name if name.endswith(".toml") else name)
-        if entry.uncertainty is None:
-            return None
-        of_file = {leaf.path: leaf.value for leaf in leaves(entry.muscle)}
-        of_plant = {leaf.path: leaf.value for leaf in leaves(self.scenario.plant.muscles[index])}
-        paths = muscle_paths(entry.uncertainty, "")
-        return entry.uncertainty.part(p in of_plant and of_file.get(p) == of_plant[p] for p in paths)
+        named, muscles = tables if isinstance(tables, list) else [tables], self.scenario.plant.muscles
+        found: list[ParameterUncertainty | None] = [None] * len(muscles)
+        for i, value in enumerate(named if len(named) == len(muscles) else []):  # otherwise of a plant of the library
+            name = value.get("library") if isinstance(value, Mapping) else value
+            if not isinstance(name, str):
+                continue
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", AirmuscleWarning)  # it was issued when the scenario was loaded
+                entry = load_law(self.path.parent / name if name.endswith(".toml") else name)
+            if entry.uncertainty is not None:
+                of_file, of_plant = ({leaf.path: leaf.value for leaf in leaves(m)} for m in (entry.muscle, muscles[i]))
+                paths = muscle_paths(entry.uncertainty, "")
+                found[i] = entry.uncertainty.part(p in of_plant and of_file.get(p) == of_plant[p] for p in paths)
+        return found
 
     def bounds(self, given: Sequence[str] = ()) -> dict[str, tuple[float, float]]:
         """The ranges [SI] of the tuned gains: those given as `gain=5 1/m:500 1/m`, or the default ranges.
@@ -108,9 +103,13 @@ class ScenarioLoop(ShortRepr):
         known = {leaf.path: leaf for leaf in leaves(self.loop.controller)}
         path = path.strip()
         check_known(f"bounds '{text}': {type(self.loop.controller).__name__} has no parameter", path, known)
-        unit, ambient = self.unit(known[path]), self.scenario.plant.ambient.pressure
-        first, second = (_read_bound(value, unit, ambient, f"bounds '{text}'") for value in (low, high))
-        return path, (first, second)
+        unit, ambient, read = self.unit(known[path]), self.scenario.plant.ambient.pressure, list[float]()
+        for value in (low, high):
+            try:
+                read.append(float(value))
+            except ValueError:
+                read.append(quantity(value, unit, ambient=ambient, where=f"bounds '{text}'"))
+        return path, (read[0], read[1])
 
     def unit(self, leaf: Leaf) -> str:
         """The unit of a parameter of the controller or of a law inside it."""
@@ -186,14 +185,6 @@ def _default_ranges(known: Sequence[Leaf]) -> dict[str, tuple[float, float]]:
         smallest, greatest = leaf.declared.bounds
         ranges[leaf.path] = max(low, smallest), min(high, greatest)
     return ranges
-
-
-def _read_bound(text: str, unit: str, ambient: float, where: str) -> float:
-    """A bound [SI], from a text with a unit, or a number in SI units."""
-    try:
-        return float(text)
-    except ValueError:
-        return quantity(text, unit, ambient=ambient, where=where)
 
 
 def _written(value: float, present: Any, unit: str, ambient: float) -> Any:
