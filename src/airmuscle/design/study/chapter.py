@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core import BLACK, BLUE, ORANGE, RED, SKY, Array, atomic_folder, cite, legend_below, new_figure
+from ...core import BLACK, BLUE, ORANGE, RED, SKY, atomic_folder, cite, legend_below, new_figure
 from ...report.chapter import BY_ROW, Chapter, NamedValue, Plot, Table, TableColumn
 from ...report.write import save_table, write_into
 from .result import SobolIndices, StudyResult, sensitivity_table
@@ -62,19 +62,15 @@ def _histograms(result: StudyResult) -> Plot:
         axis.set(xlabel=_axis_label(name, study.units[name]), ylabel="runs")
         axis.yaxis.get_major_locator().set_params(integer=True)
         if values.size:
-            axis.hist(values, bins=_bin_count(values), color=SKY, edgecolor="white", linewidth=0.4)
+            equal = np.ptp(values) <= 1e-12 * np.abs(values).max()
+            bins = 1 if equal else min(60, max(4, math.ceil(2 * values.size ** (1 / 3))))  # Rice rule
+            axis.hist(values, bins=bins, color=SKY, edgecolor="white", linewidth=0.4)
         else:
             axis.text(0.5, 0.5, "no values", ha="center", transform=axis.transAxes)
         if math.isfinite(result.nominal[name]):
             axis.axvline(result.nominal[name] * factor, color=RED, linestyle="--", linewidth=1.2)
     caption = "Histograms of the metrics over all runs; the dashed line is the nominal scenario."
     return Plot("histograms", caption, figure)
-
-
-def _bin_count(values: Array) -> int:
-    """The number of bins, twice the cube root of the number of values (Rice rule), 4 to 60; one for equal values."""
-    equal = np.ptp(values) <= 1e-12 * np.abs(values).max()
-    return 1 if equal else min(60, max(4, math.ceil(2 * values.size ** (1 / 3))))
 
 
 def _scatter(result: StudyResult, name: str) -> Plot:
@@ -181,6 +177,8 @@ def study_chapter(result: StudyResult, *, execution: str = "") -> Chapter:
     tables = [result.statistics()] if study.scalars else []
     tables += [sensitivity_table(study, indices)] if indices else []
     tables += [failure_table(result)] if result.failed.size else []
+    scenario = study.template.scenario
+    metrics = [(f"metric {name}", str(metric), "study") for name, metric in study.metrics.items()]
     return Chapter(
         name="study",
         title=study.title,
@@ -192,8 +190,14 @@ def study_chapter(result: StudyResult, *, execution: str = "") -> Chapter:
         plots=tuple(plots),
         tables=(*tables, variation_table(study)),
         notes=tuple(_notes(result, indices)),
-        references=tuple(cite(study.template.scenario.plant)),
-        chosen=_settings(study),
+        references=tuple(cite(scenario.plant)),
+        chosen=(
+            ("scenario", scenario.title, str(study.path.name)),
+            ("design", str(study.design), "study"),
+            *metrics,
+            ("integrator", str(scenario.problem.integrator), "scenario"),
+            ("input signal", str(scenario.problem.input), "scenario"),
+        ),
     )
 
 
@@ -241,15 +245,3 @@ def failure_table(result: StudyResult) -> Table:
     }
     note = f"At most {MAX_LISTED_REASONS} reasons are listed." if len(counts) == MAX_LISTED_REASONS else ""
     return Table("failed", "Failed runs", columns, note, brief=SHORT_LISTED)
-
-
-def _settings(study: Study) -> tuple[tuple[str, str, str], ...]:
-    scenario = study.template.scenario
-    metrics = [(f"metric {name}", str(metric), "study") for name, metric in study.metrics.items()]
-    return (
-        ("scenario", scenario.title, str(study.path.name)),
-        ("design", str(study.design), "study"),
-        *metrics,
-        ("integrator", str(scenario.problem.integrator), "scenario"),
-        ("input signal", str(scenario.problem.input), "scenario"),
-    )

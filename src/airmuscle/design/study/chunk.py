@@ -76,8 +76,8 @@ def study_fingerprint(study: Study) -> str:
 
 def chunk_file_names(study: Study) -> list[str]:
     """The names of the files of all chunks."""
-    common, runs = (program_fingerprint(), study.fingerprint()), map(study.chunk_runs, study.chunks)
-    return [f"{fingerprint(*common, study.values[each.start : each.stop])}.npz" for each in runs]
+    common = program_fingerprint(), study.fingerprint()
+    return [f"{fingerprint(*common, study.values[each.start : each.stop])}.npz" for each in study.chunks]
 
 
 def run_chunk(study_file: tuple[str, str], index: int) -> Chunk:
@@ -99,7 +99,7 @@ def run_chunk(study_file: tuple[str, str], index: int) -> Chunk:
 
 def compute_chunk(study: Study, index: int) -> Chunk:
     """The results of one chunk; a failed run is recorded as NaN with its reason."""
-    runs = study.chunk_runs(index)
+    runs = study.chunks[index]
     chunk = Chunk(
         np.full((len(runs), len(study.scalars)), np.nan),
         {name: np.full((len(runs), series.times.size), np.nan) for name, series in study.time_series.items()},
@@ -113,7 +113,7 @@ def compute_chunk(study: Study, index: int) -> Chunk:
             scenarios[row] = study.scenario(run, initial_state)
         except RUN_ERRORS as error:
             chunk.failure_reasons[row] = failure_reason(error)
-    outcomes = simulate_all(list(scenarios.values()), metric_times(study))
+    outcomes = simulate_all(list(scenarios.values()), study.metric_times)
     for row, outcome in zip(scenarios, outcomes, strict=True):
         check_running()
         if isinstance(outcome, str):
@@ -123,11 +123,6 @@ def compute_chunk(study: Study, index: int) -> Chunk:
             for name, series in study.time_series.items():
                 chunk.time_series[name][row] = series.sample(outcome["time"], outcome[series.column])
     return dataclasses.replace(chunk, failure_reasons=chunk.failure_reasons.astype(str))
-
-
-def metric_times(study: Study) -> Array:
-    """All times [s] at which the metrics of a study are evaluated, sorted."""
-    return np.unique(np.concatenate([metric.times for metric in study.metrics.values()]))
 
 
 def write_chunk(chunk: Chunk, path: Path) -> None:
@@ -167,10 +162,10 @@ def run_study(
     """
     files = _chunk_files(study, Path(folder) / CHUNK_FOLDER) if folder is not None else []
     # before the workers start, so that kernels are compiled only once
-    (nominal,) = simulate_all([study.template.scenario], metric_times(study))
+    (nominal,) = simulate_all([study.template.scenario], study.metric_times)
     chunks = {index: chunk for index, file in enumerate(files) if (chunk := read_chunk(file))}
-    missing = [index for index in study.chunks if index not in chunks]
-    done = len(study) - sum(len(study.chunk_runs(index)) for index in missing)
+    missing = [index for index in range(len(study.chunks)) if index not in chunks]
+    done = len(study) - sum(len(study.chunks[index]) for index in missing)
     report = progress or (lambda done, total: None)
     report(done, len(study))
     study_file = str(study.path.resolve()), study_fingerprint(study)
@@ -179,9 +174,9 @@ def run_study(
         chunks[index := missing[place]] = chunk
         if files:
             write_chunk(chunk, files[index])
-        done += len(study.chunk_runs(index))
+        done += len(study.chunks[index])
         report(done, len(study))
-    parts = [chunks[index] for index in study.chunks]
+    parts = [chunks[index] for index in range(len(study.chunks))]
     return StudyResult(
         study,
         np.concatenate([part.scalars for part in parts]),
@@ -206,6 +201,5 @@ def _chunk_files(study: Study, folder: Path) -> list[Path]:
 
 def count_finished_runs(study: Study, folder: Path | str) -> int:
     """The number of runs of a study that are saved in `folder`/chunks."""
-    chunk_folder = Path(folder) / CHUNK_FOLDER
-    files = enumerate(chunk_file_names(study))
-    return sum(len(study.chunk_runs(index)) for index, name in files if read_chunk(chunk_folder / name) is not None)
+    files = (Path(folder) / CHUNK_FOLDER / name for name in chunk_file_names(study))
+    return sum(len(runs) for runs, file in zip(study.chunks, files, strict=True) if read_chunk(file) is not None)

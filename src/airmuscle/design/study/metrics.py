@@ -8,7 +8,7 @@ therefore determines the accuracy of the metrics.
 import abc
 import dataclasses
 import math
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, Self
 
 import numpy as np
 
@@ -16,13 +16,6 @@ from ...core import Array, ParameterError
 from ...files.library import custom_field, read_finite_number
 from ...files.scenario.values import Number
 from .paths import read_name
-
-
-class Window(NamedTuple):
-    """A time window of a column: times (N,) [s] and values (N,)."""
-
-    time: Array
-    values: Array
 
 
 @dataclasses.dataclass(frozen=True)
@@ -42,23 +35,23 @@ class Metric:
                 "its begin."
             )
 
-    def window(self, time: Array, values: Array) -> Window:
-        """The part of a run (N,) within the time window; values at its bounds are interpolated."""
+    def window(self, time: Array, values: Array) -> tuple[Array, Array]:
+        """Times [s] and values of a run (N,) within the time window; values at its bounds are interpolated."""
         first, last = max(self.begin, time[0]), min(self.end, time[-1])
         if not first <= last:
-            return Window(np.empty(0), np.empty(0))
-        inside = (time > first) & (time < last)
+            return np.empty(0), np.empty(0)
         bounds = np.unique([first, last])
-        times = np.concatenate([bounds[:1], time[inside], bounds[1:]])
-        return Window(times, np.interp(times, time, values))
+        times = np.concatenate([bounds[:1], time[(time > first) & (time < last)], bounds[1:]])
+        return times, np.interp(times, time, values)
 
-    def check_range(self, start: float, duration: float) -> None:
-        """Raise ParameterError if the time window does not overlap a run of `duration` [s] from `start` [s]."""
+    def clip_to_run(self, start: float, duration: float) -> Self:
+        """The metric in a run of `duration` [s] from `start` [s]. Raises ParameterError if its window is outside."""
         if not max(self.begin, start) <= min(self.end, start + duration):
             raise ParameterError(
                 f"{type(self).__name__}: the window {self.begin:g} to {self.end:g} s does not overlap the run, "
                 f"{start:g} to {start + duration:g} s."
             )
+        return self
 
     @property
     def times(self) -> Array:
@@ -75,51 +68,51 @@ class Scalar(Metric, abc.ABC):
 
     def value(self, time: Array, values: Array) -> float:
         """The metric of a run with times (N,) [s] and values (N,) of the column."""
-        window = self.window(time, values)
-        return self._evaluate(window) if window.time.size else math.nan
+        times, inside = self.window(time, values)
+        return self._evaluate(times, inside) if times.size else math.nan
 
     @abc.abstractmethod
-    def _evaluate(self, window: Window) -> float:
+    def _evaluate(self, time: Array, values: Array) -> float:
         """The metric of a window with at least one row."""
 
 
 class Final(Scalar):
     """Final value."""
 
-    def _evaluate(self, window: Window) -> float:
-        return float(window.values[-1])
+    def _evaluate(self, time: Array, values: Array) -> float:
+        return float(values[-1])
 
 
 class Maximum(Scalar):
     """Maximum value."""
 
-    def _evaluate(self, window: Window) -> float:
-        return float(window.values.max())
+    def _evaluate(self, time: Array, values: Array) -> float:
+        return float(values.max())
 
 
 class Minimum(Scalar):
     """Minimum value."""
 
-    def _evaluate(self, window: Window) -> float:
-        return float(window.values.min())
+    def _evaluate(self, time: Array, values: Array) -> float:
+        return float(values.min())
 
 
 class Mean(Scalar):
     """Mean over time."""
 
-    def _evaluate(self, window: Window) -> float:
-        return time_mean(window.time, window.values)
+    def _evaluate(self, time: Array, values: Array) -> float:
+        return time_mean(time, values)
 
 
 class RootMeanSquare(Scalar):
     """Root mean square over time."""
 
-    def _evaluate(self, window: Window) -> float:
+    def _evaluate(self, time: Array, values: Array) -> float:
         # the square of a linear function is a parabola, which Simpson's rule integrates exactly
-        a, b = window.values[:-1], window.values[1:]
-        steps = np.diff(window.time)
+        a, b = values[:-1], values[1:]
+        steps = np.diff(time)
         if not steps.sum() > 0:
-            return abs(float(window.values[0]))
+            return abs(float(values[0]))
         return math.sqrt(float(steps @ (a * a + a * b + b * b)) / 3.0 / float(steps.sum()))
 
 
@@ -135,8 +128,8 @@ class TimeToReach(Scalar):
         if not math.isfinite(self.level):
             raise ParameterError(f"TimeToReach: level is {self.level}; it must be finite.")
 
-    def _evaluate(self, window: Window) -> float:
-        return _first_crossing(window, self.level) - float(window.time[0])
+    def _evaluate(self, time: Array, values: Array) -> float:
+        return _first_crossing(time, values, self.level) - float(time[0])
 
 
 class Overshoot(Scalar):
@@ -144,11 +137,11 @@ class Overshoot(Scalar):
 
     own_unit: ClassVar[str] = "1"
 
-    def _evaluate(self, window: Window) -> float:
-        change = window.values[-1] - window.values[0]
+    def _evaluate(self, time: Array, values: Array) -> float:
+        change = values[-1] - values[0]
         if change == 0.0:
             return math.nan
-        return max(0.0, float(((window.values - window.values[-1]) / change).max()))
+        return max(0.0, float(((values - values[-1]) / change).max()))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -168,8 +161,8 @@ class SettlingTime(Scalar):
         if not 0 < self.band < 1:
             raise ParameterError(f"SettlingTime: band is {self.band:g}; it must be between 0 and 1.")
 
-    def _evaluate(self, window: Window) -> float:
-        error, begin = window.values - window.values[-1], float(window.time[0])
+    def _evaluate(self, time: Array, values: Array) -> float:
+        error, begin = values - values[-1], float(time[0])
         half_width = self.band * abs(float(error[0]))
         outside = np.flatnonzero(np.abs(error) > half_width)
         if outside.size == 0:
@@ -177,8 +170,7 @@ class SettlingTime(Scalar):
         if half_width == 0.0:
             return math.nan
         i = int(outside[-1])
-        entry = Window(window.time[i : i + 2], error[i : i + 2])
-        return _first_crossing(entry, math.copysign(half_width, error[i])) - begin
+        return _first_crossing(time[i : i + 2], error[i : i + 2], math.copysign(half_width, error[i])) - begin
 
 
 @dataclasses.dataclass(frozen=True)
@@ -192,8 +184,9 @@ class TimeSeries(Metric):
         if not 0 < self.sample_time < math.inf:
             raise ParameterError(f"TimeSeries: sample_time is {self.sample_time:g} s; it must be positive and finite.")
 
-    def clip_to_run(self, start: float, duration: float) -> "TimeSeries":
-        """A copy whose window is clipped to a run, which fixes its times. Raises ParameterError."""
+    def clip_to_run(self, start: float, duration: float) -> Self:
+        """The time series whose window is clipped to a run, which fixes its times. Raises ParameterError."""
+        super().clip_to_run(start, duration)
         begin, end = max(self.begin, start), min(self.end, start + duration)
         if not begin < end or (end - begin) / self.sample_time > 1_000_000:
             raise ParameterError(
@@ -227,14 +220,14 @@ def time_mean(time: Array, values: Array) -> float:
     return float(np.trapezoid(values, time)) / duration if duration > 0 else float(values[0])
 
 
-def _first_crossing(window: Window, level: float) -> float:
+def _first_crossing(time: Array, values: Array, level: float) -> float:
     """The time at which the lines between the rows first cross a level; NaN if they do not."""
-    distance = window.values - level
+    distance = values - level
     crossings = np.flatnonzero(np.append(distance[:-1] * distance[1:] < 0.0, False) | (distance == 0.0))
     if crossings.size == 0:
         return math.nan
     i = crossings[0]
     if distance[i] == 0.0:
-        return float(window.time[i])
+        return float(time[i])
     fraction = distance[i] / (distance[i] - distance[i + 1])
-    return float(window.time[i] + fraction * (window.time[i + 1] - window.time[i]))
+    return float(time[i] + fraction * (time[i + 1] - time[i]))

@@ -51,10 +51,8 @@ def sobol_indices(metric: Array, parameters: int, seed: int = 0) -> SobolIndices
     """
     table = metric.reshape(-1, parameters + 2)
     complete = np.isfinite(table).all(axis=1)
-    terms = _summands(table[complete])
-    count = len(terms)
-    undefined = np.full(parameters, np.nan)
     known = table[complete]
+    terms, count, undefined = _summands(known), len(known), np.full(parameters, np.nan)
     varies = len(known) and np.ptp(known) > 1e-12 * np.abs(known).max() and np.ptp(known[:, [0, -1]]) > 0
     if not varies:  # by more than rounding errors
         no_interval = np.tile(undefined, (2, 1))
@@ -166,19 +164,18 @@ def _statistics(values: Array) -> dict[str, Any]:
 
 def sensitivity_table(study: Study, indices: dict[str, SobolIndices]) -> Table:
     """The Sobol indices of each metric with respect to each parameter, with their confidence intervals."""
-    rows = [(name, parameter.path, i) for name in indices for i, parameter in enumerate(study.parameters)]
+    paths, found = [parameter.path for parameter in study.parameters], indices.values()
 
-    def column(field: str, bound: int | None = None) -> list[float]:
-        values = [getattr(indices[name], field) for name, _, _ in rows]
-        return [float((v if bound is None else v[bound])[i]) for v, (_, _, i) in zip(values, rows, strict=True)]
+    def pairs(intervals: list[Array]) -> TableColumn:
+        return TableColumn(list(zip(*np.hstack(intervals).tolist(), strict=True)), digits=3, brief=False)
 
     columns = {
-        "metric": [name for name, _, _ in rows],
-        "parameter": [path for _, path, _ in rows],
-        "first order": TableColumn(column("first"), digits=3),
-        "first order, interval": _pairs(column("first_interval", 0), column("first_interval", 1)),
-        "total": TableColumn(column("total"), digits=3),
-        "total, interval": _pairs(column("total_interval", 0), column("total_interval", 1)),
+        "metric": [name for name in indices for _ in paths],
+        "parameter": paths * len(indices),
+        "first order": TableColumn(np.concatenate([each.first for each in found]), digits=3),
+        "first order, interval": pairs([each.first_interval for each in found]),
+        "total": TableColumn(np.concatenate([each.total for each in found]), digits=3),
+        "total, interval": pairs([each.total_interval for each in found]),
     }
     note = (
         "Intervals: 95 % bootstrap confidence intervals. First order: fraction of the variance removed if the "
@@ -186,7 +183,3 @@ def sensitivity_table(study: Study, indices: dict[str, SobolIndices]) -> Table:
     )
     title = "Variance-based sensitivities (Sobol indices)"
     return Table("sensitivities", title, columns, note, brief=MAX_SENSITIVITIES)
-
-
-def _pairs(low: list[float], high: list[float]) -> TableColumn:
-    return TableColumn(list(zip(low, high, strict=True)), digits=3, brief=False)

@@ -1,6 +1,7 @@
 """Study files: a scenario, its varied parameters, the design of experiments and the metrics; docs/study.md."""
 
 import dataclasses
+import functools
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -65,19 +66,21 @@ class Study(ShortRepr):
         known = run_column_units(self.template.scenario.problem)
         return {name: metric.unit(known[metric.column]) for name, metric in self.metrics.items()}
 
+    @property
+    def metric_times(self) -> npt.NDArray[np.float64]:
+        """All times [s] at which the metrics are evaluated, sorted."""
+        return np.unique(np.concatenate([metric.times for metric in self.metrics.values()]))
+
     def scalar_values(self, recording: Recording) -> dict[str, float]:
         """The scalar metrics of a run."""
         time = recording["time"]
         return {name: metric.value(time, recording[metric.column]) for name, metric in self.scalars.items()}
 
-    def chunk_runs(self, index: int) -> range:
-        """The runs of one chunk."""
-        return range(index * self.chunk_size, min((index + 1) * self.chunk_size, len(self)))
-
-    @property
-    def chunks(self) -> range:
-        """The indices of the chunks."""
-        return range(-(-len(self) // self.chunk_size))
+    @functools.cached_property
+    def chunks(self) -> list[range]:
+        """The runs of each chunk."""
+        starts = range(0, len(self), self.chunk_size)
+        return [range(start, min(start + self.chunk_size, len(self))) for start in starts]
 
     def varying(self, runs: Sequence[int]) -> tuple[tuple[ScenarioParameter, ...], npt.NDArray[np.float64]]:
         """The D varied parameters and those that follow them, and their values (R, D) in R runs."""
@@ -110,7 +113,13 @@ def _build_study(file: Path, tables: Mapping[str, Any], location: Location, temp
     """The study of a scenario, whose ambient pressure is that of the texts."""
     vary = _require_table(tables, "vary", location)
     parameters = {path: template.parameter(path, str(location.inside("vary"))) for path in vary}
-    variations = [_read_variation(vary[path], parameter, location) for path, parameter in parameters.items()]
+    variations = []
+    for path, parameter in parameters.items():
+        entry, (low, high) = Location(f'{location}, [vary], "{path}"', "", location.folder), parameter.bounds
+        variations.append(read_variation(vary[path], parameter.unit, entry))
+        if outside := [v for v in variations[-1].support if np.isfinite(v) and not low <= v <= high]:
+            unit = "" if parameter.unit == "1" else f" {parameter.unit}"
+            raise ParameterError(f"{entry} includes {outside[0]:g}{unit}; allowed range: {low:g} to {high:g}{unit}.")
     table = _require_table(tables, "design", location)
     design: Design = TableReader(classes=DESIGNS).build(table, location.inside("design"))
     with located_errors(location.inside("design")):
@@ -162,17 +171,6 @@ def _require_table(tables: Mapping[str, Any], key: str, location: Location) -> M
     return table
 
 
-def _read_variation(value: Any, parameter: ScenarioParameter, location: Location) -> Variation:
-    entry = Location(f'{location}, [vary], "{parameter.path}"', "", location.folder)
-    variation = read_variation(value, parameter.unit, entry)
-    low, high = parameter.bounds
-    unit = "" if parameter.unit == "1" else f" {parameter.unit}"
-    outside = [v for v in variation.support if np.isfinite(v) and not low <= v <= high]
-    if outside:
-        raise ParameterError(f"{entry} includes {outside[0]:g}{unit}; allowed range: {low:g} to {high:g}{unit}.")
-    return variation
-
-
 def _read_follow(
     table: Any, template: ScenarioTemplate, varied: list[str], location: Location
 ) -> tuple[tuple[ScenarioParameter, int], ...]:
@@ -205,8 +203,5 @@ def _read_metrics(tables: Mapping[str, Any], scenario: Scenario, location: Locat
             check_known(f"{inner}: a run has no column", column, known, "its columns are")
         metric = TableReader(classes=METRICS, known=known.get(str(column), "1") or "1").build(table, inner)
         with located_errors(inner):
-            metric.check_range(scenario.problem.start_time, scenario.problem.duration)
-            if isinstance(metric, TimeSeries):
-                metric = metric.clip_to_run(scenario.problem.start_time, scenario.problem.duration)
-        metrics[name] = metric
+            metrics[name] = metric.clip_to_run(scenario.problem.start_time, scenario.problem.duration)
     return metrics
