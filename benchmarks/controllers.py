@@ -47,7 +47,7 @@ def predictive_times(law: am.control.LinearModelPredictive) -> dict[str, np.ndar
     """Times [s] of the program with its limits, and of the whole sample, shape (SAMPLES,)."""
     rng, memory = np.random.default_rng(3), law.init()
     ranges = {f"{side}.setpoint": (0.0, 6e5) for side in SIDES}
-    low, high = ((np.full(2, end) - law.observer.inputs) / law.observer.input_sizes for end in (0.0, 6e5))
+    low, high = ((np.full(2, end) - law.model.inputs) / law.model.input_sizes for end in (0.0, 6e5))
     alone, whole = [], []
     for _ in range(SAMPLES):
         pressures, angles = rng.uniform(1.5e5, 3.5e5, 2).tolist(), rng.uniform(-0.3, 0.3, 2).tolist()

@@ -18,7 +18,7 @@ from plants import EXAMPLES
 from airmuscle.core import parameters
 from airmuscle.core.annotation import conforms, type_hints
 from airmuscle.engine import SampledSignal, Schedule
-from airmuscle.engine.loop.control_loop import CombinedSignal
+from airmuscle.engine.loop.inputs import CombinedSignal
 from airmuscle.errors import AirmuscleError
 from airmuscle.files.library import model_names
 from airmuscle.physics import AirSource, Ambient, Circuit, ExternalLoad, Gas, Mechanism, Muscle, Plant, SharedSupply

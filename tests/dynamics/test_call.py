@@ -30,8 +30,8 @@ from airmuscle.engine import (
 from airmuscle.engine.compile import compile_system
 from airmuscle.engine.compile.cache.kernel import record
 from airmuscle.engine.loop import PwmState, merge_columns
-from airmuscle.engine.run import output_times as rows_of_a_run
-from airmuscle.engine.run.output_times import merge_output_times
+from airmuscle.engine.run import problem
+from airmuscle.engine.run.problem import merge_output_times
 from airmuscle.engine.run.solution import RowRecorder
 from airmuscle.errors import AirmuscleWarning, GeometryLimitError, ParameterError
 from airmuscle.physics import FillDischarge, HangingMass, Plant, Polytropic, Supply, Valve
@@ -163,12 +163,12 @@ def test_a_command_that_one_system_takes_is_refused_by_another_of_a_smaller_rang
 @given(st.lists(TICKS, unique=True, max_size=30), st.lists(TICKS, min_size=1, max_size=8), st.sampled_from([0, 1e-12]))
 def test_few_rows_and_instants_are_merged_as_many_are(grid, instants, shift):
     grid, instants = np.sort(np.array(grid, dtype=float)), np.sort(instants) + shift
-    given_few = rows_of_a_run._FEW
-    rows_of_a_run._FEW = 0
+    given_few = problem.FEW_INSTANTS
+    problem.FEW_INSTANTS = 0
     try:
         many = merge_output_times(grid, instants, 10.0).tolist()
     finally:
-        rows_of_a_run._FEW = given_few
+        problem.FEW_INSTANTS = given_few
     assert merge_output_times(grid, instants, 10.0).tolist() == many
 
 

@@ -29,7 +29,7 @@ from airmuscle import (
     simulate,
 )
 from airmuscle.engine import PWM, PiecewiseLinear, SampledSignal, Schedule, SolenoidDriver, WithDrivers
-from airmuscle.engine.run.output_times import output_times
+from airmuscle.engine.run.problem import output_times
 from airmuscle.errors import ParameterError
 
 INPUTS = ("other", "fill")

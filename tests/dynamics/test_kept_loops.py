@@ -11,8 +11,8 @@ from control_plants import LIFT, SPLIT, assert_identical
 
 from airmuscle.control import PID, OnOffController
 from airmuscle.engine import PWM, ControlLoop, Problem, RungeKutta4, SampledSignal, Schedule, SolenoidDriver, solve
-from airmuscle.engine.run import closed_loop
-from airmuscle.engine.run.closed_loop import form_of
+from airmuscle.engine.run import prepare_loop
+from airmuscle.engine.run.run import form_of
 
 STEPS = Schedule({"pressure": ((0, 1e5), (0.5, 3e5), (0.703, 2e5))})
 SOLENOID = SolenoidDriver(2e-3, 1.5e-3, 1e-3, 1.2e-3)
@@ -30,8 +30,9 @@ def fresh(problem: Problem):
 @pytest.fixture
 def prepared(monkeypatch):
     """The loops that were prepared anew."""
-    loops, prepare = [], closed_loop.prepare_loop
-    monkeypatch.setattr(closed_loop, "prepare_loop", lambda *given: loops.append(1) or prepare(*given))
+    loops = []
+    preparing = lambda *given: loops.append(1) or prepare_loop(*given)  # noqa: E731
+    monkeypatch.setattr("airmuscle.engine.run.run.prepare_loop", preparing)
     return loops
 
 

@@ -52,7 +52,7 @@ def measurement(angle, setpoint, low=0.0, high=6e5, pressures=(2.5e5, 2.5e5)):
 
 def bounds(judged, error, steady, low, high):
     """The limits of z as stated in CondensedProblem, written down once more."""
-    problem, target, n = judged.problem, judged.target, len(error)
+    problem, target, n = judged.problem, judged.model, len(error)
     rows = problem.rows
     shift = (target.columns @ steady[:n])[problem.limited] + problem.rows_by_state @ error
     top, bottom = (limit[problem.limited] - shift for limit in (target.upper, target.lower))
@@ -66,13 +66,13 @@ def bounds(judged, error, steady, low, high):
 def target_of(judged, estimate, setpoint):
     """Deviation (n,) of the state from its target, and the target (n + m,) of state and inputs."""
     n = judged.problem.gradient.shape[1]
-    steady = judged.target.by_disturbance @ estimate[n:] + judged.target.by_setpoint @ setpoint
+    steady = judged.model.by_disturbance @ estimate[n:] + judged.model.by_setpoint @ setpoint
     return estimate[:n] - steady[:n], steady
 
 
 def test_the_target_is_at_rest_and_has_the_set_point():
     judged, rng = law(), np.random.default_rng(6)
-    model, n = judged.observer, judged.problem.gradient.shape[1]
+    model, n = judged.model, judged.problem.gradient.shape[1]
     estimate, setpoint = rng.normal(size=n + 3), np.array([0.1])
     _, steady = target_of(judged, estimate, setpoint)
     state = np.concatenate([steady[:n], estimate[n:]])
@@ -147,7 +147,7 @@ def test_a_short_plan_is_that_of_an_exhaustive_search_of_the_active_limits():
 def test_without_active_limits_the_plan_is_that_of_the_linear_quadratic_regulator():
     judged, rng = law(horizon=7), np.random.default_rng(2)
     n = judged.problem.gradient.shape[1]
-    a, b = judged.observer.transition[:n, :n], judged.observer.input_matrix[:n]
+    a, b = judged.model.transition[:n, :n], judged.model.input_matrix[:n]
     weights = np.diag([1.0 if s in GIVEN["permitted"] else 0.0 for s in AT.states])
     gain, _ = regulator("test", a, b, weights, np.eye(2))
     wide = np.full(2, 1e4)
@@ -255,9 +255,9 @@ def test_the_plan_is_that_of_an_independent_solver():
     for _ in range(60):
         estimate, setpoint = rng.normal(scale=0.5, size=n + 3), 0.3 * rng.normal(size=1)
         error, steady = target_of(judged, estimate, setpoint)
-        shift = (judged.target.columns @ steady[:n])[problem.limited] + problem.rows_by_state @ error
-        top = np.where(problem.upper, judged.target.upper[problem.limited] - shift, 1e30)
-        bottom = np.where(problem.upper, -1e30, judged.target.lower[problem.limited] - shift)
+        shift = (judged.model.columns @ steady[:n])[problem.limited] + problem.rows_by_state @ error
+        top = np.where(problem.upper, judged.model.upper[problem.limited] - shift, 1e30)
+        bottom = np.where(problem.upper, -1e30, judged.model.lower[problem.limited] - shift)
         change = np.eye(10, size) - np.eye(10, size, k=-2)
         first = np.concatenate([before - steady[n:], np.zeros(8)])
         step = np.tile(np.array([2e7, 1.5e7]) * H / 1e5, 5)
@@ -280,7 +280,7 @@ def test_the_commands_keep_the_rates_and_the_planned_blocks_are_constant():
     steps = np.abs(np.diff(record["command.left.setpoint"]))
     assert steps.max() == pytest.approx(2e6 * H, rel=1e-6)
     assert np.abs(np.diff(record["command.right.setpoint"])).max() > 1.5 * 2e6 * H
-    plan = judged.plan(np.full(len(judged.observer.transition), 0.1), np.ones(1), np.full(2, -2.0), np.full(2, 2.0))
+    plan = judged.plan(np.full(len(judged.model.transition), 0.1), np.ones(1), np.full(2, -2.0), np.full(2, 2.0))
     assert (plan[1] == plan[2]).all()
     assert (plan[3:] == plan[3]).all()
     assert (plan[0] != plan[1]).any()
@@ -289,7 +289,7 @@ def test_the_commands_keep_the_rates_and_the_planned_blocks_are_constant():
 def disturbed_angles(judged, size):
     """Greatest angle of the model of a design under random disturbances of the angular speed at their bounds [rad]."""
     n, rng = judged.problem.gradient.shape[1], np.random.default_rng(8)
-    model, state, memory = judged.observer, np.zeros(judged.problem.gradient.shape[1]), judged.init()
+    model, state, memory = judged.model, np.zeros(judged.problem.gradient.shape[1]), judged.init()
     angles, scale = [], 0.02
     for k in range(400):
         estimate = np.concatenate([state, np.zeros(3)])

@@ -10,7 +10,7 @@ import plants
 import pytest
 
 from airmuscle.engine import Problem, Rodas4, SampledSignal, Schedule, solve
-from airmuscle.engine.loop.control_loop import CombinedSignal
+from airmuscle.engine.loop.inputs import CombinedSignal
 from airmuscle.errors import ParameterError
 from airmuscle.physics import ExternalLoad, WithEnergyMeters, open_plant
 

@@ -5,7 +5,6 @@ An executor has the interface of `concurrent.futures`; local processes are those
 
 import contextlib
 import contextvars
-import dataclasses
 import hashlib
 import importlib
 import math
@@ -18,7 +17,7 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..core import FileError, InputError, atomic_file, check_writable, program_fingerprint
 from .distribution import Claims
@@ -98,8 +97,7 @@ def _own_thread() -> Iterator[Executor]:
         stop_events.remove(stopped)
 
 
-@dataclasses.dataclass
-class _Task:
+class _Task(NamedTuple):
     """A submitted call, and its future for the caller."""
 
     key: str

@@ -61,10 +61,15 @@ def process_pool(
     stop_event = context.Event()
     executor = _ProcessPool(workers, mp_context=context, initializer=_initialise_worker,
                             initargs=(stop_event, current_units(), max(1, available_cores() // workers)))  # fmt: skip
+    added = [name for name in BLAS_THREADS if one_thread_each and name not in os.environ]
     try:
-        with _one_thread_each() if one_thread_each else contextlib.nullcontext():
+        os.environ.update(dict.fromkeys(added, "1"))
+        try:
             for _ in range(workers):  # each starts a worker, as none is idle yet
                 executor.submit(os.getpid)
+        finally:
+            for name in added:
+                del os.environ[name]
         yield executor
     except BaseException:
         stop_event.set()
@@ -75,18 +80,6 @@ def process_pool(
         executor.shutdown(cancel_futures=True)
 
 
-@contextlib.contextmanager
-def _one_thread_each() -> Iterator[None]:
-    """One thread for linear algebra in the processes that are started in the block."""
-    added = [name for name in BLAS_THREADS if name not in os.environ]
-    os.environ.update(dict.fromkeys(added, "1"))
-    try:
-        yield
-    finally:
-        for name in added:
-            del os.environ[name]
-
-
 class _ProcessPool(ProcessPoolExecutor):
     """A pool that blocks SIGINT while a worker starts, until the worker ignores the signal.
 
@@ -95,26 +88,18 @@ class _ProcessPool(ProcessPoolExecutor):
     """
 
     def submit(self, *task: Any, **arguments: Any) -> Future[Any]:
-        with _sigint_blocked():
+        if not hasattr(signal, "pthread_sigmask"):  # Windows
             return super().submit(*task, **arguments)
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            return super().submit(*task, **arguments)
+        finally:
+            signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
     def terminate(self) -> None:
         """End all workers at once; their tasks are lost."""
         for process in list((self._processes or {}).values()):
             process.terminate()
-
-
-@contextlib.contextmanager
-def _sigint_blocked() -> Iterator[None]:
-    """Block SIGINT within the block, in this process and in the processes started in it."""
-    if not hasattr(signal, "pthread_sigmask"):  # Windows
-        yield
-        return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _initialise_worker(stop_event: Any, units: tuple[str, ...] | None, share: int) -> None:
@@ -130,13 +115,10 @@ def _initialise_worker(stop_event: Any, units: tuple[str, ...] | None, share: in
 
 
 def _exit_with_parent() -> None:
-    """End this worker as soon as its parent has ended; a killed parent cannot stop its workers.
-
-    The parent holds the other end of a pipe, which the operating system closes when the parent ends.
-    """
+    """End this worker as soon as its parent has ended; a killed parent cannot stop its workers."""
     parent = multiprocessing.parent_process()
     if parent is not None:
-        parent.join()
+        parent.join()  # until the operating system closes a pipe, of which the parent holds the other end
         os._exit(1)
 
 

@@ -1,5 +1,3 @@
-from .estimates import Innovation as Innovation
-from .estimates import StateEstimate as StateEstimate
 from .kalman_filters import ExtendedKalmanFilter as ExtendedKalmanFilter
 from .kalman_filters import UnscentedKalmanFilter as UnscentedKalmanFilter
 from .kalman_filters import consistency_band as consistency_band
@@ -11,6 +9,8 @@ from .nonlinear_predictive import FiniteControlSet as FiniteControlSet
 from .nonlinear_predictive import NonlinearModelPredictive as NonlinearModelPredictive
 from .predictive_design import PredictiveControl as PredictiveControl
 from .predictive_design import design_predictive as design_predictive
+from .state_estimator import Innovation as Innovation
+from .state_estimator import StateEstimate as StateEstimate
 from .state_estimator import StateEstimator as StateEstimator
 
 # isort: split

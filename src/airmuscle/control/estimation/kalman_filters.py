@@ -2,6 +2,7 @@
 
 import dataclasses
 from collections.abc import Sequence
+from types import SimpleNamespace
 from typing import Any, ClassVar
 
 import numpy as np
@@ -9,8 +10,7 @@ import numpy as np
 from ...core import Array, ParameterError, Reference, check_whole, published
 from ...engine.compile.cache.kernel import Kernel
 from ...recording.recording import Recording
-from .estimates import BoundFilter, StateEstimate
-from .state_estimator import StateEstimator
+from .state_estimator import StateEstimate, StateEstimator
 
 _predict_extended = Kernel("predict_extended", "kalman_filter")
 _correct_extended = Kernel("correct_extended", "kalman_filter")
@@ -34,19 +34,17 @@ class ExtendedKalmanFilter(StateEstimator):
 
     def transition(self, state: Array, inputs: Sequence[float]) -> tuple[Array, Array]:
         """The state (n,) one sample later, and its derivative by the state now (n, n)."""
-        bound = self._filled(StateEstimate(state, np.zeros((len(state), len(state)))), inputs)
-        self._run(bound.predict, bound)
-        matrix = bound.transition.copy()
-        return self._taken(bound).mean, matrix
+        known = StateEstimate(state, np.zeros((len(state), len(state))))
+        later, (matrix,) = self._computed("predict", known, inputs, ("transition",))
+        return later.mean, matrix
 
     def observation(self, state: Array, inputs: Sequence[float]) -> tuple[Array, Array]:
         """The measured columns (p,) at a state (n,), and their derivative by it (p, n)."""
-        bound = self._filled(StateEstimate(state, np.zeros((len(state), len(state)))), inputs)
-        bound.values[:], bound.variances[:] = 0.0, self.variances
-        self._run(bound.correct, bound)
-        columns, slopes = -bound.difference, bound.slopes.copy()
-        self._taken(bound)
-        return columns, slopes
+        known, zero = StateEstimate(state, np.zeros((len(state), len(state)))), np.zeros(len(self.measured))
+        _, (missing, slopes) = self._computed(
+            "correct", known, inputs, ("difference", "slopes"), (zero, self.variances)
+        )
+        return -missing, slopes
 
     def smooth(self, recording: Recording, first: StateEstimate) -> dict[str, Array]:
         """The columns of `estimate`, where each row also knows all later measurements: for records, not for control.
@@ -69,7 +67,7 @@ class ExtendedKalmanFilter(StateEstimator):
         kept = [mean for mean, each in zip(reversed(means), passes, strict=True) if each.row is not None]
         return {"time": rows.time, **self.table(np.array(kept), rows.held)}
 
-    def _kernels(self, at: BoundFilter) -> tuple[Any, Any]:
+    def _kernels(self, at: SimpleNamespace) -> tuple[Any, Any]:
         functions, n, (p, total) = self._functions, self._compiled.sizes.states, at.slopes.shape
         predict = _predict_extended.bind(
             functions.rates, functions.constants, self.magnitudes, float(self.sample_time), self.noise, at.mean,
@@ -145,7 +143,7 @@ class UnscentedKalmanFilter(StateEstimator):
         centre = 1.0 - len(self.states) / gamma_squared
         return centre, centre + 1.0 - self.alpha**2 + self.beta, 0.5 / gamma_squared
 
-    def _kernels(self, at: BoundFilter) -> tuple[Any, Any]:
+    def _kernels(self, at: SimpleNamespace) -> tuple[Any, Any]:
         functions, n, (p, total) = self._functions, self._compiled.sizes.states, at.slopes.shape
         spread, weights = float(0.5 / self.weights[2]) ** 0.5, np.array(self.weights)
         points, root = np.zeros((2 * total + 1, total)), np.zeros((total, total))

@@ -20,19 +20,13 @@ MAX_HORIZON, STEPS, SETTLED = 200, 20, 1e-9
 _shortest = Kernel("shortest_vector", "predictive")
 
 
-class WindowSample(NamedTuple):
-    """A sample of the window: inputs (m,) held before it, and measured columns (p,), NaN where one is missing."""
-
-    inputs: Array
-    values: Array
-
-
 class EstimationWindow(NamedTuple):
-    """The samples of the window, the filter's prediction before the first one, its estimate after the last one, and the
-    noise (z,) of the last solution, from which the next search starts."""
+    """The samples of the window, each its inputs (m,), held before it, and measured columns (p,), NaN where missing; a
+    filter's prediction before the first one, its estimate after the last one, and the noise (z,) of the last solution,
+    from which the next search starts."""
 
     arrival: StateEstimate
-    samples: tuple[WindowSample, ...]
+    samples: tuple[tuple[Array, Array], ...]
     filtered: StateEstimate
     noise: Array
 
@@ -75,20 +69,20 @@ class MovingHorizonEstimator(ShortRepr):
 
     def start(self, first: StateEstimate, values: Sequence[float], inputs: Sequence[float]) -> EstimationWindow:
         """The window of the first sample, whose estimate before its measurement is `first`."""
-        sample = WindowSample(np.array(inputs, dtype=float), np.array(values, dtype=float))
+        sample = np.array(inputs, dtype=float), np.array(values, dtype=float)
         filtered, _ = self.filter.correct(first, values, inputs)
         return self._solved(EstimationWindow(first, (sample,), filtered, np.zeros(len(first.mean))))
 
     def update(self, window: EstimationWindow, values: Sequence[float], inputs: Sequence[float]) -> EstimationWindow:
         """The window one sample later, with measured columns (p,), NaN where one is missing, and inputs held before."""
-        sample = WindowSample(np.asarray(inputs, dtype=float), np.asarray(values, dtype=float))
-        predicted = self.filter.predict(window.filtered, sample.inputs.tolist())
+        sample = np.asarray(inputs, dtype=float), np.asarray(values, dtype=float)
+        predicted = self.filter.predict(window.filtered, sample[0].tolist())
         filtered, _ = self.filter.correct(predicted, values, inputs)
         samples, arrival, noise = (*window.samples, sample), window.arrival, window.noise
         if len(samples) > self.horizon:
-            first, second = samples[0], samples[1]
-            corrected, _ = self.filter.correct(arrival, first.values.tolist(), first.inputs.tolist())
-            arrival, samples = self.filter.predict(corrected, second.inputs.tolist()), samples[1:]
+            (held, measured), (later, _) = samples[:2]
+            corrected, _ = self.filter.correct(arrival, measured.tolist(), held.tolist())
+            arrival, samples = self.filter.predict(corrected, later.tolist()), samples[1:]
             noise = np.zeros(0)
         size = len(arrival.mean) + (len(samples) - 1) * self._noisy.shape[1]
         return self._solved(EstimationWindow(arrival, samples, filtered, np.append(noise, np.zeros(size))[:size]))
@@ -124,9 +118,9 @@ class MovingHorizonEstimator(ShortRepr):
         slope = np.zeros((n, len(noise)))
         slope[:, :n] = root
         states, slopes = [window.arrival.mean + root @ noise[:n]], [slope]
-        for k, sample in enumerate(window.samples[1:]):
+        for k, (inputs, _) in enumerate(window.samples[1:]):
             part = slice(n + k * q, n + (k + 1) * q)
-            state, matrix = self.filter.transition(states[-1], sample.inputs.tolist())
+            state, matrix = self.filter.transition(states[-1], inputs.tolist())
             slope = matrix @ slopes[-1]
             slope[:, part] += step
             states.append(state + step @ noise[part])
@@ -160,10 +154,10 @@ class MovingHorizonEstimator(ShortRepr):
         """Measured minus predicted columns (r,) in standard deviations, and predictions by the noise (r, z)."""
         deviations = np.sqrt(self.filter.variances)
         misfits, rows = [], []
-        for sample, state, slope in zip(window.samples, states, slopes, strict=True):
-            predicted, by_state = self.filter.observation(state, sample.inputs.tolist())
-            here = ~np.isnan(sample.values)
-            misfits.append(((sample.values - predicted) / deviations)[here])
+        for (inputs, values), state, slope in zip(window.samples, states, slopes, strict=True):
+            predicted, by_state = self.filter.observation(state, inputs.tolist())
+            here = ~np.isnan(values)
+            misfits.append(((values - predicted) / deviations)[here])
             rows.append((by_state @ slope / deviations[:, None])[here])
         return np.concatenate(misfits), np.vstack(rows)
 

@@ -6,21 +6,45 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from ...core import Array, ParameterError, Reference, SolveError, Status, check_field_types, published, within
+from ...core import Array, Reference, ShortRepr, Status, check_field_types, published, within
 from ...core.declaration import forwarded
-from ...core.errors import check_known
+from ...core.errors import ParameterError, SolveError, check_known
 from ...engine.compile import Kernel, augmented_rates, compile_system
-from ...engine.loop.controller import Measurement, MultivariableController, failure_notes
-from ...physics.analysis import held, linearise
+from ...engine.loop.controller import Controller, Measurement, MultivariableController, failure_notes
 from ..laws.linear_model_predictive import RAWLINGS2017
-from .estimates import StateEstimate
-from .lqg_and_adrc import check_numbers, regulator
+from .lqg_and_adrc import check_numbers, check_sample_time
 from .predictive_program import MAX_HORIZON, PredictiveProgram, check_limits
-from .state_estimator import EstimatingController
+from .state_estimator import StateEstimate, StateEstimator
 
 MAX_SEQUENCES = 1_000_000
 """Maximum number of sequences of modes (chosen)."""
 _choose = Kernel("choose_mode", "best_mode_sequence")
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class EstimatingController(ShortRepr, Controller):
+    """A controller that estimates the state of its plant, with programs that one thread uses at a time."""
+
+    estimator: StateEstimator
+    first: StateEstimate = dataclasses.field(repr=False)
+    _idle: list[Any] = dataclasses.field(init=False, repr=False, default_factory=list)
+
+    measured_columns = forwarded("estimator.measured")
+
+    def __getstate__(self) -> dict[str, Any]:
+        """The fields without programs, which belong to one process."""
+        return {**self.__dict__, "_idle": []}
+
+    def estimate(self, before: StateEstimate, measurement: Measurement, inputs: Any, dt: float) -> StateEstimate:
+        """The estimate with a measurement. Raises ParameterError where the loop has another sample time."""
+        check_sample_time(type(self).__name__, dt, self.estimator.sample_time)
+        values = [float(measurement.columns[name]) for name in self.measured_columns]
+        return self.estimator.correct(before, values, inputs)[0]
+
+    def ordered(self, inputs: Mapping[str, float]) -> list[float]:
+        """The inputs of the plant in its order; 0 where none is given."""
+        names = compile_system(self.estimator.plant).description.input_names
+        return [float(inputs.get(name, 0.0)) for name in names]
 
 
 class NonlinearMemory(NamedTuple):
@@ -129,32 +153,17 @@ class NonlinearModelPredictive(EstimatingController, MultivariableController):
         wanted     set points (q,), `low` and `high` limits of the commanded inputs (m,) [SI]
         variables  those of the last solution, from which the search starts
         """
-        programs = self._idle.pop() if self._idle else self._built()
-        solution = programs.solve(state, wanted, low, high, variables)
-        self._idle.append(programs)
+        names = compile_system(self.estimator.plant).description.input_names
+        start = dict(zip(names, self._all_inputs(self.init().applied), strict=True))
+        program = self._idle.pop() if self._idle else PredictiveProgram(self, start)
+        solution = program.solve(state, wanted, low, high, variables)
+        self._idle.append(program)
         return solution
 
     def _all_inputs(self, commanded: Array) -> list[float]:
         """The inputs of the plant in its order."""
         commands = dict(zip(self.commanded, commanded.tolist(), strict=True))
         return self.ordered({**self.operating_inputs, **commands})
-
-    def _built(self) -> PredictiveProgram:
-        estimator, ready = self.estimator, compile_system(self.estimator.plant)
-        states = ready.description.state_names
-        inputs = dict(zip(ready.description.input_names, self._all_inputs(self.init().applied), strict=True))
-        magnitudes = dict(zip(states, estimator.magnitudes.tolist(), strict=False))
-        scale = np.array([self.permitted.get(name, size) for name, size in magnitudes.items()])
-        sizes = np.array([self.permitted[name] for name in self.commanded])
-        point = dict(zip(states, self.first.mean.tolist(), strict=False))
-        linear = linearise(estimator.plant, point, inputs).select(inputs=list(self.commanded))
-        a, b = held(linear.A * scale / scale[:, None], linear.B * sizes / scale[:, None], estimator.sample_time)
-        weights = np.diag([1.0 if name in self.permitted else 0.0 for name in states])
-        _, terminal = regulator("NonlinearModelPredictive", a, b, weights, np.eye(sizes.size))
-        return PredictiveProgram(
-            estimator.plant, estimator.places[1], inputs, self.controlled, self.commanded, scale, sizes, weights,
-            terminal, dict(self.limits), float(self.slack_weight), self.horizon, self.substeps, estimator.sample_time,
-        )  # fmt: skip
 
 
 class FiniteSetMemory(NamedTuple):

@@ -12,7 +12,7 @@ from ...physics.analysis.linear_model import LinearModel, linearise
 from ...physics.equilibrium import find_equilibrium
 from ...physics.plant.plant import Plant
 from ..laws import CHISCI2001, RAWLINGS2017, LinearModelPredictive
-from ..laws.linear_model_predictive import CondensedProblem, ObserverModel, PredictiveMemory, TargetMap
+from ..laws.linear_model_predictive import CondensedProblem, ObservedModel, PredictiveMemory
 from .lqg_and_adrc import (
     DISTURBANCE,
     check_numbers,
@@ -79,10 +79,6 @@ def design_predictive(
     noise = np.array([process_noise.get(i, 0.0) for i in names]) / np.append(scale, np.ones(len(disturbed)))
     deviations = np.array([measurement_noise[name] for name in measured])
     at = [np.array([model.output_values[name] for name in part]) for part in (measured, controlled, limits)]
-    observer = ObserverModel(
-        *disturbance_observer(where, (a, b, by_disturbance, c), np.diag(noise**2) * sample_time, deviations),
-        at[0], np.array([model.input_values[name] for name in model.inputs]), sizes,
-    )  # fmt: skip
     ranges = np.array([high - low for low, high in limits.values()])
     columns = limited / ranges[:, None]
     entering = sampled_plant(model, sample_time, scale, sizes, tuple(bounded))[2] * list(bounded.values())
@@ -90,8 +86,12 @@ def design_predictive(
     change = sample_time * np.array([max_rate.get(name, np.inf) for name in model.inputs]) / sizes
     problem = condense((a, b), weights, costs, terminal, columns, slack_weight, blocks, change, reach)
     ends = [(np.array([pair[i] for pair in limits.values()]) - at[2]) / ranges for i in (0, 1)]
-    maps = TargetMap(*steady_target(where, a, b, by_disturbance, z), at[1], columns, *ends)
-    return LinearModelPredictive(tuple(measured), tuple(controlled), model.inputs, observer, maps, problem)
+    observed = ObservedModel(
+        *disturbance_observer(where, (a, b, by_disturbance, c), np.diag(noise**2) * sample_time, deviations),
+        at[0], np.array([model.input_values[name] for name in model.inputs]), sizes,
+        *steady_target(where, a, b, by_disturbance, z), at[1], columns, *ends,
+    )  # fmt: skip
+    return LinearModelPredictive(tuple(measured), tuple(controlled), model.inputs, observed, problem)
 
 
 @model

@@ -3,21 +3,58 @@
 import abc
 import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, NamedTuple
 
 import numpy as np
+import numpy.typing as npt
 
 from ...core import Array, ParameterError, ShortRepr, SolveError, Status, System, check_field_types, check_known, tree
-from ...core.declaration import forwarded
-from ...core.system import check_system, state_vector
+from ...core.system import check_system, select_prefix, state_vector
 from ...engine.compile import AugmentedRates, CompiledSystem, augmented_rates, compile_system, states_and_outputs
-from ...engine.loop import COMMAND, Controller, Measurement
+from ...engine.loop import COMMAND
 from ...recording.recording import Recording
-from .estimates import BoundFilter, Innovation, MeasuredRows, Pass, StateEstimate
-from .lqg_and_adrc import DISTURBANCE, check_numbers, check_sample_time
+from .lqg_and_adrc import DISTURBANCE, check_numbers
 
 UNKNOWN = 1e30
 """Factor of the variance of a missing measurement."""
+
+
+class StateEstimate(NamedTuple):
+    """Mean (n,) and covariance (n, n) of the estimated states of a plant."""
+
+    mean: Array
+    covariance: Array
+
+
+class Innovation(NamedTuple):
+    """Measured minus predicted columns (p,) and their covariance (p, p)."""
+
+    difference: Array
+    covariance: Array
+
+    @property
+    def normalised_square(self) -> float:
+        """nu^T S^-1 nu [1]; its mean is p for a consistent filter."""
+        return float(self.difference @ np.linalg.solve(self.covariance, self.difference))
+
+
+class MeasuredRows(NamedTuple):
+    """Times (N,) [s], measured columns (N, p), inputs held before each row (N, m), samples between rows (N - 1,)."""
+
+    time: Array
+    measured: Array
+    held: Array
+    counts: npt.NDArray[np.int64]
+
+
+class Pass(NamedTuple):
+    """A sample of a filter: its row, None where it was lost, the estimate before and after its correction, inputs."""
+
+    row: int | None
+    predicted: StateEstimate
+    corrected: StateEstimate
+    inputs: Array
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -47,7 +84,7 @@ class StateEstimator(ShortRepr, abc.ABC):
     gate: float = 1.0
     _compiled: CompiledSystem = dataclasses.field(init=False, repr=False)
     _functions: AugmentedRates = dataclasses.field(init=False, repr=False)
-    _idle: list[BoundFilter] = dataclasses.field(init=False, repr=False)
+    _idle: list[SimpleNamespace] = dataclasses.field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         owner = type(self).__name__
@@ -77,23 +114,22 @@ class StateEstimator(ShortRepr, abc.ABC):
         return {field.name: getattr(self, field.name) for field in dataclasses.fields(self) if field.init}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        for name, value in state.items():
-            object.__setattr__(self, name, value)
-        self.__post_init__()
+        self.__init__(**state)  # type: ignore[misc]
 
     @abc.abstractmethod
-    def _kernels(self, at: BoundFilter) -> tuple[Any, Any]:
+    def _kernels(self, at: SimpleNamespace) -> tuple[Any, Any]:
         """The compiled prediction and correction, bound to arrays."""
 
-    def _bind(self) -> BoundFilter:
-        """The compiled filter with new arrays."""
+    def _bind(self) -> SimpleNamespace:
+        """The compiled prediction and correction of the filter with the arrays that they read and write."""
         n, p = len(self.states), len(self.measured)
-        bound = BoundFilter(
-            np.zeros(n), np.zeros((n, n)), np.zeros(self._compiled.sizes.inputs), np.zeros(p), np.zeros(p),
-            np.zeros((p, p)), np.zeros((n, n)), self.variances, np.zeros((p, n)),
+        bound = SimpleNamespace(
+            mean=np.zeros(n), covariance=np.zeros((n, n)), inputs=np.zeros(self._compiled.sizes.inputs),
+            values=np.zeros(p), variances=self.variances, difference=np.zeros(p), slopes=np.zeros((p, n)),
+            difference_covariance=np.zeros((p, p)), transition=np.zeros((n, n)),
         )  # fmt: skip
-        predict, correct = self._kernels(bound)
-        return bound._replace(predict=predict, correct=correct)
+        bound.predict, bound.correct = self._kernels(bound)
+        return bound
 
     @property
     def states(self) -> tuple[str, ...]:
@@ -128,10 +164,9 @@ class StateEstimator(ShortRepr, abc.ABC):
     @property
     def magnitudes(self) -> Array:
         """Magnitudes (n,) of the estimated states, by which the equations are scaled."""
-        nominal = self._compiled.nominal.tolist()
+        nominal = dict(zip(self._compiled.description.state_names, self._compiled.nominal.tolist(), strict=True))
         further = [abs(self._parameter_values[name]) or 1.0 for name in self.parameters]
-        states = self._compiled.description.state_names
-        return np.array([*nominal, *further, *(nominal[states.index(name)] for name in self.disturbances)])
+        return np.array([*nominal.values(), *further, *(nominal[name] for name in self.disturbances)])
 
     def start(self, state: Mapping[str, float], deviations: Mapping[str, float]) -> StateEstimate:
         """The first estimate: a state, and the standard deviations of its values; 0 unless given.
@@ -151,9 +186,7 @@ class StateEstimator(ShortRepr, abc.ABC):
 
         Raises SolveError where the rates are not finite.
         """
-        bound = self._filled(estimate, inputs)
-        self._run(bound.predict, bound)
-        return self._taken(bound)
+        return self._computed("predict", estimate, inputs)[0]
 
     def correct(
         self, estimate: StateEstimate, values: Sequence[float], inputs: Sequence[float]
@@ -171,12 +204,11 @@ class StateEstimator(ShortRepr, abc.ABC):
                 f"{', '.join(self.measured)} are {values}."
             )
         here = ~np.isnan(given)
-        bound = self._filled(estimate, inputs)
         # a missing value counts with a variance beside which nothing is known
-        bound.values[:], bound.variances[:] = np.where(here, given, 0.0), np.where(here, 1.0, UNKNOWN) * self.variances
-        self._run(bound.correct, bound)
-        innovation = Innovation(bound.difference[here], bound.difference_covariance[np.ix_(here, here)])
-        corrected = self._taken(bound)
+        measured = np.where(here, given, 0.0), np.where(here, 1.0, UNKNOWN) * self.variances
+        names = ("difference", "difference_covariance")
+        corrected, (difference, covariance) = self._computed("correct", estimate, inputs, names, measured)
+        innovation = Innovation(difference[here], covariance[np.ix_(here, here)])
         if self.gate < 1.0 and here.any():
             from scipy.special import chdtri
 
@@ -210,7 +242,9 @@ class StateEstimator(ShortRepr, abc.ABC):
                 f"{type(self).__name__}.estimate: the rows must be {self.sample_time:g} s apart, or whole multiples of "
                 "it; simulate or resample with this interval."
             )
-        inputs = np.column_stack([_input(recording, name) for name in self._compiled.description.input_names])
+        given = {**recording.columns, **select_prefix(COMMAND, recording.columns)}
+        names, none = self._compiled.description.input_names, np.zeros(time.size)
+        inputs = np.column_stack([np.asarray(given.get(name, none), dtype=float) for name in names])
         measured = np.column_stack([recording[name] for name in self.measured])
         return MeasuredRows(time, measured, np.vstack([inputs[:1], inputs[:-1]]), counts.astype(int))
 
@@ -239,55 +273,23 @@ class StateEstimator(ShortRepr, abc.ABC):
     def _parameter_values(self) -> dict[str, float]:
         return {leaf.path: float(leaf.value) for leaf in tree.leaves(self.plant) if leaf.path in self.parameters}
 
-    def _filled(self, estimate: StateEstimate, inputs: Sequence[float]) -> BoundFilter:
+    def _computed(
+        self, step: str, estimate: StateEstimate, inputs: Sequence[float], names: Sequence[str] = (),
+        measured: tuple[Array, Array] | None = None,
+    ) -> tuple[StateEstimate, list[Array]]:  # fmt: skip
+        """The estimate after the step "predict", or "correct" by values and variances (p,), and arrays by name."""
         bound = self._idle.pop() if self._idle else self._bind()
         bound.mean[:], bound.covariance[:], bound.inputs[:] = estimate.mean, estimate.covariance, inputs
-        return bound
-
-    def _taken(self, bound: BoundFilter) -> StateEstimate:
-        estimate = StateEstimate(bound.mean.copy(), bound.covariance.copy())
+        if measured is not None:
+            bound.values[:], bound.variances[:] = measured
+        status = getattr(bound, step)()
+        later = StateEstimate(bound.mean.copy(), bound.covariance.copy())
+        arrays = [getattr(bound, name).copy() for name in names]
         self._idle.append(bound)
-        return estimate
-
-    def _run(self, kernel: Any, bound: BoundFilter) -> None:
-        status = kernel()
         if status != Status.DONE:
-            self._idle.append(bound)
-            reason = Status(status).message if kernel is bound.predict else "the covariance is not positive definite"
+            reason = Status(status).message if step == "predict" else "the covariance is not positive definite"
             raise SolveError(
                 f"{type(self).__name__}: the step failed, because {reason}. Check the measured values, the first "
                 "estimate and the noise."
             )
-
-
-def _input(recording: Recording, name: str) -> Array:
-    for column in (f"{COMMAND}{name}", name):
-        if column in recording:
-            return np.asarray(recording[column], dtype=float)
-    return np.zeros(len(recording["time"]))
-
-
-@dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class EstimatingController(ShortRepr, Controller):
-    """A controller that estimates the state of its plant, with programs that one thread uses at a time."""
-
-    estimator: StateEstimator
-    first: StateEstimate = dataclasses.field(repr=False)
-    _idle: list[Any] = dataclasses.field(init=False, repr=False, default_factory=list)
-
-    measured_columns = forwarded("estimator.measured")
-
-    def __getstate__(self) -> dict[str, Any]:
-        """The fields without programs, which belong to one process."""
-        return {**self.__dict__, "_idle": []}
-
-    def estimate(self, before: StateEstimate, measurement: Measurement, inputs: Any, dt: float) -> StateEstimate:
-        """The estimate with a measurement. Raises ParameterError where the loop has another sample time."""
-        check_sample_time(type(self).__name__, dt, self.estimator.sample_time)
-        values = [float(measurement.columns[name]) for name in self.measured_columns]
-        return self.estimator.correct(before, values, inputs)[0]
-
-    def ordered(self, inputs: Mapping[str, float]) -> list[float]:
-        """The inputs of the plant in its order; 0 where none is given."""
-        names = compile_system(self.estimator.plant).description.input_names
-        return [float(inputs.get(name, 0.0)) for name in names]
+        return later, arrays

@@ -1,5 +1,6 @@
 """Laws around another one: sampling, delays and limits of its signals, manual operation, and the fault of a valve."""
 
+from collections.abc import Mapping
 from typing import ClassVar
 
 from ...core import ParameterError, Reference, Value, check_known, model, ops, parameter, select_prefix, with_prefix
@@ -186,13 +187,11 @@ class WithManual(EnclosingLaw):
         "s", "T", "time constant of the change to automatic operation", bounds=(1e-6, 1e6), default=0.5
     )
 
+    signal_units: ClassVar[Mapping[str, str]] = {"manual": "1"}
+
     @property
     def setpoints(self) -> tuple[str, ...]:
         return (*self.law.setpoints, "manual", *(f"manual.{name}" for name in self.inputs))
-
-    @property
-    def signal_units(self) -> dict[str, str]:
-        return {"manual": "1"}
 
     @property
     def initial_memory(self) -> dict[str, float]:

@@ -69,13 +69,6 @@ class _Sample:
         return np.asarray(values, dtype=float)[:, 0], np.asarray(slopes, dtype=float)
 
 
-def ideal(part: Any) -> Any:
-    """A sensor without noise and steps, which have no slope; any other part itself."""
-    if isinstance(part, ColumnSensor) and (part.resolution or part.noise):
-        return dataclasses.replace(part, resolution=0.0, noise=0.0)
-    return part
-
-
 def linearise_law(
     law: ControlLaw, sample_time: float, point: Point, wanted: Mapping[str, float], sizes: Sequence[float], known: bool
 ) -> LinearLaw:
@@ -86,6 +79,11 @@ def linearise_law(
 
     Raises ParameterError where no memory and no set points give the commands, and where the law has a kink there.
     """
+
+    def ideal(part: Any) -> Any:  # a sensor without noise and steps, which have no slope
+        with_steps = isinstance(part, ColumnSensor) and (part.resolution or part.noise)
+        return dataclasses.replace(part, resolution=0.0, noise=0.0) if with_steps else part
+
     sample = _Sample(rebuilt(law, ideal), sample_time)
     if not known:
         point = point._replace(memory=sample(point)[0][: sample.count])

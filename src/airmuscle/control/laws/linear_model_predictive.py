@@ -71,11 +71,15 @@ class PredictiveMemory(NamedTuple):
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class ObserverModel(ShortRepr):
-    """Model x_(k+1) = A x_k + B u_k of states and disturbances (n + d,), y = C x, and the gain of its observer.
+class ObservedModel(ShortRepr):
+    """Model x_(k+1) = A x_k + B u_k of states and disturbances (n + d,), y = C x, with its observer and its rest.
 
-    Deviations from an operating point, where the measured columns are `measured` (p,) and the inputs `inputs` (m,);
-    inputs in units of `input_sizes` (m,).
+    Deviations from an operating point, where the measured columns are `measured` (p,), the inputs `inputs` (m,) and the
+    controlled columns `controlled` (q,); inputs in units of `input_sizes` (m,).
+
+    gain    of the observer
+    by_disturbance, by_setpoint    (n + m, d) and (n + m, q): steady state and its inputs
+    columns, lower, upper    (l, n) of the limited columns, and their limits (l,)
     """
 
     transition: Array
@@ -85,16 +89,6 @@ class ObserverModel(ShortRepr):
     measured: Array
     inputs: Array
     input_sizes: Array
-
-
-@dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class TargetMap(ShortRepr):
-    """Linear maps (n + m, d) and (n + m, q) from disturbances and set points to the steady state and its inputs.
-
-    The set points are deviations from `controlled` (q,); `columns` (l, n) are the limited columns, with their limits
-    `lower` and `upper` (l,) as deviations from the operating point.
-    """
-
     by_disturbance: Array
     by_setpoint: Array
     controlled: Array
@@ -130,8 +124,7 @@ class LinearModelPredictive(ShortRepr, MultivariableController):
     measured: tuple[str, ...]
     controlled: tuple[str, ...]
     commanded: tuple[str, ...]
-    observer: ObserverModel
-    target: TargetMap
+    model: ObservedModel
     problem: CondensedProblem
 
     @functools.cached_property
@@ -146,7 +139,7 @@ class LinearModelPredictive(ShortRepr, MultivariableController):
     def init(self) -> PredictiveMemory:
         problem, m = self.problem, len(self.commanded)
         return PredictiveMemory(
-            np.zeros(len(self.observer.transition)), np.zeros(problem.horizon * m), np.zeros(m),
+            np.zeros(len(self.model.transition)), np.zeros(problem.horizon * m), np.zeros(m),
             np.zeros(len(self.constants["scale"])), np.array([-1, 0]),
         )  # fmt: skip
 
@@ -156,11 +149,11 @@ class LinearModelPredictive(ShortRepr, MultivariableController):
     def step(
         self, memory: PredictiveMemory, measurement: Measurement, dt: float
     ) -> tuple[Mapping[str, float], PredictiveMemory]:
-        model, ranges = self.observer, measurement.ranges
+        model, ranges = self.model, measurement.ranges
         low, high = np.array([ranges[name] for name in self.commanded]).T
         _, later = self._sample(
             memory, np.array([measurement.columns[name] for name in self.measured]) - model.measured,
-            np.array([measurement.setpoints[name] for name in self.controlled]) - self.target.controlled,
+            np.array([measurement.setpoints[name] for name in self.controlled]) - self.model.controlled,
             ((low - model.inputs) / model.input_sizes, (high - model.inputs) / model.input_sizes),
         )  # fmt: skip
         commands = (model.inputs + model.input_sizes * later.inputs).tolist()
@@ -175,7 +168,7 @@ class LinearModelPredictive(ShortRepr, MultivariableController):
         limits of the inputs (m,). `memory` has the inputs of the last sample and the limits to start from.
         """
         before = (memory or self.init())._replace(predicted=estimate)
-        status, later = self._sample(before, self.observer.output_matrix @ estimate, setpoint, (low, high))
+        status, later = self._sample(before, self.model.output_matrix @ estimate, setpoint, (low, high))
         return later.plan.reshape(self.problem.horizon, -1) if status is Status.DONE else None
 
     def _sample(
@@ -201,7 +194,7 @@ class LinearModelPredictive(ShortRepr, MultivariableController):
     def arrays(self) -> dict[str, Array]:
         """New arrays of all arguments of `predictive_sample`, by name: signals, constants, memory and workspace."""
         known, memory, m = self.constants, self.init(), len(self.commanded)
-        (p, _), (r, n), q = self.observer.output_matrix.shape, known["m"].shape, len(self.controlled)
+        (p, _), (r, n), q = self.model.output_matrix.shape, known["m"].shape, len(self.controlled)
         return {
             **{name: np.zeros(size) for name, size in (("y", p), ("r", q), ("low", m), ("high", m))}, **known,
             **memory._asdict(), "innovation": np.zeros(p), "point": np.zeros(known["rest"].shape[1]),
@@ -215,9 +208,9 @@ class LinearModelPredictive(ShortRepr, MultivariableController):
 
         The program is the shortest vector w = L^T z + L^-1 f e with limits of its rows, H = L L^T.
         """
-        problem, model = self.problem, self.observer
+        problem, model = self.problem, self.model
         n, m, count = problem.gradient.shape[1], problem.inputs, problem.moves.shape[1]
-        steady = np.hstack([self.target.by_disturbance, self.target.by_setpoint])
+        steady = np.hstack([self.model.by_disturbance, self.model.by_setpoint])
         width = n + steady.shape[1] + m
         at_rest = np.zeros((n + m, width))
         at_rest[:, n : width - m] = steady
@@ -243,14 +236,14 @@ class LinearModelPredictive(ShortRepr, MultivariableController):
 
     def _limits(self, error: Array, at_rest: Array) -> tuple[Array, Array, Array, Array, Array]:
         """All rows (r, z), what the point adds to their limits (r, N), the limits (r,), and their inputs (r,) or -1."""
-        problem, target, m = self.problem, self.target, self.problem.inputs
+        problem, model, m = self.problem, self.model, self.problem.inputs
         n, count, size = len(error), problem.moves.shape[1], len(problem.hessian)
         own, slack = np.eye(size)[:count], np.eye(size)[count:]
         rest = np.tile(at_rest[n:], (count // m, 1))
-        columns = (target.columns @ at_rest[:n])[problem.limited] + problem.rows_by_state @ error
+        columns = (model.columns @ at_rest[:n])[problem.limited] + problem.rows_by_state @ error
         narrow_inputs, narrow_rows = problem.narrowed
-        top = np.where(problem.upper, target.upper[problem.limited] - narrow_rows, np.inf)
-        bottom = np.where(problem.upper, -np.inf, target.lower[problem.limited] + narrow_rows)
+        top = np.where(problem.upper, model.upper[problem.limited] - narrow_rows, np.inf)
+        bottom = np.where(problem.upper, -np.inf, model.lower[problem.limited] + narrow_rows)
         changing = np.tile(np.isfinite(problem.max_change), count // m)
         change, largest = own - np.eye(size, k=-m)[:count], np.tile(problem.max_change, count // m)
         first = np.zeros_like(rest)

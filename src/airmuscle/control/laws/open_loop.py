@@ -7,7 +7,7 @@ from typing import ClassVar
 import numpy as np
 
 from ...core import Parameter, ParameterError, Reference, Value, model, ops, parameter, published, within
-from ...engine.loop import ControlLaw, Measurement, Memory, Sampled
+from ...engine.loop import ControlLaw, Measurement, Memory, Sampled, named_in
 from ...physics import ElasticSeriesElement, ForceLaw, Muscle
 from ...physics.muscle.geometry.meridian import SAGA_2007
 from .pid_and_sliding_mode import ASTROM_HAGGLUND1995
@@ -17,10 +17,7 @@ class OpenLoopLaw(ControlLaw):
     """A control law that measures nothing and stores nothing: feed-forward, or a distribution of set points."""
 
     initial_memory: ClassVar[Mapping[str, float]] = {}
-
-    @property
-    def measured_columns(self) -> tuple[str, ...]:
-        return ()
+    measured_columns: ClassVar[tuple[str, ...]] = ()
 
     @abc.abstractmethod
     def command(self, setpoints: Mapping[str, Value]) -> dict[str, Value]:
@@ -82,9 +79,7 @@ class SetpointLead(OpenLoopLaw):
     lead_time: float = parameter("s", "T", "lead time", bounds=(0.0, 1e3), default=0.0)
     share: float = parameter("1", "K_f", "share of the signal", bounds=(0.0, 10.0), default=1.0)
 
-    @property
-    def setpoints(self) -> tuple[str, ...]:
-        return (self.signal, self.rate)
+    setpoints = named_in("signal", "rate")
 
     def command(self, setpoints: Mapping[str, Value]) -> dict[str, Value]:
         return {self.commanded: self.share * (setpoints[self.signal] + self.lead_time * setpoints[self.rate])}
@@ -110,9 +105,7 @@ class MotionFeedForward(OpenLoopLaw):
     position_gain: float = parameter("SI", "K_s", "command by the position", bounds=(-1e12, 1e12), default=0.0)
     position: str = ""
 
-    @property
-    def setpoints(self) -> tuple[str, ...]:
-        return (self.speed, self.acceleration, *((self.position,) if self.position else ()))
+    setpoints = named_in("speed", "acceleration", "position")
 
     def command(self, setpoints: Mapping[str, Value]) -> dict[str, Value]:
         motion = self.speed_gain * setpoints[self.speed] + self.acceleration_gain * setpoints[self.acceleration]
@@ -144,9 +137,7 @@ class FrictionFeedForward(OpenLoopLaw):
             return units[self.speed] or "1"
         return super().unit_of(declared, index, units)
 
-    @property
-    def setpoints(self) -> tuple[str, ...]:
-        return (self.speed,)
+    setpoints = named_in("speed")
 
     def command(self, setpoints: Mapping[str, Value]) -> dict[str, Value]:
         return {self.commanded: self.amplitude * ops.clip(setpoints[self.speed] / self.boundary_speed, -1.0, 1.0)}
@@ -258,9 +249,7 @@ class StaticFeedForward(OpenLoopLaw):
     load_setpoint: str = ""
     acceleration_setpoint: str = ""
 
-    @property
-    def setpoints(self) -> tuple[str, ...]:
-        return (self.position, *(name for name in (self.load_setpoint, self.acceleration_setpoint) if name))
+    setpoints = named_in("position", "load_setpoint", "acceleration_setpoint")
 
     @property
     def signal_units(self) -> dict[str, str]:

@@ -5,7 +5,7 @@ from typing import ClassVar
 
 from ...core import ParameterError, Reference, Value, autodiff, model, ops, parameter, published, within
 from ...core.declaration import forwarded
-from ...engine.loop import Commanded, ControlLaw, Measurement, Memory, Sampled, commands, range_of
+from ...engine.loop import Commanded, ControlLaw, Measurement, Memory, Sampled, commands, named_in, range_of
 from ...physics import Mechanism, Muscle
 from ...physics.muscle.characteristic.tondu_lopez2000 import TONDU_LOPEZ_2000
 from .open_loop import OpenLoopLaw, check_invertible, check_pair, pressure_between, static_force
@@ -154,12 +154,9 @@ class AntagonisticInverse:
 
     def torque(self, first: Value, second: Value, angle: Value) -> Value:
         """Torque of both muscles [N m] at gauge pressures [Pa] and an angle [rad]."""
-        lengths = [muscle.geometry.resting_length for muscle in self.muscles]
-        q = {self.coordinate: angle}
-        contractions = self.mechanism.contractions(q, lengths)
-        tensions = [
-            static_force(muscle, p, c) for muscle, p, c in zip(self.muscles, (first, second), contractions, strict=True)
-        ]
+        lengths, q = [muscle.geometry.resting_length for muscle in self.muscles], {self.coordinate: angle}
+        points = zip(self.muscles, (first, second), self.mechanism.contractions(q, lengths), strict=True)
+        tensions = [static_force(muscle, pressure, contraction) for muscle, pressure, contraction in points]
         return self.mechanism.generalised_forces(q, tensions, lengths)[self.coordinate]
 
     def stiffness(self, first: Value, second: Value, angle: Value) -> Value:
@@ -231,9 +228,7 @@ class AngleAndStiffness(ControlLaw):
         if self.speed_gain and not self.speed_column:
             raise ParameterError("AngleAndStiffness: speed_gain needs speed_column, such as 'angular_speed'.")
 
-    @property
-    def measured_columns(self) -> tuple[str, ...]:
-        return (self.inverse.coordinate, *((self.speed_column,) if self.speed_column else ()))
+    measured_columns = named_in("inverse.coordinate", "speed_column")
 
     @property
     def setpoints(self) -> tuple[str, ...]:

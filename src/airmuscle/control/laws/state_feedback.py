@@ -5,7 +5,7 @@ from typing import ClassVar
 
 from ...core import ParameterError, Reference, Value, model, ops, parameter, published, select_prefix, with_prefix
 from ...core.errors import check_known
-from ...engine.loop import ControlLaw, Measurement, Memory, MultivariableController, Sampled
+from ...engine.loop import ControlLaw, Measurement, Memory, MultivariableController, Sampled, named_in
 from .open_loop import check_pair
 from .pressures import AntagonisticInverse
 
@@ -126,17 +126,12 @@ class ComputedTorque(ControlLaw):
     def check(self) -> None:
         check_pair(self, self.commanded)
 
-    @property
-    def measured_columns(self) -> tuple[str, ...]:
-        return (self.inverse.coordinate, self._speed)
+    measured_columns = named_in("inverse.coordinate", "_speed")
+    signal_units: ClassVar[Mapping[str, str]] = {"acceleration": "rad/s2", "stiffness": "N m/rad"}
 
     @property
     def setpoints(self) -> tuple[str, ...]:
         return (self.inverse.coordinate, self._speed, "acceleration", "stiffness")
-
-    @property
-    def signal_units(self) -> dict[str, str]:
-        return {"acceleration": "rad/s2", "stiffness": "N m/rad"}
 
     @property
     def _speed(self) -> str:

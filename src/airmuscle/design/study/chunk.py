@@ -19,7 +19,7 @@ from ...core.tree import fingerprint
 from ...engine.distribution import DistributedCalls
 from ...engine.processes import check_running
 from ...engine.run import solve
-from ...engine.run.output_times import output_times
+from ...engine.run.problem import output_times
 from ...files.scenario.scenario import Scenario
 from ...recording import Recording
 from . import Study, StudyResult, load_study

@@ -35,6 +35,7 @@ from .control_law import Memory as Memory
 from .control_law import Sampled as Sampled
 from .control_law import commands as commands
 from .control_law import inputs_of as inputs_of
+from .control_law import named_in as named_in
 from .control_law import range_of as range_of
 from .control_law import rebuilt as rebuilt
 from .control_law import without_simulated as without_simulated

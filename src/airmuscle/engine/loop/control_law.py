@@ -5,6 +5,7 @@ Laws around other laws, laws of one column by one input or by two in split range
 
 import abc
 import dataclasses
+import operator
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -61,6 +62,14 @@ class ControlLaw(Controller):
                 at_end = ops.either(at_end, commands[name] <= low)
         here = {**measurement.setpoints, **measurement.columns}
         return {name: ops.where(at_end, here[name], value) for name, value in measurement.setpoints.items()}
+
+
+def named_in(*fields: str) -> Any:
+    """A property: the names that these fields hold, without empty ones, `named_in("speed", "inverse.coordinate")`."""
+    return property(
+        lambda law: tuple(filter(None, (operator.attrgetter(field)(law) for field in fields))),
+        doc=f"The names in {', '.join(fields)}.",
+    )
 
 
 class EnclosingLaw(ControlLaw):
@@ -148,16 +157,8 @@ class SisoController(ControlLaw):
     measured: str
     commanded: Commanded
 
-    @property
-    def measured_columns(self) -> tuple[str, ...]:
-        return (self.measured,)
-
-    @property
-    def setpoints(self) -> tuple[str, ...]:
-        return (self.measured,)
-
-
-INOSE1962 = published("inose-1962")
+    measured_columns = named_in("measured")
+    setpoints = named_in("measured")
 
 
 @model
@@ -171,7 +172,7 @@ class SigmaDelta(EnclosingLaw):
     Reference: Inose, Yasuda and Murakami (1962).
     """
 
-    references: ClassVar[tuple[Reference, ...]] = (INOSE1962,)
+    references: ClassVar[tuple[Reference, ...]] = (published("inose-1962"),)
 
     law: ControlLaw
     minimum: float = parameter("1", "u_min", "command below which a valve is closed", bounds=(0.0, 1.0), default=0.0)

@@ -18,15 +18,7 @@ from ...core.tree import Structure, structure, with_ambient
 from ...recording.recording import Recording
 from .control_law import ControlLaw, EnclosingLaw, Memory, Sampled, rebuilt
 from .controller import Controller, Measurement, named_signal_units
-from .inputs import (
-    ZERO_INPUT,
-    InputSignal,
-    PiecewiseLinear,
-    Schedule,
-    check_input_names,
-    check_input_signal,
-    merge_columns,
-)
+from .inputs import ZERO_INPUT, CombinedSignal, InputSignal, Schedule, check_input_names, check_input_signal
 from .pwm_and_solenoid import Driver, WithDrivers
 
 COMMAND, SETPOINT, MEASURED = "command.", "setpoint.", "measured."
@@ -94,25 +86,21 @@ class ControlLoop(ShortRepr):
             )
         check_input_signal(self.setpoint)
         check_input_signal(self.other_inputs)
-        self._check_names()
+        named, expected = self.setpoint.names, self.controller.setpoints
+        if named is not None and set(named) != set(expected):
+            raise ParameterError(
+                f"ControlLoop.setpoint names {', '.join(named) or 'nothing'}; the set points of "
+                f"{type(self.controller).__name__} are {', '.join(expected)}."
+            )
+        twice = [name for name in self.other_inputs.names or () if name in self.controller.inputs]
+        if twice:
+            raise ParameterError(f"the input '{twice[0]}' is commanded by the controller and by other_inputs.")
         _ = self.driven_inputs
 
     @property
     def driven_inputs(self) -> WithDrivers:
         """The inputs that the controller does not command behind their drivers, and the drivers of all."""
         return WithDrivers(self.other_inputs, self.drivers)
-
-    def _check_names(self) -> None:
-        controller = self.controller
-        named = self.setpoint.names
-        if named is not None and set(named) != set(controller.setpoints):
-            raise ParameterError(
-                f"ControlLoop.setpoint names {', '.join(named) or 'nothing'}; the set points of "
-                f"{type(controller).__name__} are {', '.join(controller.setpoints)}."
-            )
-        twice = [name for name in self.other_inputs.names or () if name in controller.inputs]
-        if twice:
-            raise ParameterError(f"the input '{twice[0]}' is commanded by the controller and by other_inputs.")
 
     def init(self, start: float) -> ControlLoopState:
         """The state of a loop that begins at `start` [s]: no sample yet, every driver at rest."""
@@ -170,10 +158,9 @@ class ControlLoop(ShortRepr):
             ", ".join(f"{name} [{units[name]}]" if units.get(name, "1") not in ("", "1") else name for name in names)
             for names in (self.controller.measured_columns, self.controller.inputs)
         )
-        return (
-            f"{self._controller_text}, sample time {_milliseconds(self.sample_time)}, "
-            f"measured {measured}, commanded {commanded}"
-        )
+        seconds = self.sample_time
+        period = f"{seconds * 1e3:.4g} ms" if seconds < 1 else f"{seconds:.4g} s"
+        return f"{self._controller_text}, sample time {period}, measured {measured}, commanded {commanded}"
 
     @functools.cached_property
     def _controller_text(self) -> str:
@@ -204,29 +191,6 @@ def check_present(controller: Controller, columns: Sequence[str], inputs: Sequen
                 f"{alternatives(name, columns)}"
             )
     check_input_names(controller.inputs, inputs)
-
-
-@dataclasses.dataclass(frozen=True)
-class CombinedSignal(InputSignal):
-    """The inputs that `inner` names from `inner`, all others from `other`."""
-
-    inner: InputSignal
-    other: InputSignal
-
-    @property
-    def names(self) -> tuple[str, ...] | None:
-        other = self.other.names
-        return None if other is None else (*(self.inner.names or ()), *other)
-
-    def segments(self, inputs: Sequence[str], start: float, duration: float) -> PiecewiseLinear:
-        inner, other = (signal.segments(inputs, start, duration) for signal in (self.inner, self.other))
-        own = self.inner.names or ()
-        columns = [(inner if name in own else other).column(i) for i, name in enumerate(inputs)]
-        return merge_columns(columns, start) if columns else other
-
-
-def _milliseconds(seconds: float) -> str:
-    return f"{seconds * 1e3:.4g} ms" if seconds < 1 else f"{seconds:.4g} s"
 
 
 _without_design: set[Structure] = set()

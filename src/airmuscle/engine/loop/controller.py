@@ -132,10 +132,12 @@ def parameter_units(controller: Any, units: Mapping[str, str]) -> dict[str, str]
         for declared in parameters(part):
             name = f"{path}.{declared.name}" if path else declared.name
             value = getattr(part, declared.name)
-            if isinstance(value, tuple):
-                unit_of_each |= {f"{name}[{i}]": _unit_or_one(part, declared, i, known) for i in range(len(value))}
-            else:
-                unit_of_each[name] = _unit_or_one(part, declared, 0, known)
+            keys = [f"{name}[{i}]" for i in range(len(value))] if isinstance(value, tuple) else [name]
+            for i, key in enumerate(keys):
+                try:
+                    unit_of_each[key] = unit_of(part, declared, i, known)
+                except KeyError:
+                    unit_of_each[key] = "1"
     return unit_of_each
 
 
@@ -145,10 +147,3 @@ def unit_of(part: Any, declared: Parameter, index: int, units: Mapping[str, str]
     Raises KeyError for a signal whose unit is not given.
     """
     return part.unit_of(declared, index, units) if isinstance(part, SignalRelated) else declared.unit
-
-
-def _unit_or_one(part: Any, declared: Parameter, index: int, units: Mapping[str, str]) -> str:
-    try:
-        return unit_of(part, declared, index, units)
-    except KeyError:
-        return "1"

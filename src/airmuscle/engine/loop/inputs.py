@@ -72,7 +72,8 @@ class PiecewiseLinear(ShortRepr):
             )
         if not (all_finite(ends) and all_finite(values) and all_finite(slopes)):
             raise ParameterError("segments hold a number that is not finite.")
-        if ends[0] <= start or not _rising(ends):
+        few = ends.tolist() if ends.size <= FEW else []
+        if ends[0] <= start or not (all(map(operator.lt, few, few[1:])) if few else (ends[1:] > ends[:-1]).all()):
             raise ParameterError(f"segments must end in rising order after {start:g} s; they end at {ends.tolist()} s.")
 
     def as_floats(self) -> "PiecewiseLinear":
@@ -82,25 +83,11 @@ class PiecewiseLinear(ShortRepr):
             return self
         return PiecewiseLinear(*(np.array(t, dtype=float, order="C") for t in tables))
 
-    def read_only(self) -> "PiecewiseLinear":
-        """The same inputs; nobody can write to these arrays any more."""
-        for table in (self.ends, self.values, self.slopes):
-            table.setflags(write=False)
-        return self
-
     def split_at(self, starts: Array, start: float) -> "PiecewiseLinear":
         """The same inputs with segments that start at other instants (R,), in rising order, the first not before
         `start`; no segment may end within one of them."""
         ends = np.append(starts[1:], self.ends[-1])
         return PiecewiseLinear(ends, *self.at_rising(starts, start))
-
-
-def _rising(times: Array) -> bool:
-    """Whether every time is later than the one before."""
-    if times.size > FEW:
-        return bool((times[1:] > times[:-1]).all())
-    listed = times.tolist()
-    return all(map(operator.lt, listed, listed[1:]))
 
 
 def merge_columns(columns: Sequence[Sequence[Segment]], start: float) -> PiecewiseLinear:
@@ -225,7 +212,9 @@ class Schedule(InputSignal):
         """As of any signal, in arrays that cannot be written to; those of the last call are kept for the next one."""
         *asked, segments = self._last  # type: ignore[attr-defined]
         if segments is None or asked != [inputs, start, duration]:
-            segments = super().checked_segments(inputs, start, duration).read_only()
+            segments = super().checked_segments(inputs, start, duration)
+            for table in (segments.ends, segments.values, segments.slopes):
+                table.setflags(write=False)
             object.__setattr__(self, "_last", (inputs, start, duration, segments))
         return segments  # type: ignore[no-any-return]
 
@@ -274,6 +263,25 @@ class Periodic(InputSignal):
         whole = PiecewiseLinear(np.append(starts[1:], end), np.tile(once.values, size), np.tile(once.slopes, size))
         within = starts[(starts > start) & (starts < end)]
         return whole.split_at(np.append(start, within), float(starts[0]))
+
+
+@dataclasses.dataclass(frozen=True)
+class CombinedSignal(InputSignal):
+    """The inputs that `inner` names from `inner`, all others from `other`."""
+
+    inner: InputSignal
+    other: InputSignal
+
+    @property
+    def names(self) -> tuple[str, ...] | None:
+        other = self.other.names
+        return None if other is None else (*(self.inner.names or ()), *other)
+
+    def segments(self, inputs: Sequence[str], start: float, duration: float) -> PiecewiseLinear:
+        inner, other = (signal.segments(inputs, start, duration) for signal in (self.inner, self.other))
+        own = self.inner.names or ()
+        columns = [(inner if name in own else other).column(i) for i, name in enumerate(inputs)]
+        return merge_columns(columns, start) if columns else other
 
 
 ZERO_INPUT = Schedule({})

@@ -25,7 +25,9 @@ def compiled_sample(law: ControlLaw, lanes: int = 1) -> Function:
     """
     key = tree.structure(law), lanes
     if key not in _functions:
-        _functions[key] = Function(*_arguments(law), lanes)
+        known = trace_sample(law)._asdict()
+        results = {name: known.pop(name) for name in ("commands", "later")}
+        _functions[key] = Function(known, results, lanes)
     return _functions[key]
 
 
@@ -83,12 +85,6 @@ class TracedSample(NamedTuple):
     parameters: Any
     commands: Any
     later: Any
-
-
-def _arguments(law: ControlLaw) -> tuple[dict[str, Any], dict[str, Any]]:
-    """Inputs and outputs of the function of a sample, as expressions."""
-    known = trace_sample(law)._asdict()
-    return known, {name: known.pop(name) for name in ("commands", "later")}
 
 
 def trace_sample(law: ControlLaw) -> TracedSample:

@@ -15,9 +15,8 @@ from ..compile.kernel_layout import Progress, Waiting
 from ..compile.program import CompiledSystem
 from ..loop import ControlLaw, ControlLoopState, PiecewiseLinear
 from .compiled_law import compiled_sample, parameters_of
-from .driver_table import DriverTable, are_called, greatest_capacity
 from .integrators import INTERRUPT_CHECK_STEPS, MAX_STEPS, Integrator, RawSolution
-from .sampled_loop import CalledController, SampledLoop
+from .sampled_loop import CalledController, DriverTable, SampledLoop, are_called, greatest_capacity
 
 FIRST_SEGMENTS = 4096
 """Segments and rows that the buffers of driven inputs hold at first."""
@@ -45,10 +44,6 @@ class CompiledLoop:
         self.measuring = compiled.address["outputs"], measured_at
         self.commanding = np.array([loop.sample_time]), *map(np.ascontiguousarray, limits.T), commanded_at
         self.intervals = edges, np.spacing(np.abs(edges)), 0 if prepared.sampled else 1, prepared.setpoint_values
-
-    def memory_of(self, state: ControlLoopState) -> list[float]:
-        """The memory of the control law as numbers; none of a controller that is called."""
-        return [state.controller[name] for name in self.law.initial_memory] if self.law is not None else []
 
 
 class CompiledRun:
@@ -95,7 +90,8 @@ class CompiledRun:
         self._begin(initial_state)
 
     def _take_beginning(self, state: ControlLoopState) -> None:
-        self._begin_state, self._begin_memory = state, self.loop.memory_of(state)
+        law, self._begin_state = self.loop.law, state
+        self._begin_memory = [state.controller[name] for name in law.initial_memory] if law is not None else []
 
     def _begin(self, initial_state: Array) -> None:
         """Write what the kernel finds at the beginning; no sample has been taken yet."""
@@ -175,38 +171,29 @@ class CompiledRun:
     def _answer(self, waiting: int, interval: int) -> None:
         """Give the kernel what it awaits."""
         if waiting == Waiting.COMMANDS:
-            self._call_controller(interval)
+            (measured, command), memories = self._views, self._memories
+            memories[0] = memories[1]
+            assert self._controller is not None
+            commands, memories[1] = self._controller.step(memories[0], measured.tolist(), interval)
+            self._called_at = interval
+            for i, value in enumerate(commands):
+                command[i] = value
         elif waiting == Waiting.DRIVERS:
-            self._call_drivers(interval)
+            first_rows, progress, drivers = self.prepared.first_rows, self.progress, self._drivers
+            count = drivers.call(interval, float(self.loop.edges[interval]))
+            self._kernel.replace(self._columns, drivers.columns)
+            segments = progress[Progress.SEGMENTS] + count
+            rows = progress[Progress.ROWS] + count + int(first_rows[interval + 1] - first_rows[interval])
+            while segments > len(self._segments[0]) or rows > len(self._times):
+                self._extend()
         else:  # the integrator has no machine code that a kernel could call
             self.progress[Progress.RESULT] = self.bound.run_part().value
 
-    def _call_drivers(self, interval: int) -> None:
-        """Pass the signals of an interval through drivers of the user, and make room for what they return."""
-        prepared, progress, drivers = self.prepared, self.progress, self._drivers
-        count = drivers.call(interval, float(self.loop.edges[interval]))
-        self._kernel.replace(self._columns, drivers.columns)
-        rows = count + int(prepared.first_rows[interval + 1] - prepared.first_rows[interval])
-        ends = self._segments[0]
-        while progress[Progress.SEGMENTS] + count > len(ends) or progress[Progress.ROWS] + rows > len(self._times):
-            self._extend()
-            ends = self._segments[0]
-
-    def _call_controller(self, interval: int) -> None:
-        """Take the sample of an interval: from the measurements of the kernel to its commands."""
-        (measured, command), memories = self._views, self._memories
-        memories[0] = memories[1]
-        assert self._controller is not None
-        commands, memories[1] = self._controller.step(memories[0], measured.tolist(), interval)
-        self._called_at = interval
-        for i, value in enumerate(commands):
-            command[i] = value
-
     def _extend(self) -> None:
         """Longer buffers for the segments and rows of driven inputs."""
-        self._segments = tuple(map(_longer, self._segments))
-        self._times, self._rows = _longer(self._times), _longer(self._rows)
-        for i, array in enumerate((*self._segments, self._times, self._rows), self._first_buffer):
+        buffers = [np.concatenate([each, np.empty_like(each)]) for each in (*self._segments, self._times, self._rows)]
+        *self._segments, self._times, self._rows = buffers
+        for i, array in enumerate(buffers, self._first_buffer):
             self._kernel.replace(i, array)
         self.progress[Progress.FULL] = 0
 
@@ -268,8 +255,12 @@ class CompiledRun:
         done, begun = int(self.progress[Progress.INTERVAL]), self._begin_state
         if not done:
             return begun
+        # the last sample of a controller that is called may be that of an interval that was not completed
+        memory, law = self._memories[1 if done > self._called_at else 0], self.loop.law
+        if law is not None:
+            memory = dict(zip(law.initial_memory, self._memory[0].tolist(), strict=True))
         return ControlLoopState(
-            controller=self._controller_memory(done),
+            controller=memory,
             origin=begun.origin,
             time=self.time,
             sample_count=begun.sample_count + done - (0 if self.prepared.sampled else 1),
@@ -278,15 +269,3 @@ class CompiledRun:
             applied_inputs=tuple(self._kept_inputs.tolist()),
             drivers=self._drivers.as_mapping(done),
         )
-
-    def _controller_memory(self, done: int) -> Any:
-        """The memory of the controller after so many completed intervals."""
-        if self.loop.law is None:  # the last sample may be that of an interval that was not completed
-            return self._memories[1 if done > self._called_at else 0]
-        return dict(zip(self.loop.law.initial_memory, self._memory[0].tolist(), strict=True))
-
-
-def _longer(array: Array) -> Array:
-    longer = np.empty((2 * len(array), *array.shape[1:]))
-    longer[: len(array)] = array
-    return longer

@@ -15,9 +15,6 @@ from ..compile.functions import ArraySizes
 from ..compile.program import CompiledSystem, Tableau
 from ..loop.inputs import PiecewiseLinear
 
-HAIRER_WANNER1996 = published("hairer-wanner-1996")
-KUTTA1901 = published("kutta-1901")
-PRINCE_DORMAND1981 = published("prince-dormand-1981")
 INTERRUPT_CHECK_STEPS = 100_000
 """Steps between two checks whether the user wants to stop, or the state is impossible."""
 MAX_STEPS = 50_000_000
@@ -188,7 +185,7 @@ class Rodas4(Integrator):
     Reference: Hairer and Wanner, Solving Ordinary Differential Equations II, 1996, section VI.4, method RODAS.
     """
 
-    references: ClassVar[tuple[Reference, ...]] = (HAIRER_WANNER1996,)
+    references: ClassVar[tuple[Reference, ...]] = (published("hairer-wanner-1996"),)
     printed_step: ClassVar[str] = "rodas4"
 
     rtol: float = parameter("1", "rtol", "relative tolerance of a step", bounds=(1e-13, 0.1), default=1e-6)
@@ -234,7 +231,7 @@ def default_integrator(integrator: Integrator | None) -> Integrator:
 class RungeKutta4(ExplicitRungeKutta):
     """The classical method of order four (Kutta 1901)."""
 
-    references: ClassVar[tuple[Reference, ...]] = (KUTTA1901,)
+    references: ClassVar[tuple[Reference, ...]] = (published("kutta-1901"),)
 
     step: float = parameter("s", "h", "step size", bounds=(1e-9, 1e3))
 
@@ -250,7 +247,7 @@ class DormandPrince8(ExplicitRungeKutta):
     J. Computational and Applied Mathematics 7(1):67-75, 1981, table 2.
     """
 
-    references: ClassVar[tuple[Reference, ...]] = (PRINCE_DORMAND1981,)
+    references: ClassVar[tuple[Reference, ...]] = (published("prince-dormand-1981"),)
 
     step: float = parameter("s", "h", "step size", bounds=(1e-9, 1e3))
 

@@ -1,6 +1,6 @@
 """Control loop as a JAX function of the parameters of plant and controller, with classical Runge-Kutta steps."""
 
-import dataclasses
+import functools
 import math
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -50,51 +50,40 @@ def loop_in_jax(
     )
 
     def run(plant_parameters: Any, law_parameters: Any) -> dict[str, Any]:
+        import jax
+
         varied, commanding = tree.unflatten(plant, list(plant_parameters)), tree.unflatten(law, list(law_parameters))
-        return _Sample(varied, commanding, prepared, jnp).run(start, rows)
+        memory = {name: _number(value) for name, value in commanding.initial_memory.items()}
+        before = start, memory, {name: _number(0.0) for name in law.inputs}
+        interval = functools.partial(_interval, varied, commanding, prepared)
+        (final, _, _), (states, commands) = jax.lax.scan(interval, before, rows)
+        columns = {name: jnp.append(states[name], final[name]) for name in start}
+        named = {f"{COMMAND}{name}": values for name, values in commands.items()}
+        return {"time": jnp.asarray(prepared.instants), **columns, **named}
 
     return run
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class _Sample:
-    """A sample and the steps after it: the body of the loop over the samples. Plant and law have traced parameters."""
+def _interval(plant: System, law: ControlLaw, prepared: SampledLoop, carry: Any, row: Any) -> Any:
+    """State, memory and commands after a sample and the steps after it; and the state before it and its commands."""
+    import jax
 
-    plant: System
-    law: ControlLaw
-    prepared: SampledLoop
-    numpy: Any
+    state, memory, applied = carry
+    setpoints, beside, steps = row
+    ranges, given = prepared.ranges, dict(zip(prepared.input_names, beside, strict=True))
+    columns = {**plant.outputs(state, {**given, **applied}), **state}
+    measured = {name: columns[name] for name in law.measured_columns}
+    measurement = Measurement(measured, dict(zip(law.setpoints, setpoints, strict=True)), ranges)
+    commands, later = law.step(memory, measurement, prepared.loop.sample_time)
+    held = {name: ops.clip(_number(commands[name]), *ranges[name]) for name in law.inputs}
+    after, _ = jax.lax.scan(lambda x, h: (runge_kutta4(plant, x, {**given, **held}, h), None), state, steps)
+    return (after, {name: _number(later[name]) for name in memory}, held), (state, held)
 
-    def __call__(self, carry: Any, row: Any) -> Any:
-        """State, memory and commands after an interval; and the state before it and its commands."""
-        import jax
 
-        state, memory, applied = carry
-        setpoints, beside, steps = row
-        law, ranges, given = self.law, self.prepared.ranges, dict(zip(self.prepared.input_names, beside, strict=True))
-        columns = {**self.plant.outputs(state, {**given, **applied}), **state}
-        measured = {name: columns[name] for name in law.measured_columns}
-        measurement = Measurement(measured, dict(zip(law.setpoints, setpoints, strict=True)), ranges)
-        commands, later = law.step(memory, measurement, self.prepared.loop.sample_time)
-        held = {name: ops.clip(self._array(commands[name]), *ranges[name]) for name in law.inputs}
-        inputs = {**given, **held}
-        after, _ = jax.lax.scan(lambda x, h: (runge_kutta4(self.plant, x, inputs, h), None), state, steps)
-        return (after, {name: self._array(later[name]) for name in memory}, held), (state, held)
+def _number(value: Any) -> Any:
+    import jax
 
-    def run(self, start: dict[str, Any], rows: tuple[Any, ...]) -> dict[str, Any]:
-        """The columns of a run from a state of the plant."""
-        import jax
-
-        law, jnp = self.law, self.numpy
-        memory = {name: self._array(value) for name, value in law.initial_memory.items()}
-        before = start, memory, {name: self._array(0.0) for name in law.inputs}
-        (final, _, _), (states, commands) = jax.lax.scan(self, before, rows)
-        columns = {name: jnp.append(states[name], final[name]) for name in start}
-        named = {f"{COMMAND}{name}": values for name, values in commands.items()}
-        return {"time": jnp.asarray(self.prepared.instants), **columns, **named}
-
-    def _array(self, value: Any) -> Any:
-        return self.numpy.asarray(value, dtype=float)
+    return jax.numpy.asarray(value, dtype=float)
 
 
 def runge_kutta4(plant: System, state: Mapping[str, Any], inputs: Mapping[str, Any], h: Any) -> dict[str, Any]:

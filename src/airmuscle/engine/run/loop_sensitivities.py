@@ -152,13 +152,9 @@ class LawWithSensitivities(ControlLaw):
     def inputs(self) -> tuple[str, ...]:
         return self._with_derivatives(self.law.inputs)
 
-    @property
+    @functools.cached_property
     def initial_memory(self) -> dict[str, float]:
         """The values of the law, then the derivatives of each."""
-        return dict(self._initial_memory)
-
-    @functools.cached_property
-    def _initial_memory(self) -> dict[str, float]:
         import casadi
 
         symbolic, parameters = autodiff.symbolic(self.law)
@@ -196,7 +192,13 @@ class LawWithSensitivities(ControlLaw):
             )
             variables = casadi.vertcat(sample.measured, sample.memory, sample.parameters)
             parts.append(casadi.jtimes(results, variables, seed))
-        columns = evaluated(casadi.horzcat(*parts), sample[:-2], self._point(memory, measurement, dt))
+        ranges = [measurement.ranges[name] for name in law.inputs]
+        point = [
+            *(measurement.columns[name] for name in names), *(measurement.setpoints[name] for name in law.setpoints),
+            *(memory[name] for name in remembered), *(low for low, _ in ranges), *(high for _, high in ranges), dt,
+            *(leaf.value for leaf in tree.leaves(law)),
+        ]  # fmt: skip
+        columns = evaluated(casadi.horzcat(*parts), sample[:-2], point)
         count = len(law.inputs)
         commands = dict(zip(law.inputs, columns[0], strict=False))
         later = dict(zip(remembered, columns[0][count:], strict=True))
@@ -204,16 +206,3 @@ class LawWithSensitivities(ControlLaw):
             commands |= {sensitivity(name, k): column[i] for i, name in enumerate(law.inputs)}
             later |= {sensitivity(name, k): column[count + i] for i, name in enumerate(remembered)}
         return commands, later
-
-    def _point(self, memory: Memory, measurement: Measurement, dt: Value) -> list[Value]:
-        """The values of the variables of a `TracedSample` of the law."""
-        law, ranges = self.law, [measurement.ranges[name] for name in self.law.inputs]
-        return [
-            *(measurement.columns[name] for name in law.measured_columns),
-            *(measurement.setpoints[name] for name in law.setpoints),
-            *(memory[name] for name in law.initial_memory),
-            *(low for low, _ in ranges),
-            *(high for _, high in ranges),
-            dt,
-            *(leaf.value for leaf in tree.leaves(law)),
-        ]

@@ -3,37 +3,36 @@
 import dataclasses
 import functools
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from ...core import FEW, NUMBERS, Array, ParameterError, Reference, ShortRepr, System, as_float, cite
+from ...core import FEW, NUMBERS, Array, ParameterError, Reference, ShortRepr, System, as_float, cite, one_line
 from ...core.system import check_system, state_vector
 from ..compile.program import CompiledSystem, compile_system
 from ..loop import InputSignal, PiecewiseLinear, Schedule, check_input_signal
 from ..loop.control_loop import ControlLoop, ControlLoopState, designed_loop
 from .integrators import Integrator, default_integrator
-from .output_times import output_times
 
 MAX_KEPT_ROWS = 100_000
 """Output times that are kept with a plant for its next run, 0.8 MB (chosen)."""
 LARGEST = sys.float_info.max
 """The largest finite number."""
+MAX_OUTPUT_STEP = 0.01
+"""The default grid is at least this fine [s]."""
+MAX_ROWS = 10_000_000
+"""Rows of a recording that fit a usual memory."""
+FEW_INSTANTS = 32
+"""Instants up to which they are merged one by one, which is faster (measured)."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Problem(ShortRepr):
-    """An initial value problem: a system under an input for `duration` [s].
+    """An initial value problem: a system under an input for `duration` [s]; its fields are the arguments of `simulate`.
 
-    system         any System: a Plant, or a user-defined one
-    input          an InputSignal such as a Schedule, or a ControlLoop
-    initial_state  values by state; by default a Plant's equilibrium at ambient pressure
     start_time     [s]
-    output_times   spacing [s] or times [s] of the rows; by default 1/1000 of the run, at most 10 ms. The instants of
-                   the input are always among the rows, with the inputs that begin there
-    integrator     Rodas4(rtol=1e-6) by default
     control_state  state of the control loop, to continue a run
 
     Raises ParameterError for an input or state that the system does not have, an input beyond its range, a duration
@@ -54,32 +53,25 @@ class Problem(ShortRepr):
         object.__setattr__(self, "duration", as_float("simulate: duration", self.duration))
         object.__setattr__(self, "start_time", as_float("simulate: start_time", self.start_time))
         object.__setattr__(self, "integrator", default_integrator(self.integrator))
-        self._check_time()
-        if isinstance(self.input, ControlLoop):
-            object.__setattr__(self, "input", designed_loop(self.input, self.system))
-            known = self.compiled.description
-            self.input.check_columns((*known.state_names, *known.output_names), known.input_names)
-            if self.control_state is None:
-                self.input.check_sample_time(self.duration)
-            check_input_range(self.compiled, self._other_segments(self.input), self.start_time)
-        else:
-            check_input_signal(self.input)
-            check_input_range(self.compiled, self.segments, self.start_time)
-        if self.initial_state is not None:
-            _ = self.initial_vector
-
-    def _check_time(self) -> None:
         if not 0 < self.duration < float("inf"):
             raise ParameterError(f"simulate: duration is {self.duration!r} s; it must be positive and finite.")
         if not self.start_time + self.duration > self.start_time:
             raise ParameterError(
                 f"simulate: start_time is {self.start_time!r} s; a duration of {self.duration!r} s is lost in rounding."
             )
-
-    def _other_segments(self, loop: ControlLoop) -> PiecewiseLinear:
-        """The signal of the inputs of a control loop that its controller does not command."""
-        inputs = self.compiled.description.input_names
-        return loop.driven_inputs.checked_segments(inputs, self.start_time, self.duration)
+        if isinstance(self.input, ControlLoop):
+            object.__setattr__(self, "input", designed_loop(self.input, self.system))
+            known = self.compiled.description
+            self.input.check_columns((*known.state_names, *known.output_names), known.input_names)
+            if self.control_state is None:
+                self.input.check_sample_time(self.duration)
+            others = self.input.driven_inputs.checked_segments(known.input_names, self.start_time, self.duration)
+            check_input_range(self.compiled, others, self.start_time)
+        else:
+            check_input_signal(self.input)
+            check_input_range(self.compiled, self.segments, self.start_time)
+        if self.initial_state is not None:
+            _ = self.initial_vector
 
     def __getstate__(self) -> dict[str, Any]:
         """The fields alone: compiled code belongs to a process, and all else follows from the fields."""
@@ -187,25 +179,23 @@ def check_input_range(compiled: CompiledSystem, segments: PiecewiseLinear, start
     known = compiled.description
     if segments is known.cache.checked_input[0]:
         return
-    if len(known.input_names):
-        _check_within(compiled, segments, start)
-    if not any(table.flags.writeable for table in (segments.ends, segments.values, segments.slopes)):
-        known.cache.checked_input = segments, None, None
-
-
-def _check_within(compiled: CompiledSystem, segments: PiecewiseLinear, start: float) -> None:
-    """Raise ParameterError where an input is beyond its range, from the values of all segments."""
-    known = compiled.description
     values, slopes = segments.values, segments.slopes
-    tables = [values]
+    tables = [values] if known.input_names else []
     if any(slopes.ravel().tolist()) if slopes.size <= FEW else slopes.any():
         tables.append(values + slopes * (segments.ends - segments.starts(start))[:, None])
     for table in tables:
-        if _are_within(table, known.input_limits.values()):
+        if table.size > FEW:
+            smallest, largest = table.min(axis=0).tolist(), table.max(axis=0).tolist()
+        else:
+            columns = list(zip(*table.tolist(), strict=True))
+            smallest, largest = list(map(min, columns)), list(map(max, columns))
+        if all(low <= smallest[i] and largest[i] <= high for i, (low, high) in known.input_limits.values()):
             continue
         low, high = known.input_lower_limits, known.input_upper_limits
         row, column = np.argwhere(~((table >= low) & (table <= high)))[0]
         _raise_for_input(compiled, int(column), table[row, column], f"before {segments.ends[row]:g} s")
+    if not any(table.flags.writeable for table in (segments.ends, values, slopes)):
+        known.cache.checked_input = segments, None, None
 
 
 def check_inputs(compiled: CompiledSystem, values: Array, when: str) -> None:
@@ -225,11 +215,80 @@ def _raise_for_input(compiled: CompiledSystem, column: int, value: float, when: 
     )
 
 
-def _are_within(table: Array, limits: Iterable[tuple[int, tuple[float, float]]]) -> bool:
-    """Whether every column of a table (N, m) is within its limits."""
-    if table.size > FEW:
-        smallest, largest = table.min(axis=0).tolist(), table.max(axis=0).tolist()
-    else:
-        columns = list(zip(*table.tolist(), strict=True))
-        smallest, largest = list(map(min, columns)), list(map(max, columns))
-    return all(low <= smallest[i] and largest[i] <= high for i, (low, high) in limits)
+def output_times(given: float | npt.ArrayLike | None, start: float, duration: float, instants: Array) -> Array:
+    """The times [s] of the rows of a run, rising, with the instants of the inputs among them.
+
+    given  spacing [s] or times [s]; by default 1/1000 of the run, but at most 10 ms
+    """
+    end = start + duration
+    if given is None:
+        given = min(duration / 1000, MAX_OUTPUT_STEP)
+    if isinstance(given, float | int) or not np.ndim(given):
+        spacing = as_float("simulate: output_times", given)
+        return merge_output_times(_grid(spacing, start, duration), instants, duration)
+    grid = _times(given)
+    if grid.size and not (grid[0] >= start and grid[-1] <= end):
+        raise ParameterError(f"simulate: output_times must lie within {start:g} to {end:g} s.")
+    return merge_output_times(grid, instants, duration)
+
+
+def _grid(spacing: float, start: float, duration: float) -> Array:
+    if not 0 < spacing < np.inf:
+        raise ParameterError(f"simulate: a spacing of output_times of {spacing!r} s is not positive and finite.")
+    if duration / spacing > MAX_ROWS:
+        raise ParameterError(
+            f"simulate: a spacing of output_times of {spacing!r} s makes {duration / spacing:.3g} rows of a run of "
+            f"{duration:g} s; {MAX_ROWS} are allowed. The result does not depend on it: choose a wider one."
+        )
+    grid: Array = np.arange(int(duration / spacing * (1 + 1e-12)) + 1, dtype=float)
+    grid *= spacing
+    grid += start
+    return grid
+
+
+def _times(given: Any) -> Array:
+    """Times [s] in rising order, each once, from a list of them."""
+    try:
+        times = np.array(given, dtype=float)
+    except (TypeError, ValueError):
+        times = np.empty((0, 0))
+    if times.ndim != 1:
+        raise ParameterError(f"simulate: output_times is {one_line(given)}; give a spacing [s] or a list of times [s].")
+    if np.isnan(times).any():
+        raise ParameterError(f"simulate: output_times is {one_line(given)}; a time is not a number (NaN).")
+    times = np.sort(times)
+    return times[np.diff(times, prepend=-np.inf) > 0]
+
+
+def merge_output_times(grid: Array, instants: Array, duration: float) -> Array:
+    """The rows of a grid and the instants, both rising; a row of the grid close to an instant is replaced by it."""
+    close = 1e-9 * duration
+    if instants.size <= FEW_INSTANTS and grid.size:
+        return _merge_few(grid, instants, close)
+    behind = np.searchsorted(instants, grid)
+    before, after = instants[np.maximum(behind - 1, 0)], instants[np.minimum(behind, instants.size - 1)]
+    apart = np.minimum(np.abs(grid - before), np.abs(grid - after)) > close
+    merged: Array = instants.copy()
+    if apart.any():
+        merged = np.sort(np.concatenate([grid[apart], instants]))  # np.unique would import numpy.ma
+    new: npt.NDArray[np.bool_] = np.diff(merged, prepend=-np.inf) > 0
+    return merged[new]
+
+
+def _merge_few(grid: Array, instants: Array, close: float) -> Array:
+    """The same for few instants: the grid between one and the next, less the rows close to them."""
+    lower = grid.searchsorted(instants - close, side="left").tolist()
+    upper = grid.searchsorted(instants + close, side="right").tolist()
+    if upper == [row + 1 for row in lower] and len(set(lower)) == len(lower):  # each takes the place of one row
+        merged = grid.copy()
+        merged[lower] = instants
+        return merged
+    parts, row = [], 0
+    for i, (low, high) in enumerate(zip(lower, upper, strict=True)):
+        if low > row:
+            parts.append(grid[row:low])
+        if not i or instants[i] > instants[i - 1]:
+            parts.append(instants[i : i + 1])
+        row = max(row, high)
+    parts.append(grid[row:])
+    return np.concatenate(parts)

@@ -1,47 +1,52 @@
-"""Simulation of a problem, and the short ways in: `simulate` and `advance`."""
+"""Simulation of a problem, with a control loop from one sampling instant to the next, each met exactly; short ways in.
+
+Runs of compiled loops are kept with the system for the next loop of the same form. Loops have the same form if they
+differ in the parameters of the control law alone: the sampling instants, the set points and the segments of the other
+inputs are then the same, and so is the kernel with its arrays.
+"""
 
 import functools
 import operator
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 
 import numpy as np
 import numpy.typing as npt
 
-from ...core import NUMBERS, ParameterError, SimulationError, Status, System, as_float, one_line
+from ...core import NUMBERS, ParameterError, SimulationError, System, as_float, one_line, tree
+from ...core.diagnostics import Diagnostic, DiagnosticCode, Status
 from ...core.system import check_system, state_vector
 from ...recording import Recording
+from ...recording.columns import column_units
 from ..compile.program import CompiledSystem, compile_system
-from ..loop import ControlLoop, InputSignal, PiecewiseLinear, Schedule
-from .closed_loop import solve_closed_loop
+from ..loop import ControlLaw, ControlLoop, InputSignal, PiecewiseLinear, Schedule
+from .compiled_law import parameters_of
+from .compiled_loop import CompiledLoop, CompiledRun
 from .integrators import INTERRUPT_CHECK_STEPS, BoundIntegrator, Integrator, RawSolution, default_integrator
 from .problem import Problem, check_input_range, plain_numbers
-from .solution import Solution, early_end, make_solution, recorded_rows, status_of_state, truncate_at_invalid_row
+from .sampled_loop import prepare_loop
+from .solution import Solution, early_end, make_solution, possible_rows, status_of_state
 
 _AT_POSSIBLE_STATE = {Status.DONE, Status.INTERRUPTED, Status.TOO_MANY_STEPS}
 """How a run ends at a possible state."""
 INSTANTS = 1000
 """Instants between two rows at which the first impossible state is looked for (chosen)."""
+MAX_KEPT_ROWS = 100_000
+"""Rows up to which a run is kept (chosen)."""
 
 
 def solve(problem: Problem) -> Solution:
     """The solution of a problem; a run that ended early is returned as far as it was computed, with its status."""
-    loop = problem.input
-    return solve_closed_loop(problem, loop) if isinstance(loop, ControlLoop) else _solve_open_loop(problem)
-
-
-def _solve_open_loop(problem: Problem) -> Solution:
     compiled, integrator = problem.compiled, problem.integrator
     assert integrator is not None
+    if isinstance(problem.input, ControlLoop):
+        return _solve_closed_loop(problem, problem.input)
     segments, times = problem.segments, problem.times
     pool = compiled.description.cache.integrators
     bound: BoundIntegrator = pool.borrow(integrator) or integrator.bind(compiled)
     check = functools.partial(status_of_state, compiled, segments, problem.start_time)
     raw = bound.run(segments, problem.start_time, problem.initial_vector, times, check=check)
     pool.give_back(integrator, bound)
-    rows, reached = raw.rows, raw.reached
-    shown = (rows, times) if reached == times.size else (rows[:reached], times[:reached])
-    table = recorded_rows(compiled, *shown, segments, problem.start_time)
-    raw, table = truncate_at_invalid_row(compiled, raw, table, times)
+    raw, table = possible_rows(compiled, raw, times, segments, problem.start_time)
     if raw.status not in _AT_POSSIBLE_STATE and raw.reached > 0 and raw.steps < INTERRUPT_CHECK_STEPS:  # a short run
         raw = _end_between_rows(problem, raw)
     return make_solution(problem, raw, table, times, (raw.time, raw.state), {})
@@ -55,10 +60,73 @@ def _end_between_rows(problem: Problem, raw: RawSolution) -> RawSolution:
     assert integrator is not None
     instants = np.linspace(problem.times[raw.reached - 1], raw.time, INSTANTS + 1)[1:]
     again = integrator.run(compiled, problem.segments, problem.start_time, problem.initial_vector, instants)
-    rows, reached = again.rows[: again.reached], instants[: again.reached]
-    table = recorded_rows(compiled, rows, reached, problem.segments, problem.start_time)
-    end, _ = truncate_at_invalid_row(compiled, again, table, instants)
+    end, _ = possible_rows(compiled, again, instants, problem.segments, problem.start_time)
     return raw if end is again else raw._replace(time=end.time, state=end.state, status=end.status)
+
+
+def _solve_closed_loop(problem: Problem, loop: ControlLoop) -> Solution:
+    """The solution of a problem with a ControlLoop, and the state from which the run can be continued.
+
+    The recording also has `setpoint.`, `measured.` and `command.` columns: the set points in time, and the controller's
+    measurements and commands at the last sample. Every sampling instant is a row. Measurements are taken just before
+    the command of the same instant: an output that jumps with an input has not jumped yet. Split at a sampling instant
+    and continued, a run equals the run in one, to the last bit; split between two, to the integrator's tolerance.
+    """
+    compiled, form, law = problem.compiled, form_of(problem), loop.controller
+    control_state = problem.control_state or loop.init(problem.start_time)
+    pool = compiled.description.cache.loops
+    run: CompiledRun | None = pool.borrow(form)
+    if run is None:
+        assert problem.integrator is not None
+        prepared = CompiledLoop(compiled, prepare_loop(problem, control_state))
+        run = CompiledRun(prepared, compiled, problem.integrator, problem.initial_vector, control_state)
+    else:
+        assert isinstance(law, ControlLaw)
+        run.restart(compiled, problem.initial_vector, parameters_of(law), control_state)
+    run.integrate()
+    solution = _loop_solution(problem, loop, run)
+    if form is not None and run.status == Status.DONE and run.room <= MAX_KEPT_ROWS:
+        pool.give_back(form, run)  # it holds the signals, which the form names by their identity
+    return solution
+
+
+def _loop_solution(problem: Problem, loop: ControlLoop, run: CompiledRun) -> Solution:
+    """The rows of all intervals as one solution."""
+    compiled, segments, (times, states) = problem.compiled, run.signal, run.rows
+    times, states = times.copy(), states.copy()  # the next run may be in the same arrays
+    raw, table = possible_rows(compiled, run.raw(states), times, segments, problem.start_time)
+    way = "compiled with the plant" if run.loop.law is not None else "called from Python at each sample"
+    measured = [name for name in loop.controller.measured_columns if name in compiled.output_names]
+    note = f"controlled by {loop.describe(column_units(problem.system, measured))}; {way}"
+    remark = Diagnostic(DiagnosticCode.CONTROLLER, type(loop.controller).__name__, note)
+    control_state = run.control_state
+    notes = loop.controller.notes(control_state.controller)
+    remarks = (remark, *(Diagnostic(DiagnosticCode.CONTROLLER, remark.subject, text) for text in notes))
+    reached = times[: raw.reached]
+    at, setpoints = run.prepared.at(reached) if loop.drivers else run.prepared.at_times  # drivers add rows
+    more = run.columns(at[: reached.size], setpoints[: reached.size])
+    return make_solution(problem, raw, table, times, (run.time, run.state), more, remarks, control_state)
+
+
+def form_of(problem: Problem) -> Hashable | None:
+    """The form of a problem's loop; None where a part of it may change, or where the run continues another one."""
+    loop = problem.input
+    assert isinstance(loop, ControlLoop)
+    law, given = loop.controller, problem.output_times
+    signals = type(loop.setpoint) is Schedule and type(loop.other_inputs) is Schedule
+    if not signals or problem.control_state is not None or not isinstance(law, ControlLaw):
+        return None
+    if not (given is None or type(given) in (float, int)):
+        return None
+    form = (
+        tree.structure(law), id(loop.setpoint), id(loop.other_inputs), tuple(loop.drivers.items()), loop.sample_time,
+        problem.start_time, problem.duration, given, problem.integrator,
+    )  # fmt: skip
+    try:
+        hash(form)
+    except TypeError:  # a driver or an integrator that can change
+        return None
+    return form
 
 
 def simulate(

@@ -1,4 +1,4 @@
-"""SampledLoop: a control loop prepared for one run, what does not change from sample to sample; called controllers."""
+"""SampledLoop: a control loop prepared for one run, its drivers as arrays of a kernel; controllers that are called."""
 
 import dataclasses
 import functools
@@ -10,9 +10,11 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core import Array, ParameterError
-from ..loop import FEW_SEGMENTS, ControlLoop, ControlLoopState, InputSignal, Measurement, PiecewiseLinear
-from .output_times import output_times
-from .problem import Problem
+from ..compile.kernel_layout import DriverKind
+from ..loop import PWM, ControlLoop, ControlLoopState, InputSignal, Measurement, PwmState, SolenoidDriver
+from ..loop.inputs import PiecewiseLinear
+from ..loop.pwm_and_solenoid import MAX_PERIODS, SolenoidState, apply_drivers, check_command_range
+from .problem import Problem, output_times
 
 MAX_SAMPLES = 10_000_000
 """Samples of one run that fit a usual memory."""
@@ -70,7 +72,9 @@ def prepare_loop(problem: Problem, state: ControlLoopState) -> SampledLoop:
     edges, sampled = _edges(loop.sample_time, state, start, problem.end_time)
     close = CLOSE * loop.sample_time
     others = snapped(loop.other_inputs, names, edges, close)
-    starts = _merged(edges[:-1], others.ends[:-1])
+    starts, changes = edges[:-1], others.ends[:-1]
+    if not (starts[np.minimum(starts.searchsorted(changes), starts.size - 1)] == changes).all():
+        starts = np.unique(np.concatenate([starts, changes]))
     inputs = others.split_at(starts, start).as_floats()
     commanded = [names.index(name) for name in loop.controller.inputs]
     for column in commanded:
@@ -104,12 +108,6 @@ def intervals_of(times: Array, instants: Array) -> npt.NDArray[np.int64]:
     return np.maximum(np.searchsorted(instants, times, side="right") - 1, 0)
 
 
-def _merged(instants: Array, others: Array) -> Array:
-    """The instants and the others, both rising, each once."""
-    at = np.minimum(instants.searchsorted(others), instants.size - 1)
-    return instants if (instants[at] == others).all() else np.unique(np.concatenate([instants, others]))
-
-
 def _edges(sample_time: float, state: ControlLoopState, start: float, end: float) -> tuple[Array, bool]:
     """Start, the sampling instants after it, and end of a run [s]; whether the start is a sampling instant itself."""
     count, close = (end - state.origin) / sample_time - state.sample_count, CLOSE * sample_time
@@ -132,30 +130,13 @@ def snapped(signal: InputSignal, names: tuple[str, ...], edges: Array, close: fl
     """The segments of a signal; an end that is close to a sampling instant is moved to it."""
     start = float(edges[0])
     segments = signal.segments(names, start, float(edges[-1]) - start)
-    if segments.ends.size <= FEW_SEGMENTS:
-        return _few_snapped(segments, edges, close)
-    behind = np.clip(np.searchsorted(edges, segments.ends), 1, edges.size - 1)
+    ends = segments.ends
+    behind = np.minimum(np.maximum(edges.searchsorted(ends), 1), edges.size - 1)
     before, after = edges[behind - 1], edges[behind]
-    nearest = np.where(segments.ends - before < after - segments.ends, before, after)
-    ends = np.where(np.abs(nearest - segments.ends) <= close, nearest, segments.ends)
-    kept = np.diff(ends, prepend=edges[0]) > 0
+    nearest = np.where(ends - before < after - ends, before, after)
+    ends = np.where(np.abs(nearest - ends) <= close, nearest, ends)
+    kept = ends > np.concatenate([edges[:1], ends[:-1]])
     return PiecewiseLinear(ends[kept], segments.values[kept], segments.slopes[kept])
-
-
-def _few_snapped(segments: PiecewiseLinear, edges: Array, close: float) -> PiecewiseLinear:
-    """The same of a few segments, one by one."""
-    ends, kept, last = [], [], float(edges[0])
-    behind = edges.searchsorted(segments.ends).tolist()
-    for row, (end, i) in enumerate(zip(segments.ends.tolist(), behind, strict=True)):
-        after = min(max(i, 1), edges.size - 1)
-        low, high = edges[after - 1 : after + 1].tolist()
-        nearest = low if end - low < high - end else high
-        moved = nearest if abs(nearest - end) <= close else end
-        if moved > last:
-            ends.append(moved)
-            kept.append(row)
-        last = moved
-    return PiecewiseLinear(np.array(ends), segments.values[kept], segments.slopes[kept])
 
 
 class CalledController:
@@ -187,3 +168,99 @@ class CalledController:
                 f"{type(self._controller).__name__} commands {commands!r}; it must give a number for each of "
                 f"{', '.join(self._inputs)}."
             ) from None
+
+
+MAX_CAPACITY = 1_000_000
+"""Segments of an input within an interval up to which a kernel computes them."""
+WIDTH = 4
+"""Numbers of the settings and of the state of a driver."""
+KINDS: dict[type, DriverKind] = {PWM: DriverKind.MODULATOR, SolenoidDriver: DriverKind.SWITCH}
+"""The drivers that kernels and exported programs implement."""
+_STATES: dict[type, Any] = {PWM: PwmState, SolenoidDriver: SolenoidState}
+
+
+def are_called(prepared: SampledLoop) -> bool:
+    """Whether a driver of a loop must be called from Python, because the kernel does not implement it."""
+    known = all(type(driver) in KINDS for chain in prepared.loop.driven_inputs.chains.values() for driver in chain)
+    return not known or greatest_capacity(prepared) > MAX_CAPACITY
+
+
+def greatest_capacity(prepared: SampledLoop) -> int:
+    """The maximum number of segments of an input within an interval, before and after each of its drivers."""
+    duration = float(np.diff(prepared.instants).max())
+    greatest = pieces = int(np.diff(prepared.first_segments).max())
+    for chain in prepared.loop.driven_inputs.chains.values():
+        count = pieces
+        for driver in chain:
+            if isinstance(driver, PWM):
+                count = 2 * (math.ceil(min(duration * driver.frequency, MAX_PERIODS)) + 4)
+            else:
+                count = 4 * count + 4
+            greatest = max(greatest, count)
+    return greatest
+
+
+class DriverTable:
+    """The drivers (D,) of all inputs as arrays, in the order in which a signal passes through them.
+
+    kinds (D, 2)      index of the input, and DriverKind
+    settings, states, kept (D, 4)   settings; states at the end of the present and of the last completed interval
+    columns, scratch, counts, begins    workspace of the kernel
+    called  whether the drivers are called from Python, in the signals of the kernel
+    """
+
+    def __init__(self, prepared: SampledLoop, state: ControlLoopState, capacity: int, called: bool = False) -> None:
+        loop, inputs, names = prepared.loop, prepared.inputs, prepared.input_names
+        chains = loop.driven_inputs.chains
+        self.called, self._chains = called, chains
+        self._indices = {name: names.index(name) for name in chains}
+        self._order = [(name, driver) for name, chain in chains.items() for driver in chain if not called]
+        for name in chains:
+            if name not in loop.controller.inputs:
+                check_command_range(name, inputs.column(names.index(name)), float(prepared.instants[0]))
+        m = inputs.values.shape[1]
+        self.kinds = np.array([(names.index(n), KINDS[type(d)]) for n, d in self._order], np.int64).reshape(-1, 2)
+        if called:
+            self.kinds = np.array([(-1, -1)])
+        self.settings = _table([d.settings for _, d in self._order if isinstance(d, PWM | SolenoidDriver)])
+        self.kept = _table([tuple(one) for name in chains for one in state.drivers[name] if not called])
+        self.states, self._first = self.kept.copy(), self.kept.copy()
+        self.columns, self.scratch = np.empty((m, 3, capacity)), np.empty((2, 3, capacity))
+        self.counts, self.begins = np.zeros((2, m), dtype=np.int64), np.empty(m)
+
+        self._first_called = state.drivers
+        self.restart()
+
+    def restart(self) -> None:
+        """The states at the beginning of the loop."""
+        self.states[:] = self.kept[:] = self._first
+        self._before = self._after = self._first_called
+        self._called_at = -1
+
+    def call(self, interval: int, begin: float) -> int:
+        """Replace the signals of an interval by those behind the drivers; how many segments they have together."""
+        counts = self.counts[0].tolist()
+        signals = [list(zip(*self.columns[i, :, :count].tolist(), strict=True)) for i, count in enumerate(counts)]
+        self._before, self._called_at = self._after, interval
+        self._after = apply_drivers(self._chains, self._before, signals, self._indices, begin)
+        counts = list(map(len, signals))
+        if max(counts) > self.columns.shape[2]:
+            self.columns = np.empty((*self.columns.shape[:2], 2 * max(counts)))
+        for i, signal in enumerate(signals):
+            self.columns[i, :, : counts[i]] = np.array(signal).T
+        self.counts[0] = counts
+        return sum(counts)
+
+    def as_mapping(self, done: int) -> Mapping[str, tuple[Any, ...]]:
+        """The drivers' states at the end of the last of so many completed intervals, by input."""
+        if self.called:  # the last call may be that of an interval that was not completed
+            return self._after if done > self._called_at else self._before
+        by_name: dict[str, tuple[Any, ...]] = {name: () for name, _ in self._order}
+        for (name, driver), row in zip(self._order, self.kept.tolist(), strict=True):
+            kind = _STATES[type(driver)]
+            by_name[name] = (*by_name[name], kind(*row[: len(kind._fields)]))
+        return by_name
+
+
+def _table(rows: list[tuple[float, ...]]) -> Array:
+    return np.array([(*row, *[0.0] * (WIDTH - len(row))) for row in rows], dtype=float).reshape(-1, WIDTH)

@@ -4,7 +4,7 @@ import dataclasses
 import functools
 import operator
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -18,12 +18,8 @@ from ..compile.cache.kernel import record
 from ..compile.program import CompiledSystem
 from ..loop.control_loop import ControlLoopState
 from ..loop.inputs import PiecewiseLinear
-from .integrators import Integrator, RawSolution
+from .integrators import RawSolution
 from .problem import Problem
-
-if TYPE_CHECKING:
-    import pandas as pd
-
 
 _HINTS = {
     Status.TOO_MANY_STEPS: "Raise the tolerance, lengthen a fixed step, or look for a valve that chatters.",
@@ -31,6 +27,7 @@ _HINTS = {
     Status.NON_FINITE_COMMAND: "Check the last measurement of the controller, and its parameters.",
 }
 _GENERAL_HINT = "Check the last state: a parameter may be far from physical, or a fixed step too long."
+_name = functools.lru_cache(maxsize=32)(str)
 
 
 class RowTable(NamedTuple):
@@ -82,29 +79,21 @@ class RowRecorder:
         return RowTable(inputs, outputs, lower, upper, first)
 
 
-def recorded_rows(
-    compiled: CompiledSystem, states: Array, times: Array, segments: PiecewiseLinear, start: float
-) -> RowTable:
-    """Inputs and outputs at states (N, n) and rising times (N,) of a run whose segments begin at `start` [s].
-
-    For a system with its own parameters, whose recorder is kept with its description.
-    """
-    idle = compiled.description.cache.recorders
-    recorder: RowRecorder = idle.borrow(None) or RowRecorder(compiled)
-    table = recorder.evaluate(states, times, segments, start)
-    idle.give_back(None, recorder)
-    return table
-
-
-def truncate_at_invalid_row(
-    compiled: CompiledSystem, raw: RawSolution, table: RowTable, times: Array
+def possible_rows(
+    compiled: CompiledSystem, raw: RawSolution, times: Array, segments: PiecewiseLinear, start: float
 ) -> tuple[RawSolution, RowTable]:
-    """The solution up to the first row that is impossible, where numbers go on although the model does not hold.
+    """The solution with inputs and outputs of its rows, up to the first row that is impossible.
 
-    A fixed step can end in numbers that are far off; isothermal air has a pressure, below vacuum, in a negative volume.
+    Numbers can go on although the model does not hold: a fixed step can end in numbers that are far off; isothermal
+    air has a pressure, below vacuum, in a negative volume. `start` [s] is where segments begin. For a system with its
+    own parameters, whose recorder is kept with its description.
     """
-    known = compiled.description
-    positive = known.positive_outputs
+    known, all_reached = compiled.description, raw.reached == times.size
+    positive, idle = known.positive_outputs, known.cache.recorders
+    shown = (raw.rows, times) if all_reached else (raw.rows[: raw.reached], times[: raw.reached])
+    recorder: RowRecorder = idle.borrow(None) or RowRecorder(compiled)
+    table = recorder.evaluate(*shown, segments, start)
+    idle.give_back(None, recorder)
     if table.first_invalid == raw.reached and all(map(operator.ge, table.lower, known.range_floors)):
         return raw, table
     reasons: dict[Status, Any] = {
@@ -119,19 +108,17 @@ def truncate_at_invalid_row(
     status = next(status for status, rows in reasons.items() if rows[row])
     raw = raw._replace(reached=row, time=float(times[row]), state=raw.rows[row], status=status)
     inputs, outputs = table.inputs[:row], table.outputs[:row]
-    shown = np.hstack([raw.rows[:row], outputs]) if row else np.full((1, outputs.shape[1] + raw.state.size), np.nan)
-    columns = shown[:, known.ranged_columns]
+    kept = np.hstack([raw.rows[:row], outputs]) if row else np.full((1, outputs.shape[1] + raw.state.size), np.nan)
+    columns = kept[:, known.ranged_columns]
     return raw, RowTable(inputs, outputs, columns.min(axis=0).tolist(), columns.max(axis=0).tolist(), row)
 
 
 def status_of_state(
     compiled: CompiledSystem, segments: PiecewiseLinear, start: float, state: Array, time: float
 ) -> Status:
-    """DONE, or why a state (n,) at a time [s] of a run is impossible; arguments as of `recorded_rows`."""
+    """DONE, or why a state (n,) at a time [s] of a run is impossible; arguments as of `possible_rows`."""
     raw = RawSolution(state[np.newaxis].copy(), 1, time, state, Status.DONE, 0, 0)
-    times = np.array([time])
-    table = recorded_rows(compiled, raw.rows, times, segments, start)
-    return truncate_at_invalid_row(compiled, raw, table, times)[0].status
+    return possible_rows(compiled, raw, np.array([time]), segments, start)[0].status
 
 
 def make_solution(
@@ -168,12 +155,6 @@ def make_solution(
     final = dict(zip(known.state_names, end[1].tolist(), strict=True))
     statistics, remarks = Statistics(raw.steps, raw.rejected), (*diagnostics, *later)
     return Solution(problem, recording, raw.status, statistics, remarks, end[0], final, control_state)
-
-
-@functools.lru_cache(maxsize=32)
-def _name(integrator: Integrator | None) -> str:
-    """The representation of an integrator."""
-    return str(integrator)
 
 
 def early_end(compiled: CompiledSystem, raw: RawSolution, end: float) -> Diagnostic:
@@ -250,10 +231,6 @@ class Solution(NotebookDisplay):
         if self.complete:
             return self
         raise SimulationError(self.diagnostics[-1].message, self, interrupted=self.status == Status.INTERRUPTED)
-
-    def to_pandas(self) -> "pd.DataFrame":
-        """The recording as a data frame."""
-        return self.recording.to_pandas()
 
     def plot(self, *names: str, ax: Any = None) -> Any:
         """Plot the named columns, or all, over time, as `Recording.plot`, with the units of the system."""

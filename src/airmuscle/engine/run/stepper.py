@@ -109,7 +109,9 @@ class Stepper:
         if not isinstance(dt, (float, numbers.Real)) or not 0.0 < dt <= LARGEST:
             raise ParameterError(f"Stepper: dt is {one_line(dt)} s; it must be positive and finite.")
         if hasattr(inputs, "keys"):
-            inputs = self._by_name(inputs)
+            check_known("Stepper: no input", inputs, self.input_names)
+            present = zip(self.input_names, self.inputs.tolist(), strict=True)
+            inputs = list({**dict(present), **inputs}.values())
         try:
             if len(inputs) != self._given.size:
                 raise ValueError
@@ -129,7 +131,12 @@ class Stepper:
             )
         defect = self._end()
         if defect:
-            raise SimulationError(self._reason(defect, dt))
+            name = (*self.state_names, *self.output_names)[defect - 1]
+            value = [*self._next, *self._found][defect - 1]
+            raise SimulationError(
+                f"the step of {dt:g} s from {self.time:.6g} s on led to {name} {value:.4g}: "
+                f"{self._limits.meaning(defect - 1, value)} The stepper is in the state before the step."
+            )
         self.time += dt
         return self.outputs
 
@@ -201,23 +208,6 @@ class Stepper:
         self._end()
         self._always[0] = 0
         return self.outputs
-
-    def _by_name(self, inputs: Mapping[str, float]) -> list[Any]:
-        """The inputs in their order; those that are not given keep their present values."""
-        values: list[Any] = self.inputs.tolist()
-        for name, value in inputs.items():
-            if name not in self.input_names:
-                check_known("Stepper: no input", name, self.input_names)
-            values[self.input_names.index(name)] = value
-        return values
-
-    def _reason(self, defect: int, dt: float) -> str:
-        """The reason of a step that led to an impossible or invalid state."""
-        n = self.state.size
-        name = (*self.state_names, *self.output_names)[defect - 1]
-        value = self._next[defect - 1] if defect <= n else self._found[defect - 1 - n]
-        end = f"the step of {dt:g} s from {self.time:.6g} s on led to {name} {value:.4g}"
-        return f"{end}: {self._limits.meaning(defect - 1, value)} The stepper is in the state before the step."
 
 
 _RANGES = {

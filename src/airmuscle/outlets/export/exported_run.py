@@ -13,8 +13,16 @@ from ...engine.compile.kernel_text.types import TypedKernel
 from ...engine.compile.program import Description
 from ...engine.loop import COMMAND, MEASURED, SETPOINT, PiecewiseLinear
 from ...engine.run import ExplicitRungeKutta, Integrator, Problem, Rodas4
-from ...engine.run.driver_table import KINDS, MAX_CAPACITY, DriverTable, greatest_capacity
-from ...engine.run.sampled_loop import CLOSE, SampledLoop, prepare_loop, snapped
+from ...engine.run.sampled_loop import (
+    CLOSE,
+    KINDS,
+    MAX_CAPACITY,
+    DriverTable,
+    SampledLoop,
+    greatest_capacity,
+    prepare_loop,
+    snapped,
+)
 from .printed_controller import PrintedController, check_control_law, print_controller
 from .printed_system import ExportedSystem
 

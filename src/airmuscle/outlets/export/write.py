@@ -42,9 +42,9 @@ class PrintedPredictive(PrintedController):
     def source_files(self) -> dict[str, str]:
         law, arrays, number = self.law, self.law.arrays(), self.number
         shapes = {name: tuple(map(str, array.shape)) for name, array in arrays.items()}
-        model = law.observer
+        model = law.model
         known = {**law.constants, **self._given, "operating": model.inputs, "sizes": model.input_sizes,
-                 "at_measured": model.measured, "at_controlled": law.target.controlled}  # fmt: skip
+                 "at_measured": model.measured, "at_controlled": law.model.controlled}  # fmt: skip
         places = {
             **self.places,
             "tables": "".join(_table(f"{self.name}_{name}", array, number) for name, array in known.items()),
@@ -65,7 +65,7 @@ class PrintedPredictive(PrintedController):
     @property
     def _given(self) -> dict[str, Array]:
         """The limits of the inputs as scaled deviations, and the tolerances, by the names of the kernel."""
-        model, (low, high) = self.law.observer, np.array(self.ranges).T
+        model, (low, high) = self.law.model, np.array(self.ranges).T
         ends = {"low": (low - model.inputs) / model.input_sizes, "high": (high - model.inputs) / model.input_sizes}
         return ends | ({"tolerances": np.array(SINGLE_TOLERANCES)} if self.number == "float" else {})
 
@@ -90,8 +90,8 @@ class PrintedPredictive(PrintedController):
         law, sample, rows = self.law, plain_kernels("predictive")["predictive_sample"], []
         single, known = np.float32, {**law.arrays(), **self._given}
         arrays = {name: array if array.dtype == np.int64 else array.astype(single) for name, array in known.items()}
-        at, to = law.observer.measured.astype(single), law.target.controlled.astype(single)
-        sizes, operating = law.observer.input_sizes.astype(single), law.observer.inputs.astype(single)
+        at, to = law.model.measured.astype(single), law.model.controlled.astype(single)
+        sizes, operating = law.model.input_sizes.astype(single), law.model.inputs.astype(single)
         for values, points in zip(measured.astype(single), setpoints.astype(single), strict=True):
             arrays |= {"y": values - at, "r": points - to}
             sample(*arrays.values())

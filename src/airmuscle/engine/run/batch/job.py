@@ -1,5 +1,6 @@
 """BatchJob: the arguments that all ways of running a batch share, places of results, and the threads of its queue."""
 
+import concurrent.futures
 import contextlib
 import contextvars
 import dataclasses
@@ -17,7 +18,7 @@ from ....core import Array, Status
 from ...compile.program import CompiledSystem, Pool
 from ...loop.inputs import PiecewiseLinear
 from ..integrators import Integrator, RawSolution
-from ..solution import RowRecorder
+from ..solution import RowRecorder, early_end
 from .loops import LoopBatch
 from .variations import Variations
 
@@ -49,7 +50,11 @@ class BatchJob:
     def __post_init__(self) -> None:
         count = len(self.initial_states)
         self.final, self.status = np.full(self.initial_states.shape, np.nan), np.full(count, NOT_RUN)
-        self.reached = np.zeros(count, dtype=np.int64)
+        self.reached, sizes = np.zeros(count, dtype=np.int64), self.compiled.sizes
+        self.lower_bounds = self.compiled.description.lower_bounds
+        """The smallest possible value of each state (n,)."""
+        self.own = sizes.states + sizes.outputs + sizes.inputs
+        """The number of columns of the plant: states, outputs and inputs."""
 
     @functools.cached_property
     def nominal(self) -> Array:
@@ -68,24 +73,16 @@ class BatchJob:
         """Indices of the stored columns among `names`."""
         return np.array([self.names.index(name) for name in self.columns], dtype=np.int64)
 
-    @property
-    def lower_bounds(self) -> Array:
-        """The smallest possible value of each state (n,)."""
-        return self.compiled.description.lower_bounds
-
     def run_single(self, index: int) -> None:
         """Simulate one plant alone, exactly as `simulate` would, and write its results."""
         one = self.compiled.at(self.variations.parameters(index), self.nominal[index])
-        if self.loops is None:
-            segments, state = self.segments[index], self.initial_states[index]
+        state, loops = self.initial_states[index], self.loops
+        if loops is None:
+            segments = self.segments[index]
             raw = self.integrator.run(one, segments, self.start_time, state, self.times)
             self._write(index, one, self._truncate(raw), segments, {})
-        else:
-            self._run_loop(index, one, self.loops)
-
-    def _run_loop(self, index: int, one: CompiledSystem, loops: LoopBatch) -> None:
-        """Simulate a control loop and write its results."""
-        run = loops.run(index, one, self.initial_states[index])
+            return
+        run = loops.run(index, one, state)
         times, rows = run.rows
         if run.prepared.loop.drivers:  # there may be further rows
             at = np.searchsorted(times, self.times - 1e-9 * loops.template.duration)
@@ -110,8 +107,13 @@ class BatchJob:
     ) -> None:
         reached = raw.reached
         states = np.ascontiguousarray(raw.rows[:reached])
-        parts = [states, *(self._outputs_and_inputs(one, states, segments) if self._needs_rows else ())]
-        values = [column for part in parts for column in part.T]
+        values = [*states.T]
+        if ((self.kept >= states.shape[1]) & (self.kept < self.own)).any():  # outputs or inputs are stored
+            recorder: RowRecorder = self._recorders.borrow(None) or RowRecorder(one)
+            recorder.adopt(one)
+            table = recorder.evaluate(states, self.times[:reached], segments, self.start_time)
+            self._recorders.give_back(None, recorder)
+            values += [*table.outputs.T, *table.inputs.T]
         with np.errstate(over="ignore"):  # a column in single precision
             for place, (name, column) in zip(self.kept.tolist(), self.columns.items(), strict=True):
                 if place < self.own:
@@ -121,34 +123,7 @@ class BatchJob:
                 column[index, reached:] = np.nan
         self.final[index], self.status[index], self.reached[index] = raw.state, raw.status, reached
         if raw.status:
-            self.reasons[index] = self._reason(raw)
-
-    @functools.cached_property
-    def own(self) -> int:
-        """The number of columns of the plant: states, outputs and inputs."""
-        sizes = self.compiled.sizes
-        return sizes.states + sizes.outputs + sizes.inputs
-
-    @functools.cached_property
-    def _needs_rows(self) -> bool:
-        """Whether outputs or inputs are stored."""
-        return bool(((self.kept >= self.compiled.sizes.states) & (self.kept < self.own)).any())
-
-    def _outputs_and_inputs(self, one: CompiledSystem, states: Array, segments: PiecewiseLinear) -> tuple[Array, Array]:
-        """Outputs and inputs at the first rows (R, n) of a plant."""
-        recorder: RowRecorder = self._recorders.borrow(None) or RowRecorder(one)
-        recorder.adopt(one)
-        table = recorder.evaluate(states, self.times[: len(states)], segments, self.start_time)
-        self._recorders.give_back(None, recorder)
-        return table.outputs, table.inputs
-
-    def _reason(self, raw: RawSolution) -> str:
-        states = self.compiled.system.states
-        at = ", ".join(f"{s.name} {v:.4g} {s.unit}" for s, v in zip(states, raw.state, strict=True))
-        return (
-            f"the run ended at {raw.time:.6g} of {self.start_time + self.duration:.6g} s because "
-            f"{raw.status.message}, after {raw.steps} steps, at {at}"
-        )
+            self.reasons[index] = early_end(self.compiled, raw, self.start_time + self.duration).text
 
     def mark_not_run(self, index: int, status: Status, reason: str | None = None) -> None:
         """Write that a plant was not simulated."""
@@ -175,7 +150,6 @@ class Queue:
     def __init__(self, items: int) -> None:
         self.stop: npt.NDArray[np.int64] = np.zeros(1, dtype=np.int64)
         self.done = 0
-        self.error: BaseException | None = None
         self._items = iter(range(items))
         self._lock = threading.Lock()
 
@@ -190,30 +164,24 @@ class Queue:
                 worker(item)
                 with self._lock:
                     self.done += 1
-        except BaseException as error:
-            self.error = error
+        except BaseException:
             self.stop[0] = 1
+            raise
 
 
 def run_workers(queue: Queue, workers: list[Callable[[int], Any]], advanced: Callable[[int], None]) -> bool:
     """Run each worker on its own thread until the queue is empty; False where the user interrupted it."""
-    threads = [threading.Thread(target=queue.work, args=(worker,), daemon=True) for worker in workers]
-    for thread in threads:
-        thread.start()
-    interrupted = False
-    try:
-        for thread in threads:
-            while thread.is_alive():
-                thread.join(0.05)
+    complete = True
+    with concurrent.futures.ThreadPoolExecutor(max(len(workers), 1)) as threads:
+        working = [threads.submit(queue.work, worker) for worker in workers]
+        try:
+            while concurrent.futures.wait(working, 0.05).not_done:
                 advanced(queue.done)
-    except KeyboardInterrupt:
-        interrupted = True
-        queue.stop[0] = 1
-        for thread in threads:
-            thread.join()
-    if queue.error is not None:
-        raise queue.error
-    return not interrupted
+        except KeyboardInterrupt:
+            complete, queue.stop[0] = False, 1
+    for each in working:
+        each.result()
+    return complete
 
 
 @contextlib.contextmanager

@@ -12,10 +12,10 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from ....core import Array, ParameterError, Status, tree
+from ....core import Array, Status, tree
 from ...compile.cache.kernel import aligned_array, lanes, loop_lanes
 from ...compile.llvm.emit import LlvmType
-from ...loop.control_law import ControlLaw
+from ...loop import MEASURED, SETPOINT, ControlLaw
 from ..compiled_law import compiled_sample
 from ..integrators import ExplicitRungeKutta
 from ..sampled_loop import intervals_of
@@ -191,11 +191,13 @@ class LoopLaneBlock(LaneArrays):
 
     def _of_loop(self, name: str, plants: Plants) -> Array:
         """A column (R, T) of the set points, measurements or commands of plants."""
-        kind, index = self.loops.place_of(name)
-        if not kind:
+        signals = self.loops.loops[0].signals
+        prefix = next(each for each in signals if name.startswith(each))
+        index = signals[prefix].index(name.removeprefix(prefix))
+        if prefix == SETPOINT:
             return np.array([self.loops.of_plant(i).prepared.at_times[1][:, index] for i in plants.tolist()])
         at = np.minimum(self.prepared.at_times[0], len(self.samples) - 1)
-        return np.asarray((self.samples if kind == 1 else self.commands)[at, index, : plants.size].T)
+        return np.asarray((self.samples if prefix == MEASURED else self.commands)[at, index, : plants.size].T)
 
 
 class SegmentTable:
@@ -261,14 +263,3 @@ def run_in_lanes(job: BatchJob, plants: Plants) -> bool:
         return False
     ends = first.inputs.ends
     return all(np.array_equal(loops.compiled(loop).prepared.inputs.ends, ends) for loop in distinct)
-
-
-def check_precision(precision: "Precision", integrator: object, *, loops: bool) -> None:
-    """Raise ParameterError for a precision in which an integrator or control loops cannot be computed."""
-    if precision.bits != 64 and loops:
-        raise ParameterError("simulate_batch: control loops are computed in double precision; omit the precision.")
-    if precision.bits != 64 and not isinstance(integrator, ExplicitRungeKutta):
-        raise ParameterError(
-            f"simulate_batch: {type(integrator).__name__} chooses its steps in double precision; {precision} requires "
-            "an integrator of fixed step, such as RungeKutta4(1e-3)."
-        )

@@ -39,12 +39,6 @@ class LoopBatch:
         """The loop of one plant, prepared for runs with rows at the times of the batch."""
         return self.compiled(self.loops[index if len(self.loops) > 1 else 0])
 
-    def place_of(self, column: str) -> tuple[int, int]:
-        """Whether a column that loops add is a set point (0), measurement (1) or command (2), and its number."""
-        signals = self.loops[0].signals
-        prefix = next(each for each in signals if column.startswith(each))
-        return list(signals).index(prefix), signals[prefix].index(column.removeprefix(prefix))
-
     def run(self, index: int, compiled: CompiledSystem, state: Array) -> CompiledRun:
         """The loop of one plant, integrated from its initial state (n,)."""
         loop, start = self.of_plant(index), self.template.start_time

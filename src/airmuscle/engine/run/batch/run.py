@@ -1,5 +1,7 @@
 """Simulation of many plants of one structure at once."""
 
+import contextlib
+import dataclasses
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -12,13 +14,13 @@ from ...compile.program import CompiledSystem, compile_system
 from ...loop import ControlLoop, InputSignal, PiecewiseLinear
 from ...processes import available_cores
 from ..integrators import MAX_STEPS, ExplicitRungeKutta, Integrator, default_integrator
-from ..output_times import output_times as times_of
 from ..problem import Problem, check_input_range
+from ..problem import output_times as times_of
 from .job import BatchJob, Queue, progress, run_workers
-from .lanes import Double, Precision, check_precision, lane_workers
+from .lanes import Double, Precision, lane_workers
 from .loops import LoopBatch, loops_of, vary
-from .solution import BatchSolution, InMemory, OnDisk
-from .variations import Variations, check_states, count_of_states, default_states, given_states
+from .solution import BatchSolution, file_of, new_columns, new_folder, write_rest
+from .variations import default_states, given_states
 
 
 def simulate_batch(
@@ -69,19 +71,17 @@ def simulate_batch(
     compiled = compile_system(plant)
     segments = () if loops else _segments(compiled, input, count, start_time, duration)  # type: ignore[arg-type]
     times = _times(output_times, start_time, duration, input, segments, keep)
-    states, reasons = _initial_states(varied, initial_states, count)
+    if initial_states is not None:
+        states, reasons = given_states(varied, initial_states, count), dict[int, str]()
+    else:
+        with progress("computing the equilibrium of each plant", count) as advanced:
+            states, reasons = default_states(varied, advanced)
     batch = None
     if loops:
         template = Problem(plant, loops[0], duration, start_time=start_time, integrator=integrator)
         batch = LoopBatch(template, loops, laws, times)
     job = BatchJob(compiled, varied, integrator, states, segments, start_time, duration, times, reasons, batch)
-    storage = _storage(job, keep, into, precision)
-    try:
-        _run(job, precision, cores or available_cores())
-        return _solution(job, storage, precision)
-    except BaseException:
-        storage.abandon()
-        raise
+    return _solved(job, _kept(job, keep), into, precision, cores or available_cores())
 
 
 def _times(
@@ -121,14 +121,23 @@ def _check_options(
         raise ParameterError(f"into is {into!r}; give the path of a folder.")
     if not isinstance(precision, Precision):
         raise ParameterError(f"precision is {precision!r}; give Double() or Single().")
-    check_precision(precision, integrator, loops=loops)
+    if precision.bits != 64 and loops:
+        raise ParameterError("simulate_batch: control loops are computed in double precision; omit the precision.")
+    if precision.bits != 64 and not isinstance(integrator, ExplicitRungeKutta):
+        raise ParameterError(
+            f"simulate_batch: {type(integrator).__name__} chooses its steps in double precision; {precision} requires "
+            "an integrator of fixed step, such as RungeKutta4(1e-3)."
+        )
     if cores is not None and (not isinstance(cores, int) or cores < 1):
         raise ParameterError(f"simulate_batch: cores is {cores!r}; it must be a whole number from 1 on.")
 
 
 def _count(initial_states: Mapping[str, npt.ArrayLike] | None, input: object) -> int | None:
-    """The number of plants that initial states and inputs are given for."""
-    of_states = count_of_states(initial_states)
+    """The number of plants that initial states and inputs are given for; None where they are the same for all."""
+    sizes = {name: np.size(value) for name, value in (initial_states or {}).items() if np.ndim(value) > 0}
+    if len(set(sizes.values())) > 1:
+        raise ParameterError(f"initial_states: every column needs one value per plant; there are {sizes}.")
+    of_states = next(iter(sizes.values()), None)
     if isinstance(input, InputSignal | ControlLoop):
         return of_states
     if not isinstance(input, Sequence):
@@ -165,27 +174,12 @@ def _segments(
     return each * count if isinstance(input, InputSignal) else each
 
 
-def _initial_states(
-    varied: Variations, given: Mapping[str, npt.ArrayLike] | None, count: int
-) -> tuple[Array, dict[int, str]]:
-    if given is not None:
-        states = given_states(varied.system, given, count)
-        check_states(varied, states)
-        return states, {}
-    with progress("computing the equilibrium of each plant", count) as advanced:
-        return default_states(varied, advanced)
-
-
-def _storage(job: BatchJob, keep: Sequence[str] | None, into: str | Path | None, precision: Precision) -> InMemory:
-    """The place of the columns of a job, into which it writes them."""
-    names: tuple[str, ...] = job.names
-    if keep is not None:
-        check_known("keep: no column", keep, names)
-        names = (keep,) if isinstance(keep, str) else tuple(dict.fromkeys(keep))
-    shape = (names, len(job.initial_states), job.times.size, precision.dtype)
-    storage = InMemory(*shape) if into is None else OnDisk(into, *shape)
-    job.columns.update(storage.columns)
-    return storage
+def _kept(job: BatchJob, keep: Sequence[str] | None) -> tuple[str, ...]:
+    """The names of the columns to be stored."""
+    if keep is None:
+        return job.names
+    check_known("keep: no column", keep, job.names)
+    return (keep,) if isinstance(keep, str) else tuple(dict.fromkeys(keep))
 
 
 def _run(job: BatchJob, precision: Precision, cores: int) -> None:
@@ -209,19 +203,23 @@ def _run(job: BatchJob, precision: Precision, cores: int) -> None:
         job.mark_interrupted()
 
 
-def _solution(job: BatchJob, storage: InMemory, precision: Precision) -> BatchSolution:
-    states = job.compiled.description.state_names
-    final = {name: job.final[:, i].copy() for i, name in enumerate(states)}
-    notes = tuple(note for note in (f"simulated by {job.integrator}, in a batch", precision.note) if note)
-    small = {
-        "time": job.times,
-        "status": job.status,
-        "reached": job.reached,
-        **{f"final {name}": values for name, values in final.items()},
-    }
-    remarks = {"notes": notes, "reasons": job.reasons, "varied": list(job.variations.paths)}
-    columns = storage.finish(small, remarks)
-    job.columns.clear()
-    return BatchSolution(
-        job.variations, job.integrator, job.times, columns, final, job.status, job.reached, job.reasons, notes
-    )
+def _solved(
+    job: BatchJob, names: tuple[str, ...], into: str | Path | None, precision: Precision, cores: int
+) -> BatchSolution:
+    """The solution with the columns of these names, in memory or on disk."""
+    shape = len(job.initial_states), job.times.size
+    with contextlib.nullcontext() if into is None else new_folder(Path(into)) as folder:
+        job.columns.update(new_columns(names, shape, precision.dtype, folder))
+        _run(job, precision, cores)
+        final = {name: job.final[:, i].copy() for i, name in enumerate(job.compiled.description.state_names)}
+        notes = tuple(note for note in (f"simulated by {job.integrator}, in a batch", precision.note) if note)
+        solution = BatchSolution(
+            job.variations, job.integrator, job.times, dict(job.columns), final, job.status, job.reached, job.reasons,
+            notes,
+        )  # fmt: skip
+        if folder is not None:
+            write_rest(solution, folder)
+    if into is None:
+        return solution
+    columns = {name: np.load(Path(into) / file_of(name), mmap_mode="r") for name in names}
+    return dataclasses.replace(solution, columns=columns)

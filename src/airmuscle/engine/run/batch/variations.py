@@ -142,16 +142,9 @@ STATES_AT_ONCE = 500
 """Systems whose default states are computed between two reports of progress (chosen)."""
 
 
-def count_of_states(given: Mapping[str, npt.ArrayLike] | None) -> int | None:
-    """The number of plants that initial states are given for; None where they are the same for all."""
-    sizes = {name: np.size(value) for name, value in (given or {}).items() if np.ndim(value) > 0}
-    if len(set(sizes.values())) > 1:
-        raise ParameterError(f"initial_states: every column needs one value per plant; there are {sizes}.")
-    return next(iter(sizes.values()), None)
-
-
-def given_states(system: System, given: Mapping[str, npt.ArrayLike], count: int) -> Array:
-    """Initial states (N, n) from numbers or columns (N,) by name."""
+def given_states(variations: Variations, given: Mapping[str, npt.ArrayLike], count: int) -> Array:
+    """Initial states (N, n) from numbers or columns (N,) by name. Raises ParameterError for an impossible one."""
+    system = variations.system
     names = [s.name for s in system.states]
     check_known("the plant has no state", given, names)
     missing = [name for name in names if name not in given]
@@ -174,12 +167,12 @@ def given_states(system: System, given: Mapping[str, npt.ArrayLike], count: int)
         raise ParameterError(
             f"initial_states, row {row}: '{names[i]}' is {states[row, i]:.4g}; it must not be negative."
         )
+    _check_states(variations, names, states)
     return states
 
 
-def check_states(variations: Variations, states: Array) -> None:
+def _check_states(variations: Variations, names: list[str], states: Array) -> None:
     """Raise the error of `simulate` for an impossible initial state (N, n), with its row."""
-    names = [s.name for s in variations.system.states]
     try:
         columns = {name: column.view(Column) for name, column in zip(names, states.T, strict=True)}
         variations.as_columns().check_state(columns)
@@ -200,9 +193,12 @@ def default_states(variations: Variations, advanced: Callable[[int], None]) -> t
     systems that are done.
     """
     system = variations.system
-    rows, shared = _distinct(system, variations)
-    names = [s.name for s in system.states]
-    states, reasons = np.full((rows.size, len(names)), np.nan), dict[int, str]()
+    relevant = [i for i, path in enumerate(variations.paths) if system.affects_default_state(path)]
+    known: dict[bytes, int] = {}
+    values = np.ascontiguousarray(variations.values[:, relevant])
+    shared = np.array([known.setdefault(row.tobytes(), len(known)) for row in values], dtype=np.intp)
+    rows = np.unique(shared, return_index=True)[1]
+    states, reasons = np.full((rows.size, len(system.states)), np.nan), dict[int, str]()
     for begin in range(0, rows.size, STATES_AT_ONCE):
         part = rows[begin : begin + STATES_AT_ONCE]
         table = system.default_states(variations.table(part))
@@ -211,29 +207,12 @@ def default_states(variations: Variations, advanced: Callable[[int], None]) -> t
                 f"simulate_batch: give the initial_states of {type(system).__name__}, a value for each state."
             )
         states[begin : begin + part.size] = table
-        for i in np.flatnonzero(~np.isfinite(table).all(axis=1)):
-            state = _default_state(variations.one(int(part[i])), names)
-            if isinstance(state, str):
-                reasons[begin + int(i)] = state
-            else:
-                states[begin + i] = state
-            advanced(begin + int(i))
+        for i in np.flatnonzero(~np.isfinite(table).all(axis=1)).tolist():
+            try:
+                state = variations.one(int(part[i])).default_state() or {}
+                states[begin + i] = [state[s.name] for s in system.states]
+            except PhysicsError as error:
+                reasons[begin + i] = f"it has no equilibrium to start from: {error}"
+            advanced(begin + i)
         advanced(begin + part.size)
     return states[shared], {row: reasons[i] for row, i in enumerate(shared.tolist()) if i in reasons}
-
-
-def _distinct(system: System, variations: Variations) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
-    """The first of all systems that share a default state, and for each (N,) the index of the shared one."""
-    relevant = [i for i, path in enumerate(variations.paths) if system.affects_default_state(path)]
-    known: dict[bytes, int] = {}
-    table = np.ascontiguousarray(variations.values[:, relevant])
-    shared = np.array([known.setdefault(row.tobytes(), len(known)) for row in table], dtype=np.intp)
-    return np.unique(shared, return_index=True)[1], shared
-
-
-def _default_state(system: System, names: list[str]) -> Array | str:
-    try:
-        state = system.default_state() or {}
-    except PhysicsError as error:
-        return f"it has no equilibrium to start from: {error}"
-    return np.array([state[name] for name in names])
