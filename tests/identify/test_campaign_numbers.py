@@ -200,5 +200,7 @@ def test_candidate_records_have_supplies_by_absolute_pressure_and_a_pulse_to_hal
     found = [each.experiment.plant.circuit.supply.pressure + ambient for each in context.supplies()]
     assert found == pytest.approx([0.6 * (supply + ambient), 1.4 * (supply + ambient)])
     choked = conductance * 1e5 * (supply + ambient) / float(BRAID.volume(0.0))  # rise at the ambient temperature [Pa/s]
-    assert context._time_of_half_rise(supply) == pytest.approx(0.5 * supply / choked)
-    assert 0.02 < context._time_of_half_rise(supply) < 0.5
+    _, pulse, *_ = context.valve_records(plant.circuit)
+    (_, (closed, _)) = pulse.experiment.command.changes["fill"]
+    assert closed == pytest.approx(0.5 * supply / choked)
+    assert 0.02 < closed < 0.5

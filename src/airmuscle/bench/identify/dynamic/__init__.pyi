@@ -11,9 +11,8 @@ from .fit import describe_cross_predictions as describe_cross_predictions
 from .fit import fit_dynamic as fit_dynamic
 from .fit import fit_tube as fit_tube
 from .initial_conditions import InitialConditions as InitialConditions
-from .levenberg_marquardt import LevenbergMarquardt as LevenbergMarquardt
-from .levenberg_marquardt import bounded_step as bounded_step
-from .problem import DynamicProfile as DynamicProfile
+from .problem import LevenbergMarquardt as LevenbergMarquardt
+from .problem import bounded_step as bounded_step
 from .record_model import commands_at as commands_at
 from .record_ranking import RecordRanking as RecordRanking
 from .record_ranking import rank_records as rank_records
@@ -25,6 +24,7 @@ from .reliability import describe_optima as describe_optima
 from .reliability import distinct_optima as distinct_optima
 from .reliability import searches_at_lowest as searches_at_lowest
 from .result import DynamicFit as DynamicFit
+from .result import DynamicProfile as DynamicProfile
 from .result import SensorLocation as SensorLocation
 from .result import locate_pressure_sensor as locate_pressure_sensor
 

@@ -23,8 +23,6 @@ PULSE_SHARE = 0.5
 """Share of the pressure rise at which a valve is closed again (chosen)."""
 VALVE_PARAMETERS = ("conductance", "critical_ratio")
 """Parameters of a valve that its flow depends on, by the last part of their paths."""
-
-
 FILL = Schedule({"fill": ((0.0, 1.0),)})
 
 
@@ -33,23 +31,19 @@ class CandidateRecord:
     """A record that could be measured: what it is, its simulated experiment, and what it does not share with the fit.
 
     `changed` are parameters that are unknowns of its own: those whose values differ from the fit by an unknown amount,
-    such as the conductance of a throttled valve, and those that the records of the fit do not use.
+    such as the conductance of a throttled valve, and those that the records of the fit do not use. `replaced` is the
+    beginning of the paths of a part of the plant that this record replaces by a known one.
     """
 
     description: str
     experiment: Experiment
     changed: tuple[str, ...] = ()
     replaced: str = ""
-    """Beginning of the paths of a part of the plant that this record replaces by a known one."""
 
 
 def candidate_records(fit: DynamicFit) -> tuple[CandidateRecord, ...]:
-    """The records to compare for a fit of a plant with one muscle; the first is a repeat of its first record.
-
-    Fills from other supply pressures, a discharge, a fill whose valve is closed halfway, a fill through a throttle,
-    other held lengths, a longer record, and a fill of a rigid tank of known volume, as far as circuit and mechanism
-    allow. Each has as many rows as the first record.
-    """
+    """The records to compare for a fit of a plant with one muscle, as far as circuit and mechanism allow; the first is
+    a repeat of its first record, and each has as many rows as this one."""
     plant, model = fit.plant(0), fit.problem.record_models[0]
     assert isinstance(plant, Plant)
     begun = dataclasses.replace(model.experiment, plant=plant, start_time=0.0)
@@ -106,7 +100,10 @@ class _Context:
         flow = [each.path for each in tree.leaves(self.plant) if each.path.startswith("circuit.discharge.")]
         unknown = tuple(path for path in flow if path.endswith(VALVE_PARAMETERS) and path not in self.identified)
         yield CandidateRecord("a discharge from the supply pressure", discharge, unknown)
-        half = self._time_of_half_rise(high)
+        ambient, volume = float(self.plant.ambient.pressure), float(self.plant.muscles[0].geometry.volume(0.0))
+        conductance = circuit.fill.conductance if isinstance(circuit.fill, Valve) else 1e-8
+        rate = conductance * (high + ambient) * 1e5 / volume  # [Pa/s] at the reference pressure of ISO 8778
+        half = float(np.clip(PULSE_SHARE * high / rate, 0.02 * end, 0.5 * end))  # of a choked fill
         closed = Schedule({"fill": ((0.0, 1.0), (half, 0.0))})
         text = f"a fill whose valve is closed after {half:.2g} s, and the pressure until {end:.2g} s"
         yield CandidateRecord(text, self._of(self.plant, closed, 0.0))
@@ -126,15 +123,6 @@ class _Context:
         changed = coefficients.get(type(plant.gas), ())
         text = f"a fill of a rigid tank of known volume, about {1e6 * volume:.3g} cm3, through the same valve"
         yield CandidateRecord(text, self._of(plant, FILL, 0.0), changed, "muscle.")
-
-    def _time_of_half_rise(self, supply: float) -> float:
-        """Duration [s] of a choked fill to half of the supply pressure."""
-        circuit, ambient = self.plant.circuit, float(self.plant.ambient.pressure)
-        assert isinstance(circuit, FillDischarge)
-        volume = float(self.plant.muscles[0].geometry.volume(0.0))
-        conductance = circuit.fill.conductance if isinstance(circuit.fill, Valve) else 1e-8
-        rate = conductance * (supply + ambient) * 1e5 / volume  # [Pa/s] at the reference pressure of ISO 8778
-        return float(np.clip(PULSE_SHARE * supply / rate, 0.02 * self.times[-1], 0.5 * self.times[-1]))
 
     def _of(self, plant: Plant, command: Schedule | None = None, pressure: float | None = None) -> Experiment:
         conditions = self.experiment.initial_conditions

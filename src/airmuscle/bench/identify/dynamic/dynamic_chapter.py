@@ -12,8 +12,8 @@ from ....recording.columns import display_scale, displayed
 from ....report.chapter import BY_ROW, Chapter, Plot, Table, TableColumn
 from ...reported import unit_column
 from ..result import MAX_ROWS
-from . import CrossPrediction, DynamicFit, RegulatorFit, describe_cross_predictions
-from .problem import MIN_IMPROVEMENT, NORMAL_95, DynamicProfile
+from . import CrossPrediction, DynamicFit, DynamicProfile, RegulatorFit, describe_cross_predictions
+from .result import MIN_IMPROVEMENT, NORMAL_95
 
 MAX_OPTIMA = 8
 """Maximum number of optima in a table; the lowest are shown."""
@@ -27,10 +27,8 @@ def dynamic_chapters(
 
     `remarks` are sentences about the records, `cross` the predictions of each record by the others, which stand first.
     """
-    chapters = [_estimates(fit, title, remarks, cross)]
-    if profiles:
-        chapters.append(_profiles(profiles))
-    return [*chapters, *(_record(fit, i) for i in range(len(fit.problem.record_models)))]
+    first, records = _estimates(fit, title, remarks, cross), range(len(fit.problem.record_models))
+    return [first, *([_profiles(profiles)] if profiles else []), *(_record(fit, i) for i in records)]
 
 
 def regulator_chapters(result: RegulatorFit, title: str) -> list[Chapter]:
@@ -45,13 +43,21 @@ def _estimates(fit: DynamicFit, title: str, remarks: Sequence[str], cross: Seque
     estimates, residuals = chapter.tables
     if cross:  # the table of the cross-predictions contains the residuals, too
         residuals = dataclasses.replace(residuals, brief=0)
-    names = [e.name for e in fit.estimates]
+    names, undetermined = [e.name for e in fit.estimates], fit.identifiability.undetermined
     rows = {"unknown": names, **{name: fit.correlations[:, i] for i, name in enumerate(names)}}
     correlations = Table("correlations", "Correlations", rows, shown=False)
-    tables = (_cross_table(cross), estimates, _undetermined_table(fit), _optima_table(fit), residuals, correlations)
+    columns: dict[str, Any] = {
+        "combination (relative changes)": [
+            ", ".join(f"{name} {share:+.2g}" for name, share in each.shares) for each in undetermined
+        ],
+        "relative standard deviation": [each.relative_stderr for each in undetermined],
+        "experiment that determines it": [each.remedy for each in undetermined],
+    }
+    open_ends = Table("not-determined", "Parameter combinations that the records do not determine", columns)
+    tables = (_cross_table(cross), estimates, open_ends, _optima_table(fit), residuals, correlations)
     return dataclasses.replace(
         chapter, title=title, summary=(describe_cross_predictions(cross), *chapter.paragraphs),
-        tables=tuple(table for table in tables if table), plots=(), notes=(*chapter.notes, *remarks),
+        tables=tuple(filter(len, tables)), plots=(), notes=(*chapter.notes, *remarks),
         references=tuple(cite(fit.plant())),
     )  # fmt: skip
 
@@ -68,19 +74,6 @@ def _cross_table(cross: Sequence[CrossPrediction]) -> Table:
     }
     title = "Each record predicted by the parameters of the others"
     return Table("cross", title, columns, brief=MAX_ROWS, key="cross-predictions")
-
-
-def _undetermined_table(fit: DynamicFit) -> Table:
-    """Return a table of the combinations that the records do not determine, with the experiment that would."""
-    undetermined = fit.identifiability.undetermined
-    columns: dict[str, Any] = {
-        "combination (relative changes)": [
-            ", ".join(f"{name} {share:+.2g}" for name, share in each.shares) for each in undetermined
-        ],
-        "relative standard deviation": [each.relative_stderr for each in undetermined],
-        "experiment that determines it": [each.remedy for each in undetermined],
-    }
-    return Table("not-determined", "Parameter combinations that the records do not determine", columns)
 
 
 def _optima_table(fit: DynamicFit) -> Table:

@@ -32,37 +32,38 @@ class Experiment(ShortRepr):
         check_input_signal(self.command)
 
 
+class _Checked:
+    """Base of unknowns of one record, whose fields have the declared types."""
+
+    def __post_init__(self) -> None:
+        check_field_types(self)
+
+
 @dataclasses.dataclass(frozen=True)
-class StartTime:
+class StartTime(_Checked):
     """The start time of a run on the clock of its recording, as an unknown."""
 
     margin: float
     """Maximum deviation from the start time of the experiment [s]."""
-
-    def __post_init__(self) -> None:
-        check_field_types(self)
 
     def __str__(self) -> str:
         return "start time"
 
 
 @dataclasses.dataclass(frozen=True)
-class InitialValue:
+class InitialValue(_Checked):
     """A known value of the initial conditions, as an unknown: `InitialValue("pressure", 2e3)`."""
 
     name: str
     margin: float
     """Maximum deviation from the value of the experiment [SI]."""
 
-    def __post_init__(self) -> None:
-        check_field_types(self)
-
     def __str__(self) -> str:
         return f"initial {self.name}"
 
 
 @dataclasses.dataclass(frozen=True)
-class CommandInstants:
+class CommandInstants(_Checked):
     """The instants at which the command of a run changes after its first one, each of them as an unknown.
 
     They count from the start of the run, whose error is that of `StartTime`. The command must be a Schedule.
@@ -71,9 +72,6 @@ class CommandInstants:
     margin: float
     """Maximum deviation from an instant of the command of the experiment [s]."""
 
-    def __post_init__(self) -> None:
-        check_field_types(self)
-
 
 @dataclasses.dataclass(frozen=True)
 class CommandInstant:
@@ -81,9 +79,6 @@ class CommandInstant:
 
     instant: float
     margin: float
-
-    def __str__(self) -> str:
-        return "command instant"
 
 
 ParameterPaths = str | tuple[str, ...]
@@ -126,8 +121,7 @@ class Unknown:
 
     @property
     def origin(self) -> float:
-        """Value from which the unknown is counted in the search: of an instant that of the experiment, whatever the
-        zero of the clock; otherwise 0."""
+        """Value from which the unknown is counted in the search: of an instant that of the experiment, otherwise 0."""
         return self.value if isinstance(self.target, StartTime | CommandInstant) else 0.0
 
     @property
@@ -185,10 +179,8 @@ def _record_unknown(experiment: Experiment, target: StartTime | InitialValue, re
     if isinstance(target, StartTime):
         value, unit, symbol = experiment.start_time, "s", "t_0"
     else:
-        known = experiment.initial_conditions.known
-        check_known(
-            f"the initial conditions of record {record + 1} have no known value", target.name, known, "known are"
-        )
+        known, where = experiment.initial_conditions.known, f"the initial conditions of record {record + 1}"
+        check_known(f"{where} have no known value", target.name, known, "known are")
         value, symbol = known[target.name], f"{target.name}_0"
         unit = column_heading(target.name).partition("[")[2].rstrip("]") or "SI"
     name, margin = f"{target} of record {record + 1}", target.margin
@@ -266,11 +258,6 @@ def describe_other_ambient(plant: System, experiment: Experiment) -> list[str]:
         return []
     texts = [f"{each.pressure / 1e3:.4g} kPa and {each.temperature:.4g} K" for each in (other, own)]
     return [f"the ambient air is that of the record, {texts[0]}; the plant was identified at {texts[1]}"]
-
-
-def has_standard_ambient(plant: System) -> bool:
-    """Whether the ambient pressure of a plant is the standard one, which it has where none is stated."""
-    return bool(getattr(getattr(plant, "ambient", None), "pressure", None) == Ambient().pressure)
 
 
 def describe_ambient(recordings: Sequence[Recording]) -> list[str]:

@@ -10,20 +10,12 @@ import numpy as np
 from ....core import AirmuscleError, Array, IdentificationError, ParameterError, check_whole
 from ....engine import Integrator, Rodas4
 from ....engine.compile import System
-from ....physics import Plant, Tube, Valve, WithTubes
+from ....physics import Ambient, Plant, Tube, Valve, WithTubes
 from ....recording.columns import displayed
 from ..identifiability import analyse_identifiability
 from ..model_evidence import EQUIVALENT, aicc, lag_one_autocorrelation
 from ..result import Estimate
-from .experiment import (
-    Experiment,
-    ParameterPaths,
-    RecordUnknown,
-    check_ambient,
-    describe_ambient,
-    has_standard_ambient,
-    make_unknowns,
-)
+from .experiment import Experiment, ParameterPaths, RecordUnknown, check_ambient, describe_ambient, make_unknowns
 from .problem import MAX_RUNS, DynamicFitProblem
 from .record_model import RecordModel, count_readings, separate_residuals
 from .reliability import describe_bounds, describe_flatness, describe_optima, distinct_optima
@@ -178,12 +170,13 @@ def _build_result(problem: DynamicFitProblem, searches: Array, costs: Array) -> 
     )
     correlations = covariance / np.outer(standard_errors, standard_errors)
     optima = distinct_optima(problem.values(searches), costs, problem.scales, problem.margins)
+    airs = [(m.experiment.recording, getattr(m.plant, "ambient", None)) for m in problem.record_models]
     notes = [
         *(str(combination) for combination in analysis.undetermined),
         *describe_bounds(estimates, jacobian, inverse, on_bound, problem.scales, problem.origins),
         *describe_optima(optima, estimates, costs, problem.margins),
         *_describe_model_error(problem, residuals, estimates, inner.size),
-        *describe_ambient([m.experiment.recording for m in problem.record_models if has_standard_ambient(m.plant)]),
+        *describe_ambient([record for record, air in airs if air and air.pressure == Ambient().pressure]),
     ]
     return DynamicFit(problem, estimates, correlations, analysis, residual_std, costs, optima, tuple(notes))
 
@@ -226,11 +219,11 @@ class CrossPrediction:
         return max(self.rms[name] / max(self.fitted[name], 1e-300) for name in self.rms)
 
     def __str__(self) -> str:
-        parts = ", ".join(
+        parts = [
             f"{name} {displayed(name, error, 3)} (joint fit {displayed(name, self.fitted[name], 3)})"
             for name, error in self.rms.items()
-        )
-        return f"{self.record} predicted by the parameters of the other records: rms error {parts}."
+        ]
+        return f"{self.record} predicted by the parameters of the other records: rms error {', '.join(parts)}."
 
 
 def cross_predict(fit: DynamicFit, refit: Callable[[Sequence[int]], DynamicFit]) -> tuple[CrossPrediction, ...]:
@@ -249,10 +242,8 @@ def cross_predict(fit: DynamicFit, refit: Callable[[Sequence[int]], DynamicFit])
             part = refit([k for k in range(count) if k != i])
         except AirmuscleError:
             continue
-        model, common = (
-            fit.problem.record_models[i],
-            {e.name: e.value for e in part.estimates if OF_RECORD not in e.name},
-        )
+        model = fit.problem.record_models[i]
+        common = {e.name: e.value for e in part.estimates if OF_RECORD not in e.name}
         estimates = tuple(dataclasses.replace(e, value=common.get(e.name, e.value)) for e in fit.estimates)
         other = dataclasses.replace(fit, estimates=estimates)
         rms, fitted = ({name: each.rms(name, i) for name in model.names} for each in (other, fit))

@@ -78,12 +78,8 @@ class InitialConditions:
 def _steady_conditions(
     plant: Plant, state: Mapping[str, float], pressures: Sequence[float], at_rest: bool
 ) -> InitialConditions:
-    """The conditions at the gauge pressures [Pa] of the muscles: these, and one for each state but the air masses.
-
-    A state that depends on no pressure of a muscle is settled if it is that of a circuit, such as the air of a tank,
-    else known. Of the others, a tube has the pressure of its muscle, and the remaining ones are stationary; so are the
-    speeds of a mechanism at rest, in place of its known coordinates.
-    """
+    """The gauge pressures [Pa] of the muscles, and one condition for each state but the air masses: settled or known if
+    no pressure changes it, equal pressure of a tube, else stationary, as the speeds of a mechanism at rest are."""
     motion = {c.name: state[c.name] for c in plant.mechanism.coordinates}
     motion |= {c.speed: state[c.speed] for c in plant.mechanism.coordinates}
     increased = [[p + PRESSURE_STEP * (i == k) for i, p in enumerate(pressures)] for k in range(len(pressures))]
@@ -146,11 +142,8 @@ def compile_conditions(system: System, initial: InitialConditions) -> Function:
 def solve_initial_state(
     function: Function, initial: InitialConditions, leaves: Array, known: Array, guess: Array, nominal: Array
 ) -> tuple[Array, Array, Array]:
-    """The initial state (n,) and its derivatives by the known values (n, k) and by the leaves (n, p).
-
-    `function` is that of `compile_conditions`, `nominal` (n,) holds the magnitudes of the states. The derivatives
-    follow from the implicit function theorem. Raises IdentificationError where no state satisfies the conditions.
-    """
+    """The initial state (n,) by `compile_conditions` for states of `nominal` size, and its derivatives by the known
+    values (n, k) and the leaves (n, p) (implicit function theorem). Raises IdentificationError if there is none."""
     n, x = guess.size, guess.copy()
     target = np.concatenate([known, np.zeros(n - known.size)])
     values, by_state, by_leaf = np.empty(n), np.empty((n, n)), np.empty((n, leaves.size))
@@ -174,8 +167,7 @@ MIN_DURATION = 1e-9
 
 
 class CommandInterval(NamedTuple):
-    """The segments of a command from `begin` [s] on, the rows within them (K,), and the sensitivity column of the
-    instant at which the interval begins; None for the first."""
+    """Segments of a command from `begin` [s] on, rows within them (K,), and column of their first instant or None."""
 
     begin: float
     segments: PiecewiseLinear
@@ -184,11 +176,11 @@ class CommandInterval(NamedTuple):
 
 
 class TimeGrid(NamedTuple):
-    """The rows of a record relative to the start of the run, shape (N,), with the inputs there (N, m)."""
+    """The rows of a record relative to the start of the run, shape (N,), with the inputs there (N, m); `instants` are
+    those of the command that are unknowns [s], by those of the command of the experiment."""
 
     start_time: float
     instants: Mapping[float, float]
-    """The instants of the command that are unknowns [s], by those of the command of the experiment."""
     times: Array
     before_start: npt.NDArray[np.bool_]
     inputs: Array
@@ -199,10 +191,8 @@ def make_time_grid(
     times: Array, start_time: float, command: InputSignal, inputs: tuple[str, ...], instants: Mapping[float, float],
     columns: Mapping[float, int],
 ) -> TimeGrid:  # fmt: skip
-    """The grid of rows at `times` (N,) on the clock of the record, for a command with estimated instants.
-
-    `instants` has the estimate of each instant of the experiment's command that is an unknown, `columns` its column.
-    """
+    """The grid of rows at `times` (N,) on the clock of the record; `instants` has the estimate of each instant of the
+    experiment's command that is an unknown, `columns` its sensitivity column."""
     elapsed = times - start_time
     rows = np.maximum(elapsed, 0.0)
     segments = command.segments(inputs, 0.0, max(float(elapsed[-1]), MIN_DURATION))

@@ -1,16 +1,142 @@
-"""DynamicFitProblem: residuals of all records as a function of the unknowns, their minimisation, and their profile."""
+"""Least squares of the residuals of all records: Levenberg-Marquardt method with bounds, and the problem it solves.
+
+    (N + lambda D^2) s = -g,   N = J^T J, g = J^T r,   D the maximum norms of the columns of J so far
+
+An unknown on its bound, with a gradient that points beyond it, is fixed for that step. An unknown that the step would
+move beyond a bound is set to that bound, and the step of the others is computed again. The same holds for the maximum
+change of an unknown in one step: an unknown with little effect so far, and thus a large step, does not shorten the
+steps of the others. The damping follows the ratio of the actual to the predicted reduction.
+
+Reference: Moré, J. J., The Levenberg-Marquardt algorithm: implementation and theory, Lecture Notes in Mathematics 630,
+Springer 1978 (scaling by D); Nielsen, H. B., Damping parameter in Marquardt's method, IMM-REP-1999-05, DTU 1999.
+"""
 
 import dataclasses
 import functools
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from typing import Self
 
 import numpy as np
 
 from ....core import AirmuscleError, Array
-from ..result import Estimate
 from .experiment import Unknown
-from .levenberg_marquardt import LevenbergMarquardt
 from .record_model import MAX_STEPS, RecordModel
+
+Residuals = Callable[[Array], tuple[Array, Array] | None]
+"""Residuals (R,) and Jacobian (R, P) at unknowns (P,); None where they cannot be computed."""
+INITIAL_DAMPING, MIN_DAMPING, MAX_DAMPING = 1e-3, 1e-12, 1e30
+RELATIVE_STEP_LIMIT, MIN_STEP_LIMIT = 0.7, 0.25
+"""Maximum change of an unknown in one step: this fraction of its value, or of its scale or bounds if that is larger.
+Chosen: far from the optimum a long step leads to plants that cannot be simulated, or only with tiny time steps."""
+TOLERANCE = 1e-10
+"""Predicted relative reduction below which the search ends, and relative step likewise."""
+COST_NOISE = 1e-5
+"""Relative jump of the sum of squares that is caused by the step-size control of the simulation; chosen. A step with a
+predicted reduction below a tenth of it is accepted if the sum of squares increases by no more than it: the Jacobian
+still gives the direction, the sum no longer does. Such a step ends the search unless its predicted reduction is less
+than half of the last one."""
+
+
+def _normal_equations(evaluated: tuple[Array, Array] | None, count: int) -> tuple[float, Array, Array]:
+    """Sum of squares, normal matrix (P, P) and half the gradient (P,); an infinite sum where residuals or Jacobian are
+    missing, not finite, or overflow when squared."""
+    if evaluated is not None:
+        r, j = evaluated
+        with np.errstate(over="ignore", invalid="ignore"):
+            cost, normal, gradient = float(r @ r), j.T @ j, j.T @ r
+        if cost < np.inf and np.isfinite(normal).all():
+            return cost, normal, gradient
+    return np.inf, np.zeros((count, count)), np.zeros(count)
+
+
+class LevenbergMarquardt:
+    """A search from one initial guess, which can be interrupted and continued: unknowns `x` (P,), sum of squares there,
+    `cost`, and whether it is `finished`.
+
+    The sum of squares is infinite where the residuals cannot be computed at the initial guess.
+    """
+
+    def __init__(self, residuals: Residuals, start: Array, low: Array, high: Array) -> None:
+        self._residuals, self._low, self._high = residuals, low, high
+        self._scale, self._damping, self._growth = np.zeros(start.size), INITIAL_DAMPING, 2.0
+        self._rejected_step, self._predicted, self._evaluations = np.full(start.size, np.nan), np.inf, 1
+        x = np.clip(start, low, high)
+        self._accept(x, _normal_equations(residuals(x), x.size))
+        self.finished = not self.cost < np.inf
+
+    def run(self, max_evaluations: int) -> Self:
+        """Search until convergence, or until the residuals were evaluated `max_evaluations` times in total."""
+        while not self.finished and self._evaluations < max_evaluations:
+            self._step()
+        return self
+
+    def _accept(self, x: Array, equations: tuple[float, Array, Array]) -> None:
+        self.x, (self.cost, self._normal, self._gradient) = x, equations
+        self._scale = np.maximum(self._scale, np.sqrt(self._normal.diagonal()))
+
+    def _step(self) -> None:
+        """Propose steps until one is no repetition, evaluate it, and accept or reject it."""
+        step, predicted = self._propose_step()
+        while not (converged := self._is_converged(step, predicted)) and (
+            not predicted > 0 or (step == self._rejected_step).all()
+        ):
+            self._reject(step)
+            step, predicted = self._propose_step()
+        if converged:
+            self.finished = True
+            return
+        tried, self._evaluations = _normal_equations(self._residuals(self.x + step), step.size), self._evaluations + 1
+        cost, small = tried[0], predicted <= COST_NOISE / 10 * self.cost and self._damping < 1
+        within_noise = small and cost <= (1 + COST_NOISE) * self.cost
+        if within_noise and cost >= self.cost and predicted > self._predicted / 2:
+            self.finished = True
+        elif within_noise or cost < self.cost:
+            ratio = (self.cost - cost) / predicted if cost < self.cost else 1.0
+            self._accept(self.x + step, tried)
+            self._damping = max(self._damping * max(1 / 3, 1 - (2 * ratio - 1) ** 3), MIN_DAMPING)
+            self._growth, self._predicted = 2.0, predicted
+        else:
+            self._reject(step)
+
+    def _reject(self, step: Array) -> None:
+        """Increase the damping, and remember the rejected step."""
+        self._damping, self._growth, self._rejected_step = self._damping * self._growth, 2 * self._growth, step
+
+    def _propose_step(self) -> tuple[Array, float]:
+        """A step, and the predicted reduction of the sum of squares."""
+        x, scale = self.x, self._scale
+        limit = np.maximum(RELATIVE_STEP_LIMIT * np.abs(x), MIN_STEP_LIMIT * np.minimum(self._high - self._low, 1.0))
+        low, high = np.maximum(self._low, x - limit), np.minimum(self._high, x + limit)
+        damping = self._damping * np.where(scale > 0, scale, 1.0) ** 2
+        step = bounded_step(self._normal, self._gradient, damping, x, low, high)
+        return step, -float(step @ (2 * self._gradient + self._normal @ step))
+
+    def _is_converged(self, step: Array, predicted: float) -> bool:
+        """Whether the step or its predicted reduction is negligible, or the damping exceeds its maximum."""
+        if (0 <= predicted <= TOLERANCE * self.cost and self._damping < 1) or not self._damping < MAX_DAMPING:
+            return True
+        scaled_step, scaled_x = self._scale * step, self._scale * self.x
+        return bool(scaled_step @ scaled_step <= TOLERANCE**2 * (scaled_x @ scaled_x))
+
+
+def bounded_step(normal: Array, gradient: Array, damping: Array, x: Array, low: Array, high: Array) -> Array:
+    """The damped step (P,) from x; unknowns that it would move beyond a bound are set to it, the others recomputed."""
+    free = ~(((x <= low) & (gradient > 0)) | ((x >= high) & (gradient < 0)))
+    step, matrix = np.zeros(x.size), normal + np.diag(damping)
+    while free.any():
+        if free.all():
+            step[:] = np.linalg.solve(matrix, -gradient)
+        else:
+            right, indices = gradient + normal @ np.where(free, 0.0, step), np.flatnonzero(free)
+            step[indices] = np.linalg.solve(matrix[indices[:, None], indices], -right[indices])
+        target = x + step
+        beyond = free & ((target < low) | (target > high))
+        if not beyond.any():
+            break
+        step[beyond] = (np.clip(target, low, high) - x)[beyond]
+        free &= ~beyond
+    return step
+
 
 MAX_RUNS = 200
 """Maximum number of simulations of all records in one search."""
@@ -65,9 +191,7 @@ class DynamicFitProblem:
 
     def run(self, scaled: Array, max_steps: int = MAX_STEPS) -> tuple[Array, Array, int]:
         """Residuals and Jacobian as in `residuals`, missing values omitted, and the steps of the longest simulation.
-
-        Raises SimulationError or IdentificationError where a simulation fails or exceeds `max_steps`.
-        """
+        Raises SimulationError or IdentificationError where one fails or exceeds `max_steps`."""
         residuals, jacobians, longest = [], [], 0
         values, factors = self.values(scaled), self.scales / self.sensor_deviations[:, None]
         for model in self.record_models:
@@ -82,11 +206,8 @@ class DynamicFitProblem:
         return np.concatenate(residuals), np.concatenate(jacobians), longest
 
     def solve(self, scaled: Array, fixed: Sequence[int] = ()) -> tuple[Array, float]:
-        """Least squares from an initial guess (P,) with some unknowns fixed, given by index.
-
-        Returns the scaled unknowns and the sum of squares, which is infinite where the initial guess cannot be
-        simulated.
-        """
+        """Least squares from an initial guess (P,) with some unknowns fixed, given by index: the scaled unknowns, and
+        the sum of squares, which is infinite where the guess cannot be simulated."""
         free, solution = [k for k in range(scaled.size) if k not in fixed], scaled.copy()
         search = self.search(scaled, free).run(MAX_RUNS)
         solution[free] = search.x
@@ -114,83 +235,3 @@ class DynamicFitProblem:
 
         low, high = self.bounds
         return LevenbergMarquardt(guarded, scaled[free], low[free], high[free])
-
-
-NORMAL_95 = 1.96
-"""Square root of the cost increase, in residual variances, at the limits of a 95 % confidence interval."""
-MAX_STANDARD_ERRORS = 4.0
-"""Range of a profile in standard errors to either side, at most twice the estimate of a parameter."""
-MIN_IMPROVEMENT = 0.1
-"""Reduction of the sum of squares, in residual variances, that shows that the fit was not converged; chosen."""
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class DynamicProfile:
-    """Values of one estimate in increasing order, and the increase of the sum of squares in residual variances."""
-
-    name: str
-    unit: str
-    values: Array
-    cost_increase: Array
-    estimates: Array
-    """All estimates at every value [SI], shape (M, P)."""
-
-    @property
-    def interval(self) -> tuple[float, float]:
-        """Limits of the 95 % interval, where the cost increase is 1.96 squared; NaN where it stays below, or where
-        the plant cannot be simulated before it is reached."""
-        best = int(np.argmin(self.cost_increase))
-        distance = np.sqrt(np.maximum(self.cost_increase - self.cost_increase[best], 0.0))
-        below = self._find_crossing(self.values[: best + 1][::-1], distance[: best + 1][::-1])
-        return below, self._find_crossing(self.values[best:], distance[best:])
-
-    @staticmethod
-    def _find_crossing(values: Array, distance: Array) -> float:
-        above = np.flatnonzero(distance > NORMAL_95)
-        if not above.size or not np.isfinite(distance[above[0]]):
-            return float("nan")
-        i = int(above[0])
-        fraction = (NORMAL_95 - distance[i - 1]) / (distance[i] - distance[i - 1])
-        return float(values[i - 1] + fraction * (values[i] - values[i - 1]))
-
-    def __str__(self) -> str:
-        low, high = (f"{end:.4g}" if np.isfinite(end) else "unbounded" for end in self.interval)
-        rows = [f"\n  {v:.4g}: {c:.3g}" for v, c in zip(self.values, self.cost_increase, strict=True)]
-        if self.cost_increase.min() < -MIN_IMPROVEMENT:
-            rows.append("\n  a better fit was found on the profile: fit again from there")
-        unit = "" if self.unit == "1" else f" [{self.unit}]"
-        text = "increase of the sum of squares in residual variances"
-        return f"{self.name}{unit}, 95 % confidence interval {low} to {high}; {text}:{''.join(rows)}"
-
-
-def compute_profile(
-    problem: DynamicFitProblem, estimates: Sequence[Estimate], index: int, cost: float, variance: float, points: int
-) -> DynamicProfile:
-    """The profile of one estimate at `points` values to either side, from the optimum outwards.
-
-    estimates  of the fit, whose sum of squares is `cost` and whose residual variance is `variance`
-    index      of the profiled estimate
-    """
-    best = problem.scaled(np.array([e.value for e in estimates]))
-    low, high = (bound[index] for bound in problem.bounds)
-    stderr = estimates[index].stderr / problem.scales[index]
-    span = high - low
-    if problem.unknowns[index].paths:  # the zero of a clock or of an initial value gives no range
-        span = min(span, 2.0 * abs(best[index]) or 1.0)
-    distance = min(MAX_STANDARD_ERRORS * stderr, span) if np.isfinite(stderr) else span
-    rows = [(best[index], cost, best)]
-    for side in (-1.0, 1.0):
-        scaled = best.copy()
-        for step in range(1, points + 1):
-            value = best[index] + side * distance * step / points
-            if not low <= value <= high:
-                break
-            scaled = scaled.copy()
-            scaled[index] = value
-            scaled, constrained_cost = problem.solve(scaled, fixed=(index,))
-            rows.append((value, constrained_cost, scaled))
-    rows.sort(key=lambda row: row[0])
-    cost_increase = np.array([(constrained_cost - cost) / variance for _, constrained_cost, _ in rows])
-    values = problem.origins[index] + np.array([value for value, _, _ in rows]) * problem.scales[index]
-    all_estimates = problem.values(np.array([scaled for _, _, scaled in rows]))
-    return DynamicProfile(estimates[index].name, estimates[index].unit, values, cost_increase, all_estimates)

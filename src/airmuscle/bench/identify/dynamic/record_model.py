@@ -107,10 +107,7 @@ class RecordModel:
         return {target.instant: float(values[self.sensitivity_indices[j]]) for j, target in self._instant_columns}
 
     def evaluate(self, values: Array, max_steps: int = MAX_STEPS) -> "ModelOutputs":
-        """The modelled outputs at the rows of the record for unknowns at `values` (P,) [SI].
-
-        Raises IdentificationError where the simulation fails or no initial state exists.
-        """
+        """The modelled outputs at the rows for unknowns at `values` (P,) [SI]. Raises IdentificationError."""
         outputs, before_start, steps = self._outputs(values, max_steps)
         count, columns = len(self.names), self._system.sizes.outputs // len(self.names) - 2
         by_column = outputs[:, count:-count].reshape(-1, count, columns)
@@ -144,10 +141,8 @@ class RecordModel:
     def _integrate(
         self, bound: BoundIntegrator, system: CompiledSystem, state: Array, grid: TimeGrid, max_steps: int
     ) -> tuple[Array, int]:
-        """The states with their sensitivities at the rows, and the steps, interval by interval.
-
-        The sensitivity to an instant of the command begins there with the difference of the rates before and after it.
-        """
+        """The states with their sensitivities at the rows, and the steps; the sensitivity to an instant of the command
+        begins there with the difference of the rates before and after it."""
         rows, steps, held = list[Array](), 0, grid.intervals[0].segments.values[0]
         for interval in grid.intervals:
             if interval.column is not None:

@@ -29,15 +29,11 @@ MIN_GAIN = 1.5
 
 
 class PairPrecision(NamedTuple):
-    """Relative standard errors of two parameters and their correlation."""
+    """Relative standard errors of two parameters, the `worst` of them, and their correlation."""
 
     standard_errors: tuple[float, float]
+    worst: float
     correlation: float
-
-    @property
-    def worst(self) -> float:
-        """The greater of the two relative standard errors."""
-        return max(self.standard_errors)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -126,11 +122,8 @@ def rank_records(fit: DynamicFit, pair: tuple[str, str] | None = None) -> Record
 
 
 def _fit_information(fit: DynamicFit, common: Sequence[int]) -> Array:
-    """The Fisher information of the relative common unknowns from the records of the fit, with the prior.
-
-    A parameter is relative to its estimate, or to its scale if that is zero; a start time or an initial value, whose
-    zero is arbitrary, to its margin.
-    """
+    """The Fisher information of the common unknowns from the records of the fit, with the prior; relative to their
+    estimates, or scales if these are zero, and for start times and initial values, whose zero is arbitrary, margins."""
     _, jacobian = fit.problem.residuals(fit.problem.scaled(fit.values))
     pairs = zip(fit.estimates, fit.unknowns, strict=True)
     magnitudes = [(abs(estimate.value) if unknown.paths else 0.0) or unknown.scale for estimate, unknown in pairs]
@@ -141,8 +134,7 @@ def _fit_information(fit: DynamicFit, common: Sequence[int]) -> Array:
 
 
 def _without(matrix: Array, nuisance: Array, prior: Array | float = PRIOR) -> Array:
-    """The information of the columns of a matrix, with the columns of nuisance unknowns estimated as well; `prior` are
-    their standard deviations in the unit of the columns."""
+    """The information of the columns of a matrix, with nuisance unknowns of prior deviations estimated as well."""
     own, cross = matrix.T @ matrix, matrix.T @ nuisance
     if not nuisance.shape[1]:
         return np.asarray(own)
@@ -191,10 +183,9 @@ def _candidate_sensitivities(fit: DynamicFit, candidate: CandidateRecord, unknow
 
 
 def _precision(information: Array, names: Sequence[str], pair: tuple[str, str]) -> PairPrecision:
-    covariance = np.linalg.inv(information)
-    i, k = (names.index(name) for name in pair)
-    first, second = np.sqrt(covariance[i, i]), np.sqrt(covariance[k, k])
-    return PairPrecision((float(first), float(second)), float(covariance[i, k] / (first * second)))
+    covariance, (i, k) = np.linalg.inv(information), [names.index(name) for name in pair]
+    first, second = float(np.sqrt(covariance[i, i])), float(np.sqrt(covariance[k, k]))
+    return PairPrecision((first, second), max(first, second), float(covariance[i, k] / (first * second)))
 
 
 def _most_correlated(information: Array, names: Sequence[str]) -> tuple[str, str]:

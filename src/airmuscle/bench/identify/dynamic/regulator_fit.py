@@ -2,7 +2,8 @@
 
 import contextlib
 import dataclasses
-from collections.abc import Sequence
+import functools
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -59,12 +60,6 @@ class RegulatorFit(Reported):
     remarks: tuple[str, ...]
 
     @property
-    def zeros_from_residuals(self) -> tuple[float, ...]:
-        """The zeros corrected by the mean residuals, because a regulator may rest anywhere within its sensitivity."""
-        means = [float(np.mean(self.fit.residuals(i)["pressure"])) for i in range(len(self.zeros))]
-        return tuple(zero - mean for zero, mean in zip(self.zeros, means, strict=True))
-
-    @property
     def plant(self) -> Plant:
         """The vessel behind the regulator with the estimated parameters."""
         plant = self.fit.plant()
@@ -87,6 +82,9 @@ class RegulatorFit(Reported):
         table = Table("zeros", title, {"record": names, "zero": zeros}, brief=len(names))
         notes = (*(f"too little excited: {remark}" for remark in self.remarks), *chapter.notes)
         return dataclasses.replace(chapter, title="Pressure regulator", tables=(*chapter.tables, table), notes=notes)
+
+
+Fitted = Callable[[Plant, tuple[float, ...]], RegulatorFit]
 
 
 def fit_regulator(
@@ -118,12 +116,13 @@ def fit_regulator(
     zeros = tuple(_settled_difference(each) for each in recordings)
     circuit = initial or _initial_regulator(recordings, supply_pressure, volume)
     plant = Plant(Muscle.ideal(Vessel(volume)), circuit, Isometric(0.0), Isothermal())
-    search = _Search(recordings, tuple(f"circuit.{name}" for name in free), noise)
+    paths = tuple(f"circuit.{name}" for name in free)
+    fitted: Fitted = functools.partial(_fit, recordings, paths, noise)
     rng, found = np.random.default_rng(seed), []
     for start in range(starts):
         deviations = rng.normal(0.0, FIRST_SPREAD * (start > 0), len(free))
         with contextlib.suppress(IdentificationError):  # a guess that cannot be simulated
-            found.append(search.refined(search.fit(_perturbed(plant, search.paths, deviations), zeros), rng))
+            found.append(_refined(fitted(_perturbed(plant, paths, deviations), zeros), paths, fitted, rng))
             if found[-1].fit.residual_std < AT_NOISE:
                 break
     if not found:
@@ -131,37 +130,34 @@ def fit_regulator(
     return min(found, key=lambda each: each.fit.costs[0])
 
 
-@dataclasses.dataclass(frozen=True)
-class _Search:
-    """What all fits of a search have in common."""
+def _fit(
+    recordings: Sequence[Recording], paths: tuple[str, ...], noise: float, plant: Plant, zeros: tuple[float, ...]
+) -> RegulatorFit:
+    records = [_experiment(plant, each, zero) for each, zero in zip(recordings, zeros, strict=True)]
+    limits = {path: LIMITS[name] for path in paths if (name := path.removeprefix("circuit.")) in LIMITS}
+    fit = fit_dynamic(plant, records, free=paths, observed={"pressure": noise}, bounds=limits)
+    weak = [name for each in fit.identifiability.undetermined for name, _ in each.shares]
+    weak += [estimate.name for estimate in fit.estimates if estimate.on_bound]
+    commands = {name: COMMANDS[name.removeprefix("circuit.")] for name in weak}
+    remarks = tuple(f"{name} is not determined; give {command}" for name, command in commands.items())
+    return RegulatorFit(fit, zeros, remarks)
 
-    recordings: Sequence[Recording]
-    paths: tuple[str, ...]
-    noise: float
 
-    def fit(self, plant: Plant, zeros: tuple[float, ...]) -> RegulatorFit:
-        """The fit that starts from a plant."""
-        records = [_experiment(plant, each, zero) for each, zero in zip(self.recordings, zeros, strict=True)]
-        limits = {path: LIMITS[name] for path in self.paths if (name := path.removeprefix("circuit.")) in LIMITS}
-        fit = fit_dynamic(plant, records, free=self.paths, observed={"pressure": self.noise}, bounds=limits)
-        weak = [name for each in fit.identifiability.undetermined for name, _ in each.shares]
-        weak += [estimate.name for estimate in fit.estimates if estimate.on_bound]
-        commands = {name: COMMANDS[name.removeprefix("circuit.")] for name in weak}
-        remarks = tuple(f"{name} is not determined; give {command}" for name, command in commands.items())
-        return RegulatorFit(fit, zeros, remarks)
-
-    def refined(self, best: RegulatorFit, rng: np.random.Generator) -> RegulatorFit:
-        """The best of repetitions, the first of which only corrects the zeros of the sensors."""
-        failed, deviations = 0, np.zeros(len(self.paths))
-        while failed < PATIENCE:
-            attempt, failed = best, failed + 1
-            with contextlib.suppress(IdentificationError):
-                attempt = self.fit(_perturbed(best.plant, self.paths, deviations), best.zeros_from_residuals)
-            if attempt.fit.costs[0] < best.fit.costs[0]:
-                failed = 0 if attempt.fit.costs[0] < GAINED * best.fit.costs[0] else failed
-                best = attempt
-            deviations = rng.normal(0.0, SPREAD, len(self.paths))
-        return best
+def _refined(best: RegulatorFit, paths: tuple[str, ...], fitted: Fitted, rng: np.random.Generator) -> RegulatorFit:
+    """The best of repetitions, the first of which only corrects the zeros of the sensors by the mean residuals, because
+    a regulator may rest anywhere within its sensitivity."""
+    failed, deviations = 0, np.zeros(len(paths))
+    while failed < PATIENCE:
+        attempt, failed = best, failed + 1
+        means = [float(np.mean(best.fit.residuals(i)["pressure"])) for i in range(len(best.zeros))]
+        zeros = tuple(zero - mean for zero, mean in zip(best.zeros, means, strict=True))
+        with contextlib.suppress(IdentificationError):
+            attempt = fitted(_perturbed(best.plant, paths, deviations), zeros)
+        if attempt.fit.costs[0] < best.fit.costs[0]:
+            failed = 0 if attempt.fit.costs[0] < GAINED * best.fit.costs[0] else failed
+            best = attempt
+        deviations = rng.normal(0.0, SPREAD, len(paths))
+    return best
 
 
 def _perturbed(plant: Plant, paths: Sequence[str], deviations: Array) -> Plant:

@@ -30,20 +30,19 @@ MIN_RECORDS, MAX_SCATTER = 3, 2.0
 (chosen): with three records, the scatter is that far above a true standard error in about 2 % of cases."""
 MIN_SEARCHES, MAX_NAMES = 3, 3
 """Number of searches from which a single one at the optimum is named; number of unknowns in a sentence (chosen)."""
-CONSEQUENCES: tuple[tuple[tuple[str, ...], str], ...] = (
-    (("critical_ratio",),
-     "The flow law does not describe the records near equal pressures, or they do not reach that range; the "
-     "conductance takes up the difference, and the predicted time to the final pressure is biased. Record the fill "
-     "until the pressure is steady, or fix the ratio at the value of the data sheet."),
-    (("volume", "rest_volume", "growth_volume"),
-     "Only the ratio of conductance to volume is determined, so the conductance has the relative error of this bound "
-     "and must not be used with another volume. Measure the volume separately, for example by the water that fills "
-     "it."),
-)  # fmt: skip
+CONSEQUENCES = {
+    "critical_ratio": "The flow law does not describe the records near equal pressures, or they do not reach that "
+    "range; the conductance takes up the difference, and the predicted time to the final pressure is biased. Record "
+    "the fill until the pressure is steady, or fix the ratio at the value of the data sheet."
+} | dict.fromkeys(
+    ("volume", "rest_volume", "growth_volume"),
+    "Only the ratio of conductance to volume is determined, so the conductance has the relative error of this bound "
+    "and must not be used with another volume. Measure the volume separately, for example by the water that fills it.",
+)
 """Consequence of an unknown on its bound, by the last part of its path."""
 RECORD_CONSEQUENCE = "The true value may lie beyond it: give a wider margin, or state the value in the record."
 """Consequence of a start time or an initial value on its bound."""
-_OTHER_CONSEQUENCE = "Extend the bound if it is not physical, or fix the parameter at a measured value."
+OTHER_CONSEQUENCE = "Extend the bound if it is not physical, or fix the parameter at a measured value."
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -89,12 +88,17 @@ def describe_optima(
     """
     best, notes = optima[0], list[str]()
     for other in optima[1:]:
-        increase = float(np.sqrt(other.cost / max(best.cost, 1e-300))) - 1.0
-        differences = _differences(other, estimates, _magnitudes(estimates, margins))
+        increase, differences = float(np.sqrt(other.cost / max(best.cost, 1e-300))) - 1.0, []
+        for e, value, magnitude in zip(estimates, other.values, _magnitudes(estimates, margins), strict=True):
+            change = abs(value - e.value)
+            contained = MIN_STANDARD_ERRORS * e.stderr if np.isfinite(e.stderr) else 0.0
+            if change > contained and change / magnitude > SAME_VALUE:
+                text = f"{e.name} {value:.3g} instead of {e.value:.3g} {e.display_unit}".rstrip()
+                differences.append((change / magnitude, text))
         if increase <= SIMILAR_RMS and differences:
             notes.append(
                 f"the problem has several optima: {counted(other.searches, 'search')} of {costs.size} ended where the "
-                f"rms residual is only {100 * increase:.1f} % greater, with {', '.join(differences)}; the standard "
+                f"rms residual is only {100 * increase:.1f} % greater, with {_greatest(differences)}; the standard "
                 "errors describe one optimum and do not contain this difference"
             )
             break
@@ -112,21 +116,9 @@ def _magnitudes(estimates: Sequence[Estimate], margins: Array) -> Array:
     return np.where(np.isnan(margins), values, margins)
 
 
-def _differences(other: Optimum, estimates: Sequence[Estimate], magnitudes: Array) -> list[str]:
-    """The unknowns that differ by more than their standard errors contain, the largest relative difference first."""
-    differences = []
-    for e, value, magnitude in zip(estimates, other.values, magnitudes, strict=True):
-        change = abs(value - e.value)
-        contained = MIN_STANDARD_ERRORS * e.stderr if np.isfinite(e.stderr) else 0.0
-        if change > contained and change / magnitude > SAME_VALUE:
-            text = f"{e.name} {value:.3g} instead of {e.value:.3g} {e.display_unit}".rstrip()
-            differences.append((change / magnitude, text))
-    return _greatest(differences)
-
-
-def _greatest(changes: list[tuple[float, str]]) -> list[str]:
+def _greatest(changes: list[tuple[float, str]]) -> str:
     """The texts of the greatest changes, the greatest first."""
-    return [text for _, text in sorted(changes, reverse=True)[:MAX_NAMES]]
+    return ", ".join(text for _, text in sorted(changes, reverse=True)[:MAX_NAMES])
 
 
 def describe_flatness(estimates: Sequence[Estimate], degrees_of_freedom: int, margins: Array) -> list[str]:
@@ -143,8 +135,8 @@ def describe_flatness(estimates: Sequence[Estimate], degrees_of_freedom: int, ma
             ends = f"{e.value - change:.3g} to {e.value + change:.3g} {e.display_unit}".rstrip()
             wide.append((change / size, f"{e.name} {ends}"))
     text = (
-        f"an rms residual that is {100 * SMALL_RMS:.0f} % greater allows {', '.join(_greatest(wide))}; with model "
-        "error, other bounds or another start can give any value in such a range, whatever the standard error"
+        f"an rms residual that is {100 * SMALL_RMS:.0f} % greater allows {_greatest(wide)}; with model error, "
+        "other bounds or another start can give any value in such a range, whatever the standard error"
     )
     return [text] if wide else []
 
@@ -165,46 +157,30 @@ def describe_bounds(
     for k in map(int, np.flatnonzero(on_bound)):
         bound = estimates[k]
         shifts = -inverse @ (jacobian[:, inner].T @ jacobian[:, k]) * scales[inner] / scales[k]
-        change = BOUND_SHIFT * (abs(bound.value - origins[k]) or scales[k])
-        moved = _moved([estimates[int(i)] for i in inner], shifts * change)
+        change, moved = BOUND_SHIFT * (abs(bound.value - origins[k]) or scales[k]), []
+        for e, shift in zip([estimates[int(i)] for i in inner], shifts * change, strict=True):
+            if np.isfinite(shift) and abs(shift) > e.stderr:  # false for one without a standard error
+                by = f"{e.name} by {shift:+.2g} {e.display_unit}".rstrip()
+                text = f"{by} ({abs(shift) / e.stderr:.2g} standard errors)"
+                moved.append((abs(shift) / max(abs(e.value), 1e-300), text))
         greater = f"{change:.2g} {bound.display_unit}" if origins[k] else f"{100 * BOUND_SHIFT:.0f} %"
-        effect = f" If the bound were {greater} greater, it would move {', '.join(moved)}." if moved else ""
+        effect = f" If the bound were {greater} greater, it would move {_greatest(moved)}." if moved else ""
         value = f"{bound.value:.4g} {bound.display_unit}".rstrip()
+        field = bound.name.partition(" of record")[0].rpartition(".")[2].partition("[")[0]
+        of_record = bound.name.startswith(("start time", "initial "))
+        consequence = RECORD_CONSEQUENCE if of_record else CONSEQUENCES.get(field, OTHER_CONSEQUENCE)
         notes.append(
             f"{bound.name} is on its bound, {value}, and has no standard error; the standard errors of the others hold "
-            f"only for this value. {_consequence(bound.name)}{effect}"
+            f"only for this value. {consequence}{effect}"
         )
     return notes
-
-
-def _moved(estimates: Sequence[Estimate], shifts: Array) -> list[str]:
-    """The unknowns that a shift of a bound moves by more than a standard error, the largest relative change first."""
-    moved = []
-    for e, shift in zip(estimates, shifts, strict=True):
-        if np.isfinite(shift) and abs(shift) > e.stderr:  # false for one without a standard error
-            by = f"{e.name} by {shift:+.2g} {e.display_unit}".rstrip()
-            moved.append(
-                (abs(shift) / max(abs(e.value), 1e-300), f"{by} ({abs(shift) / e.stderr:.2g} standard errors)")
-            )
-    return _greatest(moved)
-
-
-def _consequence(name: str) -> str:
-    if name.startswith(("start time", "initial ")):
-        return RECORD_CONSEQUENCE
-    last = name.partition(" of record")[0].rpartition(".")[2].partition("[")[0]
-    return next((text for names, text in CONSEQUENCES if last in names), _OTHER_CONSEQUENCE)
 
 
 def scatter_of_records(
     estimates: Sequence[Estimate], common: Sequence[Mapping[str, float]]
 ) -> tuple[tuple[Estimate, ...], list[str]]:
-    """The estimates with standard errors of common parameters by the jackknife over three records or more, where these
-    are `MAX_SCATTER` times those of the rows or more, and a sentence that says so.
-
-    `common` are the common parameters of the fits without each record in turn. What differs between records is no
-    noise of their rows.
-    """
+    """The estimates with standard errors of the parameters `common` to the fits without each record in turn, by the
+    jackknife over three records or more, where these exceed those of the rows by far; and a sentence that says so."""
     found, ratios = list(estimates), dict[str, float]()
     for i, each in enumerate(estimates if len(common) >= MIN_RECORDS else ()):
         values = [one[each.name] for one in common if each.name in one]

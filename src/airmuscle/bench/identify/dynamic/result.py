@@ -1,5 +1,5 @@
-"""DynamicFit: estimates, standard errors, goodness of fit, undetermined combinations of parameters and figure; location
-of the pressure sensor in a fill by two fits."""
+"""DynamicFit: estimates, standard errors, goodness of fit, undetermined combinations of parameters, profile and figure;
+location of the pressure sensor in a fill by two fits."""
 
 import dataclasses
 from collections.abc import Mapping, Sequence
@@ -18,8 +18,54 @@ from ...reported import Reported, unit_column
 from ..identifiability import Identifiability
 from ..result import MAX_ROWS, Estimate
 from .experiment import Unknown
-from .problem import DynamicFitProblem, DynamicProfile, compute_profile
+from .problem import DynamicFitProblem
 from .reliability import Optimum, scatter_of_records, searches_at_lowest
+
+NORMAL_95 = 1.96
+"""Square root of the cost increase, in residual variances, at the limits of a 95 % confidence interval."""
+MAX_STANDARD_ERRORS = 4.0
+"""Range of a profile in standard errors to either side, at most twice the estimate of a parameter."""
+MIN_IMPROVEMENT = 0.1
+"""Reduction of the sum of squares, in residual variances, that shows that the fit was not converged; chosen."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class DynamicProfile:
+    """Values of one estimate in increasing order, and the increase of the sum of squares in residual variances."""
+
+    name: str
+    unit: str
+    values: Array
+    cost_increase: Array
+    estimates: Array
+    """All estimates at every value [SI], shape (M, P)."""
+
+    @property
+    def interval(self) -> tuple[float, float]:
+        """Limits of the 95 % interval, where the cost increase is 1.96 squared; NaN where it stays below, or where
+        the plant cannot be simulated before it is reached."""
+        best = int(np.argmin(self.cost_increase))
+        distance = np.sqrt(np.maximum(self.cost_increase - self.cost_increase[best], 0.0))
+        below = self._find_crossing(self.values[: best + 1][::-1], distance[: best + 1][::-1])
+        return below, self._find_crossing(self.values[best:], distance[best:])
+
+    @staticmethod
+    def _find_crossing(values: Array, distance: Array) -> float:
+        above = np.flatnonzero(distance > NORMAL_95)
+        if not above.size or not np.isfinite(distance[above[0]]):
+            return float("nan")
+        i = int(above[0])
+        fraction = (NORMAL_95 - distance[i - 1]) / (distance[i] - distance[i - 1])
+        return float(values[i - 1] + fraction * (values[i] - values[i - 1]))
+
+    def __str__(self) -> str:
+        low, high = (f"{end:.4g}" if np.isfinite(end) else "unbounded" for end in self.interval)
+        rows = [f"\n  {v:.4g}: {c:.3g}" for v, c in zip(self.values, self.cost_increase, strict=True)]
+        if self.cost_increase.min() < -MIN_IMPROVEMENT:
+            rows.append("\n  a better fit was found on the profile: fit again from there")
+        unit = "" if self.unit == "1" else f" [{self.unit}]"
+        text = "increase of the sum of squares in residual variances"
+        return f"{self.name}{unit}, 95 % confidence interval {low} to {high}; {text}:{''.join(rows)}"
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -40,10 +86,7 @@ class DynamicFit(Reported):
     notes: tuple[str, ...] = ()
 
     def __getitem__(self, name: str) -> Estimate:
-        """An estimate by its name, for example `circuit.fill.conductance` or `start time of record 2`.
-
-        Raises ParameterError.
-        """
+        """An estimate by its name, such as `start time of record 2`. Raises ParameterError."""
         names = [e.name for e in self.estimates]
         check_known("the fit has no unknown", name, names, "it has")
         return self.estimates[names.index(name)]
@@ -93,10 +136,31 @@ class DynamicFit(Reported):
         return float(np.sqrt(np.nanmean(self.residuals(record)[name] ** 2)))
 
     def profile(self, name: str, points: int = 9) -> DynamicProfile:
-        """The profile likelihood of one estimate at `points` values to either side; all others are fitted again."""
-        index = [e.name for e in self.estimates].index(self[name].name)
+        """The profile likelihood of one estimate at `points` values to either side, from the optimum outwards; all
+        others are fitted again."""
+        index, problem, best = self.estimates.index(self[name]), self.problem, self.problem.scaled(self.values)
+        low, high = (bound[index] for bound in problem.bounds)
+        stderr, span = self.estimates[index].stderr / problem.scales[index], high - low
+        if problem.unknowns[index].paths:  # the zero of a clock or of an initial value gives no range
+            span = min(span, 2.0 * abs(best[index]) or 1.0)
+        distance = min(MAX_STANDARD_ERRORS * stderr, span) if np.isfinite(stderr) else span
+        rows = [(best[index], self.costs[0], best)]
+        for side in (-1.0, 1.0):
+            scaled = best.copy()
+            for step in range(1, points + 1):
+                value = best[index] + side * distance * step / points
+                if not low <= value <= high:
+                    break
+                scaled = scaled.copy()
+                scaled[index] = value
+                scaled, cost = problem.solve(scaled, fixed=(index,))
+                rows.append((value, cost, scaled))
+        rows.sort(key=lambda row: row[0])
         variance = max(self.residual_std, 1e-300) ** 2
-        return compute_profile(self.problem, self.estimates, index, self.costs[0], variance, points)
+        increase = np.array([(cost - self.costs[0]) / variance for _, cost, _ in rows])
+        values = problem.origins[index] + np.array([value for value, _, _ in rows]) * problem.scales[index]
+        estimates = problem.values(np.array([scaled for _, _, scaled in rows]))
+        return DynamicProfile(name, self.estimates[index].unit, values, increase, estimates)
 
     def plot(self, record: int = 0, *, ax: Any = None) -> Any:
         """Plot the observed quantities of one record, measured and modelled, one panel each.
@@ -130,21 +194,13 @@ class DynamicFit(Reported):
             f"Residual standard deviation {self.residual_std:.3g} times that of the sensors; rank {rank} of {inner} "
             f"unknowns that are not on a bound; {reached}."
         )
-        relative = NamedValue(
-            "residual standard deviation", self.residual_std, "1", "", 3, "relative to the sensors", False
-        )
         counts = {
             "rank": rank, "unknowns not on a bound": inner, "searches": searches,
             "searches at the optimum": self.starts_at_optimum,
         }  # fmt: skip
+        deviation, remark = "residual standard deviation", "relative to the sensors"
+        relative = NamedValue(deviation, self.residual_std, "1", digits=3, remark=remark, brief=False)
         values = (relative, *(NamedValue(name, count, brief=False) for name, count in counts.items()))
-        tables = (estimate_table(self.estimates, "estimates", "Estimates", brief=MAX_ROWS), self._rms_table)
-        plots = (Plot("record", "First record, measured and modelled.", self.plot),)
-        return Chapter("dynamic", "Dynamic fit", summary, values=values, tables=tables, plots=plots, notes=self.notes)
-
-    @property
-    def _rms_table(self) -> Table:
-        """The rms residual of each observed quantity in each record."""
         rows = [(i, each.experiment.recording.origin, name)
                 for i, each in enumerate(self.problem.record_models) for name in each.names]  # fmt: skip
         columns: dict[str, Any] = {
@@ -153,7 +209,10 @@ class DynamicFit(Reported):
             "rms residual": TableColumn([self.rms(name, i) for i, _, name in rows], BY_ROW),
             "unit": unit_column([name for _, _, name in rows]),
         }
-        return Table("rms", "Residuals by record", columns, brief=MAX_ROWS)
+        residuals = Table("rms", "Residuals by record", columns, brief=MAX_ROWS)
+        tables = (estimate_table(self.estimates, "estimates", "Estimates", brief=MAX_ROWS), residuals)
+        plots = (Plot("record", "First record, measured and modelled.", self.plot),)
+        return Chapter("dynamic", "Dynamic fit", summary, values=values, tables=tables, plots=plots, notes=self.notes)
 
 
 MIN_RELATIVE_RESIDUAL, MIN_RESIDUAL_RATIO = 0.02, 2.0
