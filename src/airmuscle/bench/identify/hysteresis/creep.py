@@ -121,14 +121,13 @@ class CreepFit:
         elements = ", ".join(f"{amplitude:.3g}{unit} with {tau:.3g} s" for amplitude, tau in pairs)
         subject = ("no creep", "creep with one time constant", "creep with two time constants")[count]
         rms = ", ".join(f"{value:.3g}" for value in self.rmse_by_order)
-        text = f"The data justify {subject}{f' ({elements})' if elements else ''}; "
-        text += f"rms error with zero, one and two time constants: {rms}{unit}."
-        if count and max(self.creep.time_constants) > self.duration / 2:
-            text += (
-                f" The record of {self.duration:.3g} s is too short for the longest time constant, so the final value "
-                "is extrapolated."
-            )
-        return text
+        subject += f" ({elements})" if elements else ""
+        text = f"The data justify {subject}; rms error with zero, one and two time constants: {rms}{unit}."
+        too_short = (
+            f" The record of {self.duration:.3g} s is too short for the longest time constant, so the final value is "
+            "extrapolated."
+        )
+        return text + too_short if count and max(self.creep.time_constants) > self.duration / 2 else text
 
 
 def fit_creep(recording: Recording, quantity: str) -> CreepFit:

@@ -149,10 +149,8 @@ def _compared_laws(name: str, title: str, fits: Sequence[FrictionFit], own: dict
 
 
 def joint_friction_chapter(fits: Sequence[JointFit], not_joined: Sequence[str] = ()) -> Chapter:
-    """Return the chapter of the joint fits of all laws, lowest AICc first; the best justified one is shown.
-
-    `not_joined` are sentences on the loops that the joint fit does not use.
-    """
+    """Return the chapter of the joint fits of all laws, lowest AICc first, with the friction of each run by the best
+    justified one; `not_joined` are sentences on the loops that the joint fit does not use."""
     shown = preferred_fit(fits) or fits[0]
     none = "The runs justify no friction law that holds for all of them, so none is written."
     none = "" if shown.justified else f"{none} {shown.name} is shown as the best one. "
@@ -160,18 +158,8 @@ def joint_friction_chapter(fits: Sequence[JointFit], not_joined: Sequence[str] =
         "depends on pressure": [fit.law is not fit.friction for fit in fits],
         "runs that disagree": [sum(run.disagrees for run in fit.agreement) for fit in fits],
     }
-    laws, own = "Friction laws fitted to all runs together, best first", shown.chapter()
-    tables = (_compared_laws("joint-laws", laws, fits, columns), _run_table(shown), *_friction_tables(own))
-    summary = (f"{none}{shown.verdict}",)
-    return dataclasses.replace(
-        own, title="Friction of all runs", summary=summary, tables=tables, notes=tuple(not_joined)
-    )
-
-
-def _run_table(fit: JointFit) -> Table:
-    """Return the friction of each run, from the run alone and from all runs; in the brief view those that disagree."""
-    runs = fit.agreement
-    columns: dict[str, Any] = {
+    laws, own, runs = "Friction laws fitted to all runs together, best first", shown.chapter(), shown.agreement
+    by_run: dict[str, Any] = {
         "run": [run.origin for run in runs],
         "level": [run.description for run in runs],
         "from this run": TableColumn([run.amplitude for run in runs], "N", digits=3),
@@ -181,8 +169,12 @@ def _run_table(fit: JointFit) -> Table:
         P_VALUE: TableColumn([run.p_value for run in runs], brief=False),
         "agrees": TableColumn([not run.disagrees for run in runs], brief=False),
     }
-    title = f"Friction of each run, {fit.name}: half the range of the force"
-    return Table("joint-runs", title, columns, brief=[i for i, run in enumerate(runs) if run.disagrees])
+    title = f"Friction of each run, {shown.name}: half the range of the force"
+    of_runs = Table("joint-runs", title, by_run, brief=[i for i, run in enumerate(runs) if run.disagrees])
+    tables = (_compared_laws("joint-laws", laws, fits, columns), of_runs, *_friction_tables(own))
+    return dataclasses.replace(
+        own, title="Friction of all runs", summary=(f"{none}{shown.verdict}",), tables=tables, notes=tuple(not_joined)
+    )
 
 
 def _figure(loop: HysteresisLoop) -> Any:

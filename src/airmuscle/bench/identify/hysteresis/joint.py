@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ....core import LINES, Array, given_axes, legend_below, new_figure, relabel_in_display_units
+from ....core import LINES, given_axes, legend_below, new_figure, relabel_in_display_units
 from ....engine.distribution import DistributedCalls
 from ....engine.processes import Workers, process_pool
 from ....physics.muscle.friction import Friction, IdentifiedFriction, PressureScaledFriction
@@ -74,17 +74,10 @@ def agreement_of_run(joint: Friction, own: HysteresisFit, description: str, pres
     variance = float(np.mean(rest**2)) * rest.size / max(effective_sample_size(rest), 1.0)
     joint_misfit, misfit = Misfit.of(joint, (run,)), Misfit.of(own.friction, (run,))
     largest = max(float(np.linalg.norm(force)) for force in (own_force, joint_force)) or 1e-300
-    amplitude = force_amplitude(run, joint)
-    return RunAgreement(
-        origin=run.origin,
-        description=description,
-        pressure=pressure,
-        amplitude=factor * amplitude,
-        amplitude_stderr=float(np.sqrt(variance / power)) * amplitude,
-        joint_amplitude=amplitude,
-        deviation=float(np.linalg.norm(own_force - joint_force)) / largest,
-        p_value=misfit.p_value(joint_misfit._replace(parameters=curve.shape[1])),
-    )
+    amplitude, deviation = force_amplitude(run, joint), float(np.linalg.norm(own_force - joint_force)) / largest
+    stderr, p_value = float(np.sqrt(variance / power)), misfit.p_value(joint_misfit._replace(parameters=curve.shape[1]))
+    own_amplitude = (factor * amplitude, stderr * amplitude)
+    return RunAgreement(run.origin, description, pressure, *own_amplitude, amplitude, deviation, p_value)
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False, kw_only=True)
@@ -158,9 +151,8 @@ class JointFit(FrictionFit):
         at_runs, factors = ([float(self.friction.pressure_factor(p)) for p in each] for each in (pressure, grid))
         acting = np.array(at_runs) > 0
         at_one = float(np.mean(joint[acting] / np.array(at_runs)[acting])) if acting.any() else 0.0
-        figure, axes = (
-            new_figure(width=6.0, height=3.9) if ax is None else (None, given_axes(ax, 1, "plot of a friction")[0])
-        )
+        figure, axes = (None, None) if ax is not None else new_figure(width=6.0, height=3.9)
+        axes = axes or given_axes(ax, 1, "plot of a friction")[0]
         axes.plot(grid / 1e3, [at_one * factor for factor in factors], color=LINES[1], label="joint fit")
         dots = {"fmt": "o", "color": LINES[0], "capsize": 3, "label": "each run alone, 2 standard errors"}
         axes.errorbar(pressure / 1e3, own, 2.0 * error, **dots)
@@ -245,14 +237,22 @@ def identified_friction(friction: Friction, runs: Sequence[LoopSeries]) -> Frict
 
 
 def _fit_law(usable: Sequence[LoopFit], own: Sequence[HysteresisFit]) -> JointFit:
-    """One law fitted to all runs, with a constant and with a pressure-dependent scale; the better of the two."""
+    """One law fitted to all runs, with a constant and with a pressure-dependent scale; the better of the two.
+
+    The search of the scale starts from the run at the highest pressure, and a line through the amplitudes of all runs.
+    """
     runs, scale_p_value = [fit.series for fit in own], float("nan")
     known = [None if run.pressure is None else float(np.mean(run.pressure[run.fitted_rows])) for run in runs]
     pressures = np.array([float("-inf") if each is None else each for each in known])
     reference, lowest = int(np.argmax(pressures)), float(pressures.min())  # -inf where a run has no pressure
     friction, weak = search_parameters(own[len(own) // 2].friction, runs)
     if np.isfinite(lowest) and pressures[reference] > max(1e3, MIN_PRESSURE_RATIO * lowest):
-        scaled = search_parameters(_initial_scale(own, pressures, reference), runs)
+        amplitudes = [force_amplitude(fit.series, fit.friction) for fit in own]
+        slope, offset = np.polyfit(pressures, amplitudes, 1)
+        rounded = float(f"{pressures[reference]:.3g}")
+        at_reference = offset + slope * rounded
+        ratio = float(np.clip(offset / at_reference if at_reference > 0 else 1.0, 0.01, 5.0))
+        scaled = search_parameters(PressureScaledFriction(own[reference].friction, ratio, rounded), runs)
         small, large = (Misfit.of(each, runs) for each in (friction, scaled[0]))
         scale_p_value = large.p_value(small)
         if scale_p_value < SIGNIFICANCE_LEVEL and large.reduction_of_aicc(small) > 0:
@@ -264,16 +264,6 @@ def _fit_law(usable: Sequence[LoopFit], own: Sequence[HysteresisFit]) -> JointFi
         **evidence(friction, runs, repeats), weak_combinations=weak, series=tuple(runs), agreement=tuple(agreement),
         scale_p_value=scale_p_value,
     )  # fmt: skip
-
-
-def _initial_scale(own: Sequence[HysteresisFit], pressures: Array, reference: int) -> PressureScaledFriction:
-    """The friction of the run at the highest pressure, with a scale by the amplitudes of all runs."""
-    amplitudes = [force_amplitude(fit.series, fit.friction) for fit in own]
-    slope, offset = np.polyfit(pressures, amplitudes, 1)
-    rounded = float(f"{pressures[reference]:.3g}")
-    at_reference = offset + slope * rounded
-    ratio = offset / at_reference if at_reference > 0 else 1.0
-    return PressureScaledFriction(own[reference].friction, float(np.clip(ratio, 0.01, 5.0)), rounded)
 
 
 class SelectedFriction(NamedTuple):

@@ -72,11 +72,8 @@ class DataLimits:
         return self.high_speed >= MIN_SPEED_RATIO * self.low_speed
 
     def bounds(self, leaf: Leaf) -> tuple[float, float]:
-        """Bounds of a parameter: the declared ones, narrowed by what a muscle of this force and speed can show.
-
-        A force is at most the maximum force, a viscous force at the highest speed likewise, a characteristic speed is
-        between the lowest and the highest speed, and a stiffness is at most what the readings show.
-        """
+        """Bounds of a parameter: the declared ones, narrowed to the force, also a viscous one at the highest speed, the
+        range of speed and the stiffness that the data show."""
         narrowed = {"N": (-math.inf, self.force), "N/m": (-math.inf, self.stiffness)}
         if self.high_speed > 0:
             narrowed["N s/m"] = (-math.inf, self.force / self.high_speed)
@@ -107,13 +104,10 @@ def data_limits(force: Array, path: Array, time: Array | None, rows: Mask) -> Da
 
 
 def resolved_stiffness(path: Array, hysteresis: Array) -> float:
-    """The maximum stiffness that readings show [N/m]: the amplitude of the hysteresis by the resolution of the path.
+    """The maximum stiffness that readings show [N/m]: the amplitude of the hysteresis (N,) [N], the force without its
+    static curve, by the resolution of the path (N,) [m], both at the fitted rows.
 
-    path        displacement at the fitted rows [m], shape (N,)
-    hysteresis  force without its static curve at these rows [N], shape (N,)
-
-    The resolution is the displacement below which nothing is seen: the noise, a tenth of the median step, or the step
-    of a reading that is repeated during the motion.
+    The resolution is the noise, a tenth of the median step, or the step of a reading that is repeated in motion.
     """
     steps = np.abs(np.diff(path))
     moving = steps > 0

@@ -133,10 +133,7 @@ def find_loops(
 
 
 def _separate_runs(recording: Recording, sensors: Mapping[str, segment.Sensor]) -> list[tuple[Recording, segment.Run]]:
-    """The runs of a recording with two directions, each with its rows; the longest run if no run has two.
-
-    Runs at one level belong together, and so do all rows of a recording with a single level.
-    """
+    """The runs of a recording with two directions and their rows, else the longest run; all rows of a single level."""
     runs = segment.find_runs(recording, sensors)
     longest = max(runs, key=lambda run: len(run.interval))
     if all(_is_same_level(longest, run) for run in runs) or longest.kind not in (segment.ISOBARIC, segment.ISOMETRIC):
@@ -180,24 +177,21 @@ def _make_loop(
     if "force" in sensors:
         rows &= sensors["force"].censoring(force) == 0
     rows = rows if all_rows else rows & segment.quasi_static_rows(recording, sensors)
-    _check_two_directions(recording, _directions(recording, friction_path), rows)
-    if run.kind != segment.ISOBARIC:  # rows in which the pressure changes quickly, whatever the length does
-        columns = {name: recording[name] for name in ("time", "pressure") if name in recording}
-        steady = segment.quasi_static_rows(dataclasses.replace(recording, columns=columns), sensors)
-        transient = int(np.count_nonzero(rows & ~steady))
-    return HysteresisLoop(recording, run, friction_path, static_curve, rows, transient)
-
-
-def _check_two_directions(recording: Recording, direction: np.ndarray, fitted_rows: segment.Mask) -> None:
+    direction = _directions(recording, friction_path)
     for sign, branch in ((1, "rising"), (-1, "falling")):
-        rows = np.count_nonzero(direction == sign)
-        if not np.any((direction == sign) & fitted_rows):
-            excluded = f" ({rows} are excluded: not quasi-static, without force, or saturated)" if rows else ""
+        if not np.any((direction == sign) & rows):
+            count = np.count_nonzero(direction == sign)
+            excluded = f" ({count} are excluded: not quasi-static, without force, or saturated)" if count else ""
             raise IdentificationError(
                 f"{recording.origin}: the {branch} branch has no rows to fit{excluded}, but a loop needs a rising and "
                 "a falling branch. Give such a run, or run it more slowly where its rows are not quasi-static.",
                 hint=Hint("To fit all rows, if only the length changes quickly", "all_rows", True),
             )
+    if run.kind != segment.ISOBARIC:  # rows in which the pressure changes quickly, whatever the length does
+        columns = {name: recording[name] for name in ("time", "pressure") if name in recording}
+        steady = segment.quasi_static_rows(dataclasses.replace(recording, columns=columns), sensors)
+        transient = int(np.count_nonzero(rows & ~steady))
+    return HysteresisLoop(recording, run, friction_path, static_curve, rows, transient)
 
 
 def _is_same_level(one: segment.Run, other: segment.Run) -> bool:

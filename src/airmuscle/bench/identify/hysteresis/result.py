@@ -11,16 +11,9 @@ from ....core import LINES, Array, given_axes, leaves, legend_below, new_figure,
 from ....physics.muscle.friction import Friction
 from ....report.chapter import BY_ROW, Chapter, Plot, Table, TableColumn
 from ...reported import Reported
+from .. import model_evidence
 from ..identifiability import UndeterminedCombination
-from ..model_evidence import (
-    aicc,
-    describe_reduction,
-    effective_sample_size,
-    f_test_p_value,
-    format_p_value,
-    reduction_of_aicc,
-)
-from .limits import DataLimits, limit_reservations, parameters_on_bounds, undetermined_parameters
+from .limits import DataLimits, limit_reservations, undetermined_parameters
 from .search import LoopSeries, branch_gap, free_parameters, repeat_difference
 
 SIGNIFICANCE_LEVEL = 0.01
@@ -43,17 +36,18 @@ class Misfit(NamedTuple):
         parts = [run.fitted_residuals(friction) for run in runs]
         own = 0 if friction is None else free_parameters(friction)
         count = own + sum(int(run.design_matrix.shape[1]) for run in runs)
-        return cls(mean_square(parts), float(sum(map(effective_sample_size, parts))), count)
+        return cls(mean_square(parts), float(sum(map(model_evidence.effective_sample_size, parts))), count)
 
     def reduction_of_aicc(self, smaller: "Misfit") -> float:
         """AICc of a smaller model minus that of this one, for the effective number of these residuals."""
-        before, after = (aicc(each.mean_square, self.sample_size, each.parameters) for each in (smaller, self))
-        return reduction_of_aicc(before, after)
+        models = (smaller, self)
+        criteria = (model_evidence.aicc(each.mean_square, self.sample_size, each.parameters) for each in models)
+        return model_evidence.reduction_of_aicc(*criteria)
 
     def p_value(self, smaller: "Misfit") -> float:
         """p-value of the F test of the parameters that this model has beyond a smaller one."""
-        added = self.parameters - smaller.parameters
-        return f_test_p_value(smaller.mean_square, self.mean_square, self.sample_size, self.parameters, added)
+        before, after, added = smaller.mean_square, self.mean_square, self.parameters - smaller.parameters
+        return model_evidence.f_test_p_value(before, after, self.sample_size, self.parameters, added)
 
 
 def mean_square(parts: Sequence[Array]) -> float:
@@ -117,10 +111,10 @@ class FrictionFit(Reported):
 
     def _judged(self, text: str, what: str, repeats: str, further: str = "") -> str:
         """A text with the statistical tests, the reservations, what is not determined, and whether it is justified."""
-        sentences = [
-            f"{text} {describe_reduction(self.aicc_reduction)}, effective sample size "
-            f"{self.effective_sample_size:.0f}; F test {format_p_value(self.p_value)}."
-        ]
+        reduction = model_evidence.describe_reduction(self.aicc_reduction)
+        p_value = model_evidence.format_p_value(self.p_value)
+        tests = f"effective sample size {self.effective_sample_size:.0f}; F test {p_value}"
+        sentences = [f"{text} {reduction}, {tests}."]
         if np.isfinite(self.repeat_rmse):
             sentences.append(
                 f"On the {repeats} the rms error changes from {self.repeat_rmse_without_friction:.3g} to "
@@ -167,11 +161,6 @@ class HysteresisFit(FrictionFit):
     @property
     def limits(self) -> DataLimits:
         return self.series.limits
-
-    @property
-    def on_bounds(self) -> tuple[str, ...]:
-        """Paths of the parameters that the search moved to a bound, declared or set by the data."""
-        return parameters_on_bounds(self.friction, self.limits)
 
     @property
     def reservations(self) -> tuple[str, ...]:
@@ -228,10 +217,8 @@ class HysteresisFit(FrictionFit):
             figure, axes = new_figure(2, 1, width=6.0, height=5.6, sharex=True)
         else:
             axes = given_axes(ax, 1, "plot of a loop")[:2]
-        measured, force = (
-            series.target - series.design_matrix @ self.coefficients,
-            -series.friction_force(self.friction),
-        )
+        measured = series.target - series.design_matrix @ self.coefficients
+        force = -series.friction_force(self.friction)
         path, rows = series.path * series.axis.factor, series.fitted_rows
         points: dict[str, Any] = {"marker": "o", "markersize": 3, "linestyle": "none", "color": LINES[0], "alpha": 0.5}
         axes[0].plot(path[rows], measured[rows], **points, label="measured - static curve")

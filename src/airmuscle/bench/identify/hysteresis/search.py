@@ -32,10 +32,9 @@ class BinnedDifference:
 
 
 def binned_difference(path: Array, values: Array, other_path: Array, other_values: Array) -> BinnedDifference:
-    """Second branch minus first branch in the bins of the common path where both have rows.
+    """Second minus first branch in the bins of the common path where both have n and m rows, with weight n m/(n + m).
 
-    A bin with n rows of one branch and m of the other has the weight n m/(n + m). The values should be residuals from a
-    common static curve, not forces: within a bin the slope of a steep curve would appear as a difference.
+    The values should be residuals from a common static curve: the slope of a force would appear as a difference.
     """
     low = max(path.min(initial=np.inf), other_path.min(initial=np.inf))
     high = min(path.max(initial=-np.inf), other_path.max(initial=-np.inf))
@@ -146,10 +145,8 @@ def search_parameters(
 def _fit_stiffnesses(
     friction: Any, runs: Sequence[LoopSeries], factors: Sequence[Array | float] | None = None
 ) -> Friction:
-    """Stiffnesses of elements with given limits, by bounded linear least squares; `factors` scale the forces.
-
-    No element slides at a greater force than the largest one of the data.
-    """
+    """Stiffnesses of elements with given limits, by bounded linear least squares; `factors` scale the forces, none of
+    which is greater than the largest one of the data."""
     from scipy.linalg import block_diag
     from scipy.optimize import lsq_linear
 
@@ -204,16 +201,15 @@ def _fit_iteratively(
     limits = combine_limits(tuple(run.limits for run in runs))
     all_leaves = list(tree.leaves(friction))
     free = [i for i, leaf in enumerate(all_leaves) if leaf.declared.fitted]
-    coordinates = [_SearchCoordinate.from_leaf(all_leaves[i], limits) for i in free]
+    start, low, high, sizes = zip(*(_search_coordinate(all_leaves[i], limits) for i in free), strict=True)
 
     def law(x: Sequence[float]) -> Friction:
         values = [leaf.value for leaf in all_leaves]
-        for i, coordinate, value in zip(free, coordinates, x, strict=True):
-            values[i] = coordinate.parameter_value(float(value))
+        for i, size, coordinate in zip(free, sizes, map(float, x), strict=True):
+            values[i] = coordinate * size if size else float(np.exp(coordinate))
         return tree.unflatten(friction, values)
 
-    start, bounds = [c.start for c in coordinates], ([c.low for c in coordinates], [c.high for c in coordinates])
-    result = least_squares(lambda x: _residuals(law(x), runs), start, bounds=bounds, x_scale=1.0, max_nfev=60)
+    result = least_squares(lambda x: _residuals(law(x), runs), start, bounds=(low, high), x_scale=1.0, max_nfev=60)
     fitted = tree.with_parameters(friction, [leaf.value for leaf in tree.leaves(law(result.x))])
     names = [all_leaves[i].path for i in free]
     if any("[" in name for name in names):
@@ -224,25 +220,13 @@ def _fit_iteratively(
     return fitted, analysis.undetermined
 
 
-@dataclasses.dataclass(frozen=True)
-class _SearchCoordinate:
-    """A parameter as a search coordinate: its logarithm if its lower bound is positive, else scaled by its size."""
-
-    start: float
-    low: float
-    high: float
-    size: float
-
-    @classmethod
-    def from_leaf(cls, leaf: Leaf, limits: DataLimits) -> "_SearchCoordinate":
-        low, high = limits.bounds(leaf)
-        value = min(max(leaf.value, low), high)
-        if low > 0:
-            return cls(float(np.log(value)), float(np.log(low)), float(np.log(high)), 0.0)
-        narrowed = high < leaf.declared.bounds[1]
-        size = abs(value) or (0.1 * high if narrowed else 1.0)
-        return cls(value / size, low / size, high / size, size)
-
-    def parameter_value(self, coordinate: float) -> float:
-        """The parameter for a value of the coordinate."""
-        return coordinate * self.size if self.size else float(np.exp(coordinate))
+def _search_coordinate(leaf: Leaf, limits: DataLimits) -> tuple[float, float, float, float]:
+    """Start, bounds and size of a parameter in the search, relative to its size; of one with a positive lower bound
+    those of its logarithm, and a size of 0."""
+    low, high = limits.bounds(leaf)
+    value = min(max(leaf.value, low), high)
+    if low > 0:
+        return float(np.log(value)), float(np.log(low)), float(np.log(high)), 0.0
+    narrowed = high < leaf.declared.bounds[1]
+    size = abs(value) or (0.1 * high if narrowed else 1.0)
+    return value / size, low / size, high / size, size
