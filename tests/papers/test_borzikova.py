@@ -38,7 +38,7 @@ def laws():
 
 
 def verdict(name, law, curves=CURVES):
-    return borzikova.SURFACE.claim(borzikova.PAPER, name, curves, {name: law}, name).verdict
+    return borzikova.SURFACE.claim(name, curves, {name: law}, name).verdict
 
 
 def rms(law, force, least=0.25e5):
@@ -49,7 +49,7 @@ def rms(law, force, least=0.25e5):
 
 
 def test_the_printed_indices_cannot_be_confirmed():
-    found = [claim for row in borzikova.CURVES for claim in row.claims(borzikova.PAPER)]
+    found = [claim for row in borzikova.CURVES for claim in row.claims()]
     assert [(c.printed.value, c.reproduced, c.verdict) for c in found] == [
         (0.998, None, NOT_TESTABLE),
         (0.999, None, NOT_TESTABLE),
@@ -107,7 +107,7 @@ def test_another_sign_of_a_plane_curve_changes_the_verdict(laws):
 
 
 def test_where_no_index_exists_the_explained_part_stands_in_its_place(laws):
-    found = borzikova.SURFACE.claim(borzikova.PAPER, PRINTED, CURVES, laws, PRINTED)
+    found = borzikova.SURFACE.claim(PRINTED, CURVES, laws, PRINTED)
     assert index_on_curves(laws[PRINTED], CURVES).value is None
     assert found.reproduced == pytest.approx(-576.65, abs=0.01)
     assert "The index does not exist" in found.note
@@ -148,21 +148,21 @@ def test_between_the_loads_both_surfaces_dip_below_zero(laws):
 
 def test_two_loads_change_the_verdict_on_the_coefficients():
     data = sample(CURVES)
-    assert borzikova.RANK.claim(borzikova.PAPER, "", data).verdict == HOLDS
-    two = borzikova.RANK.claim(borzikova.PAPER, "", data.rows(data["force"] > 50))
+    assert borzikova.RANK.claim("", data).verdict == HOLDS
+    two = borzikova.RANK.claim("", data.rows(data["force"] > 50))
     assert (two.reproduced, two.verdict) == (10.0, DIFFERS)
 
 
 def test_on_rounded_curves_the_linearised_fit_is_not_least_squares():
     data = round_contraction(sample(CURVES))
-    claim, _ = borzikova.PROCEDURE.claims(borzikova.PAPER, data)
+    claim, _ = borzikova.PROCEDURE.claims(data)
     assert claim.reproduced == pytest.approx(0.11175 / 0.10763, abs=1e-4)
     assert claim.verdict == DIFFERS
 
 
 def test_linearised_as_gauss_newton_the_fit_is_least_squares():
     data = round_contraction(sample(CURVES))
-    _, claim = borzikova.PROCEDURE.claims(borzikova.PAPER, data)
+    _, claim = borzikova.PROCEDURE.claims(data)
     assert claim.reproduced == pytest.approx(1.0, abs=1e-9)
     assert claim.verdict == HOLDS
     law = borzikova.fit_gauss_newton(data, 0.40).model
@@ -171,8 +171,8 @@ def test_linearised_as_gauss_newton_the_fit_is_least_squares():
 
 
 def test_the_catalogue_contradicts_itself_and_the_measurements():
-    lifted, smaller, diameter = (claim for row in borzikova.CATALOGUE for claim in row.claims(borzikova.PAPER))
-    contracted = borzikova.MUSCLE[0].claims(borzikova.PAPER, CURVES)
+    lifted, smaller, diameter = (claim for row in borzikova.CATALOGUE for claim in row.claims())
+    contracted = borzikova.MUSCLE[0].claims(CURVES)
     assert (lifted.printed.value, lifted.reproduced, lifted.verdict) == (
         35.0,
         30.0,
@@ -187,11 +187,11 @@ def test_the_catalogue_contradicts_itself_and_the_measurements():
 
 
 def test_the_saturation_is_not_reached_within_the_pressure_range():
-    saturation, initial_load, branches = (row.claim(borzikova.PAPER, "", CURVES) for row in borzikova.MUSCLE[1:])
+    saturation, initial_load, branches = (row.claim("", CURVES) for row in borzikova.MUSCLE[1:])
     assert saturation.reproduced == pytest.approx(37.5, abs=0.05)
     assert saturation.verdict == DIFFERS
     other = dataclasses.replace(CURVES, max_pressure=5e5)
-    assert borzikova.MUSCLE[1].claim(borzikova.PAPER, "", other).reproduced > saturation.reproduced
+    assert borzikova.MUSCLE[1].claim("", other).reproduced > saturation.reproduced
     assert [initial_load.verdict, branches.verdict] == [NOT_TESTABLE, NOT_TESTABLE]
     assert "begins at −3.57 %" in initial_load.note
 

@@ -286,7 +286,7 @@ def test_varied_together_the_chosen_values_break_the_claim_on_relative_damping(j
     assert max(alone) < releasing.MAX_DAMPING_DIFFERENCE < both
     assert both == pytest.approx(0.305, abs=5e-4)
     found = {claim.claim: claim for claim in releasing.joint_claims(joint)}
-    damping = found[releasing.STATEMENTS["relative damping"].text]
+    damping = found[releasing.STATEMENTS["relative damping"].blank.claim]
     assert damping.verdict == DIFFERS
     assert 50.0 < damping.reproduced < 100.0
     assert f"{100 * releasing.share(joint, 'relative damping', 'Sobol set'):.3g} %" in damping.note
@@ -346,7 +346,7 @@ def test_ideal_gas_and_reference_density_are_negligible_causes(effects):
 
 
 def test_the_step_lies_in_the_range_of_the_sensor_only_as_absolute_pressure():
-    absolute, gauge, hysteresis = (claim for row in hosovsky_fill.MEASUREMENT for claim in row.claims(""))
+    absolute, gauge, hysteresis = (claim for row in hosovsky_fill.MEASUREMENT for claim in row.claims())
     assert (absolute.reproduced, absolute.verdict) == (pytest.approx(0.548675), HOLDS)
     assert (gauge.verdict, hysteresis.verdict) == (DIFFERS, NOT_TESTABLE)
 

@@ -358,7 +358,7 @@ def test_the_previous_model_with_evenly_spread_fibres_is_the_pair_of_circle_and_
 
 
 def test_the_circle_of_the_previous_model_moves_with_pressure_at_a_load_and_not_at_a_contraction():
-    at_load, at_contraction = claims.ROWS["previous model"].claims("")
+    at_load, at_contraction = claims.ROWS["previous model"].claims()
     assert (at_load.verdict, at_contraction.verdict) == (HOLDS, DIFFERS)
     assert at_contraction.reproduced == pytest.approx(1.0, rel=1e-9)
     model = Ferraresi2001(LINE_A)
@@ -470,7 +470,7 @@ def verdict(claim):
 
 
 def cases_of(row):
-    return claims.ROWS[row].claims(claims.PAPER)
+    return claims.ROWS[row].claims()
 
 
 def test_the_combined_claim_holds_only_with_w_2_and_q_2():
@@ -705,7 +705,7 @@ def test_the_greatest_error_of_the_angle_is_that_of_all_angles_not_of_three():
 
 
 def test_the_printed_model_leaves_both_muscles_slack_and_the_circular_one_is_accurate():
-    verdicts = {c.case: (c.reproduced, c.verdict) for c in claims.ROWS["feed-forward of a pair"].claims("")}
+    verdicts = {c.case: (c.reproduced, c.verdict) for c in claims.ROWS["feed-forward of a pair"].claims()}
     assert len(verdicts) == 6
     for line in ("A", "B"):
         assert verdicts[rf"printed, \(w = 2\), \(q = 1\), line {line}"] == (100.0, DIFFERS)

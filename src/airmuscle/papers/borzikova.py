@@ -63,10 +63,7 @@ def linearised_ratio(recording: am.Recording, repeated: bool) -> tuple[float, st
 
 
 def fit_gauss_newton(recording: am.Recording, saturation: float) -> SurfaceFit:
-    """Fit k by repeated linearisation of f in its coefficients, from the linear fit of the logarithm.
-
-    Raises IdentificationError if the coefficients are not determined.
-    """
+    """Fit k by repeated linearisation in the coefficients. Raises IdentificationError if they are not determined."""
     problem = SurfaceProblem.from_recording(recording, saturation, 4, 2)
     coefficients: Array = np.asarray(np.linalg.lstsq(*problem.linear_system(), rcond=None)[0], dtype=float)
     for _ in range(MAX_LINEARISATIONS):
@@ -143,10 +140,10 @@ def claims(curves: PlaneCurves, laws: Laws) -> tuple[Claim, ...]:
     """Return all claims of the paper for these curves and surfaces."""
     data = sample(curves)
     return (
-        *claims_of(CURVES, PAPER),
-        *SURFACE.claims(PAPER, curves, laws),
-        *RANK.claims(PAPER, data),
-        *PROCEDURE.claims(PAPER, round_contraction(data)),
-        *claims_of((LOAD, *CATALOGUE), PAPER),
-        *claims_of(MUSCLE, PAPER, curves),
+        *claims_of(CURVES),
+        *SURFACE.claims(curves, laws),
+        *RANK.claims(data),
+        *PROCEDURE.claims(round_contraction(data)),
+        *claims_of((LOAD, *CATALOGUE)),
+        *claims_of(MUSCLE, curves),
     )

@@ -47,9 +47,9 @@ def chapter() -> Chapter:
     return Chapter(
         rig.PAPER,
         claims=(
-            *claims_of(filling.SURFACE, rig.PAPER, surface_fit()),
+            *claims_of(filling.SURFACE, surface_fit()),
             *filling.fill_claims(fill, explanation),
-            *claims_of(filling.MEASUREMENT, rig.PAPER),
+            *claims_of(filling.MEASUREMENT),
             *releasing.claims(low, high, ranges),
             *releasing.joint_claims(joint),
             *filling.gas_findings(effects),

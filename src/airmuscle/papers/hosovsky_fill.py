@@ -123,10 +123,10 @@ def fill_claims(fill: FillRun, explanation: str = "") -> tuple[Claim, ...]:
     choked = claim_row(PAPER, "choked flow", printed=Equal(0.433 * 650.0, 2e-3 * step, derived=True))
     valve = claim_row(PAPER, "conductance", lambda fill: fill.plant.circuits[0].fill.conductance * 1e5 * 60e3)
     return (
-        valve.claim(PAPER, "", fill),
-        choked.claim(PAPER, "", choke_end / 1e3, ""),
-        *claims_of(FILL, PAPER, fill),
-        claim_row(PAPER, "deviations").claim(PAPER, "", None, explanation),
+        valve.claim("", fill),
+        choked.claim("", choke_end / 1e3, ""),
+        *claims_of(FILL, fill),
+        claim_row(PAPER, "deviations").claim("", None, explanation),
     )
 
 
@@ -134,7 +134,7 @@ def gas_findings(effects: tuple[Effect, ...]) -> tuple[Claim, ...]:
     """Return the effects of the ideal gas and of the reference density, compared with a negligible change."""
     changes = {each.substitution.component: each.largest("pressure", rig.FILLING) for each in effects}
     return tuple(
-        row.claim(PAPER, "", abs(change) / 1e3)
+        row.claim("", abs(change) / 1e3)
         for component, change in changes.items()
         for key, row in GAS.items()
         if component.startswith(key)

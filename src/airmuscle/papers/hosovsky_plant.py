@@ -118,10 +118,7 @@ def plant(
     series: am.physics.SeriesElement = am.physics.RigidSeriesElement(),
     data: str = FORCE_MAPS[0],
 ) -> am.Plant:
-    """Return the plant: muscle, two valves with closed centre, load and gas.
-
-    The defaults are those of the paper: isothermal gas, rigid wall, no line, no series spring.
-    """
+    """Return the plant; the defaults are those of the paper: isothermal gas, rigid wall, no line, no series spring."""
     valves = am.FillDischarge(am.Supply(SUPPLY_PRESSURE), valve, valve)
     actuator = dataclasses.replace(muscle(parameters, data, spring), wall=wall, series=series)
     circuit = valves if tube is None else am.physics.WithTubes(valves, tube)

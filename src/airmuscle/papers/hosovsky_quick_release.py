@@ -15,6 +15,7 @@ import airmuscle as am
 from ..core import DASHES, LINES, legend_below, new_figure
 from ..design.study import Sobol, Uniform
 from ..report import AtLeast, AtMost, Claim, Plot, Table
+from ..report.claims import ClaimRow
 from ..report.formatting import format_quantity, format_unit
 from . import hosovsky_plant as rig
 from .hosovsky_plant import FORCE_MAPS, UnpublishedParameters, latched_load, plant
@@ -34,7 +35,7 @@ STATEMENTS = {
 
 def agrees(key: str, value: float) -> bool:
     """Return whether a value confirms a statement."""
-    criterion = STATEMENTS[key].printed
+    criterion = STATEMENTS[key].blank.printed
     return criterion is not None and criterion.agrees(value)
 
 
@@ -129,9 +130,9 @@ def claims(low: Release, high: Release, ranges: Table) -> tuple[Claim, ...]:
         outcome = "it holds" if not failing else f"it does not hold for {', '.join(failing)}; otherwise it holds"
         note = (
             f"Initial gauge pressures {low.pressure / 1e3:g} and {high.pressure / 1e3:g} kPa (chosen). Each chosen "
-            f"value varied alone over its range: {min(column):.3g} to {max(column):.3g} {format_unit(row.unit)}"
+            f"value varied alone over its range: {min(column):.3g} to {max(column):.3g} {format_unit(row.blank.unit)}"
         )
-        result.append(row.claim(rig.PAPER, "nominal values", values[key], f"{note.rstrip()}; {outcome}."))
+        result.append(row.claim("nominal values", values[key], f"{note.rstrip()}; {outcome}."))
     return tuple(result)
 
 
@@ -227,9 +228,9 @@ def joint_claims(cases: Sequence[JointCase]) -> list[Claim]:
         shares = "; ".join(f"{design} {100 * share(cases, key, design):.3g} %" for design in designs)
         note = (
             f"Share of {len(cases)} combinations of all chosen values for which it holds: {shares}. Values "
-            f"{np.nanmin(values):.3g} to {np.nanmax(values):.3g} {format_unit(row.unit)}".rstrip()
+            f"{np.nanmin(values):.3g} to {np.nanmax(values):.3g} {format_unit(row.blank.unit)}".rstrip()
             + f"; worst case: {worst.describe()} ({worst.design})."
         )
-        joint = dataclasses.replace(row, printed=AtLeast(100.0, derived=True), unit="%")
-        result.append(joint.claim(rig.PAPER, CASE, 100 * share(cases, key), note))
+        blank = dataclasses.replace(row.blank, printed=AtLeast(100.0, derived=True), unit="%")
+        result.append(ClaimRow(blank).claim(CASE, 100 * share(cases, key), note))
     return result

@@ -16,7 +16,7 @@ from ..core import check_writable
 from ..engine.processes import process_pool
 from ..files.library.files import complete_name
 from ..report.chapter import Chapter, Plot, Table
-from ..report.claims import AtLeast, AtMost, ClaimRow, Equal, Kind, PublishedValue
+from ..report.claims import AtLeast, AtMost, Claim, ClaimRow, Equal, Kind, PublishedValue
 from ..report.write import rendered_figure, write_report
 
 PAPERS: dict[str, str] = {
@@ -128,7 +128,7 @@ def claim_row(
     for key, criterion in (("equal", Equal), ("at_least", AtLeast), ("at_most", AtMost)):
         printed = criterion(entry.pop(key), **options) if key in entry else printed
     kind = Kind(entry.pop("kind", Kind.CLAIM.value))
-    return ClaimRow(printed=printed, reproduce=reproduce, cases=cases, kind=kind, **entry)
+    return ClaimRow(Claim(paper, entry.pop("text"), printed, None, kind=kind, **entry), reproduce, cases)
 
 
 def _in_one_line(text: str) -> str:

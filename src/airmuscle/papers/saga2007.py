@@ -97,7 +97,7 @@ ROWS = {name: claim_row(PAPER, name, *given) for name, given in _REPRODUCED.item
 
 def claim(row: str, *arguments: Any) -> Claim:
     """Return the claim of one row for other arguments than those of its cases."""
-    return ROWS[row].claim(PAPER, "", *arguments)
+    return ROWS[row].claim("", *arguments)
 
 
 CONTRACTIONS = np.array([0.001, 0.01, 0.05, 0.10, 0.20, 0.35])
@@ -109,7 +109,7 @@ def chapter() -> Chapter:
     """Return the chapter of the report: claims with verdicts, tables, figures, and the sources of all values."""
     return Chapter(
         PAPER,
-        claims=claims_of(ROWS.values(), PAPER),
+        claims=claims_of(ROWS.values()),
         tables=(
             interpretation_table(),
             exact_table(),

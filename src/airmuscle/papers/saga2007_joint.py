@@ -93,10 +93,7 @@ def angle_errors(name: str, line: str, angles: Angles = LINE) -> Array:
 
 @functools.cache
 def max_angle_error(name: str, line: str) -> float:
-    """Return the greatest error [rad] between zero and the greatest angle; NaN where both muscles are slack.
-
-    The greatest of LINE is refined between its neighbours.
-    """
+    """Return the greatest error [rad] up to the greatest angle, refined within LINE; NaN where both are slack."""
     from scipy.optimize import minimize_scalar
 
     errors = np.abs(angle_errors(name, line))

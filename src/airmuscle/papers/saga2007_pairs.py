@@ -82,10 +82,7 @@ def force_balances(
     contraction: Array,
     along: RubberIntegral = am.characteristic.ArcIntegral(),
 ) -> dict[str, ForceBalance]:
-    """Return the three closures of one outline over contraction, with w = 1 and M = m/pi.
-
-    `along` is the rubber integral of the two balances.
-    """
+    """Return the three closures of one outline, w = 1 and M = m/pi; `along` is the rubber integral of the balances."""
     segment = tube.segment(contraction)
     hoop = WALL * along.hoop_stress(rubber, segment)
     growth = tube.volume_derivative(contraction) / tube.resting_length
@@ -124,10 +121,7 @@ def ideal_errors(contraction: Array) -> dict[Pair, Array]:
 
 
 def errors(rubber: am.characteristic.RubberLine, force: float, contraction: Array) -> dict[Pair, Array]:
-    """Return the relative pressure error of each pair, compared with the exact meridian with rubber [1].
-
-    NaN where either of the two is undefined.
-    """
+    """Return the relative pressure errors [1] to the exact meridian with rubber; NaN where one is undefined."""
     reference = np.asarray(exact_meridian(rubber).shape_at_force(contraction, force).pressure)
     return {pair: value / reference - 1 for pair, value in pressures(rubber, force, contraction).items()}
 

@@ -59,11 +59,6 @@ class Ferraresi2001:
         half_angle = np.sqrt(am.geometry.CircularArc().angle_squared(contraction))
         return self.fibre_length / (2 * half_angle), half_angle
 
-    def middle_radius(self, contraction: Any) -> Any:
-        """Radius of the tube in the middle [m]."""
-        radius, angle = self.circle(contraction)
-        return self.end_radius + radius * (1 - np.cos(angle))
-
     def hoop_force(self, contraction: Any) -> Any:
         """Hoop force of the rubber on the half shell [N]: the first two terms of (A), and that of the intercept."""
         radius, angle = self.circle(contraction)
@@ -80,16 +75,15 @@ class Ferraresi2001:
 
     def pressure(self, contraction: Any, force: Any) -> Any:
         """Gauge pressure [Pa] at a contraction and a tension [N]; NaN where the balances have no solution."""
-        lever = np.sin(self.circle(contraction)[1]) * self.fibre_sum / self.fibres
-        area = self.half_section(contraction) - lever * np.pi * self.middle_radius(contraction) ** 2
+        radius, angle = self.circle(contraction)
+        lever = np.sin(angle) * self.fibre_sum / self.fibres
+        middle_radius = self.end_radius + radius * (1 - np.cos(angle))
+        area = self.half_section(contraction) - lever * np.pi * middle_radius**2
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.where(area > 0, (self.hoop_force(contraction) + lever * force) / area, np.nan)
 
     def contraction(self, pressure: float, force: float) -> float:
-        """Smallest contraction [1] in equilibrium at a gauge pressure [Pa] and a tension [N].
-
-        Raises SolveError if there is none from 0.01 to 45 %.
-        """
+        """Smallest contraction [1] at a pressure [Pa] and tension [N]. Raises SolveError beyond 0.01 to 45 %."""
         from scipy.optimize import brentq
 
         grid = np.geomspace(1e-4, 0.45, 400)

@@ -156,38 +156,31 @@ class Claim:
 
 @dataclasses.dataclass(frozen=True)
 class ClaimRow:
-    """One row of a table of claims: statement, expected value, unit, function that reproduces the value, note, cases.
+    """One row of a table of claims: a claim without its value, the function that reproduces the value, and the cases.
 
     `reproduce` returns the value, or the value with a further sentence of the note; without it these are the arguments,
     and without arguments no value can be computed. `cases` maps the name of each case to its arguments.
     """
 
-    text: str
-    printed: PublishedValue | None
-    unit: str
+    blank: Claim
     reproduce: Callable[..., Any] | None = None
-    note: str = ""
     cases: Mapping[str, tuple[Any, ...]] = dataclasses.field(default_factory=lambda: {"": ()})
-    kind: Kind = Kind.CLAIM
-    untestable: bool = False
-    place: str = ""
 
-    def claim(self, paper: str, case: str, *arguments: Any) -> Claim:
-        """Return the claim of one paper in one case, evaluated for these arguments."""
+    def claim(self, case: str, *arguments: Any) -> Claim:
+        """Return the claim in one case, evaluated for these arguments."""
         found = self.reproduce(*arguments) if self.reproduce else arguments or None
         value, reason = found if isinstance(found, tuple) else (found, "")
-        note = f"{self.note} {reason}".strip()
-        shared = (self.kind, self.untestable, self.place)
-        return Claim(paper, self.text, self.printed, value, self.unit, note, case, *shared)
+        note = f"{self.blank.note} {reason}".strip()
+        return dataclasses.replace(self.blank, reproduced=value, note=note, case=case)
 
-    def claims(self, paper: str, *subject: Any) -> tuple[Claim, ...]:
+    def claims(self, *subject: Any) -> tuple[Claim, ...]:
         """Return the claims of all cases; the function is given the subject before the arguments of the case."""
-        return tuple(self.claim(paper, case, *subject, *arguments) for case, arguments in self.cases.items())
+        return tuple(self.claim(case, *subject, *arguments) for case, arguments in self.cases.items())
 
 
-def claims_of(rows: Iterable[ClaimRow], paper: str, *subject: Any) -> tuple[Claim, ...]:
+def claims_of(rows: Iterable[ClaimRow], *subject: Any) -> tuple[Claim, ...]:
     """Return the claims of the rows of a table, each in all its cases."""
-    return tuple(claim for row in rows for claim in row.claims(paper, *subject))
+    return tuple(claim for row in rows for claim in row.claims(*subject))
 
 
 @dataclasses.dataclass(frozen=True)

@@ -132,10 +132,7 @@ def parameter_table(model: Any, name: str, title: str, *, brief: bool = False) -
 def leaf_table(
     rows: Iterable[tuple[str, Leaf]], name: str, title: str, *, bounds: bool = False, brief: bool = False
 ) -> Table:
-    """Return a table of parameters under the given paths, with their bounds if wanted.
-
-    The brief view has all but the middle of long lists.
-    """
+    """Return a table of parameters under the given paths; the brief view has all but the middle of long lists."""
     listed = list(rows)
     columns: dict[str, Any] = {
         "parameter": [path for path, _ in listed],
@@ -149,7 +146,10 @@ def leaf_table(
         finite = [each if any(map(math.isfinite, each)) else None for each in bounds_of]
         columns["bounds"] = TableColumn(finite, BY_ROW, digits=6)
         columns["fitted"] = TableColumn([leaf.declared.fitted for _, leaf in listed], brief=False)
-    return Table(name, title, columns, brief=_ends_of_lists(columns["parameter"]) if brief else 0)
+    stems = [path.partition("[")[0] for path, _ in listed]
+    ends = [i for i, stem in enumerate(stems)  # without the middle of long lists
+            if (count := stems.count(stem)) <= MAX_VALUES or i - stems.index(stem) in (0, 1, count - 1)]  # fmt: skip
+    return Table(name, title, columns, brief=ends if brief else 0)
 
 
 def estimate_table(estimates: Sequence[Any], name: str, title: str, *, brief: int = 0) -> Table:
@@ -169,10 +169,3 @@ def estimate_table(estimates: Sequence[Any], name: str, title: str, *, brief: in
         "meaning": TableColumn([each.meaning for each in estimates], brief=False),
     }
     return Table(name, title, columns, brief=brief)
-
-
-def _ends_of_lists(paths: Sequence[str]) -> list[int]:
-    """The indices of the parameters without the middle of long lists."""
-    stems = [path.partition("[")[0] for path in paths]
-    return [i for i, stem in enumerate(stems)
-            if (count := stems.count(stem)) <= MAX_VALUES or i - stems.index(stem) in (0, 1, count - 1)]  # fmt: skip

@@ -6,9 +6,9 @@ import unicodedata
 from collections.abc import Iterator, Sequence
 
 from ..core import printable
-from .chapter import Chapter, NamedValue, Table
+from .chapter import Chapter, Table
 from .formatting import to_plain
-from .shown import ShownColumn, shown_columns, value_cells
+from .shown import shown_columns, value_cells
 
 MAX_WORD = 14
 """Length of a word that may be broken, such as a path [characters] (chosen)."""
@@ -32,7 +32,11 @@ def as_text(chapters: Sequence[Chapter], width: int, rest: str = "the report") -
 def _lines(chapter: Chapter, result: Sequence[str], width: int, rest: str) -> Iterator[str]:
     yield to_plain(chapter.title)
     yield from map(to_plain, result)
-    yield from _value_lines([each for each in chapter.values if each.brief])
+    values = [each for each in chapter.values if each.brief]
+    cells = [(each.name, " ".join(filter(None, value_cells(each))), each.remark) for each in values]
+    widths = [max(map(cell_width, column)) for column in zip(*cells, strict=True)]
+    for name, value, remark in cells:
+        yield f"{_padded(name, widths[0])}   {_padded(value, widths[1])}   {remark}".rstrip()
     for table in chapter.tables:
         if table.brief_rows:
             yield from ["", *([to_plain(table.title)] if table.title else []), *table_lines(table, width, rest)]
@@ -44,30 +48,9 @@ def _lines(chapter: Chapter, result: Sequence[str], width: int, rest: str) -> It
         yield f"{len(remarks) - MAX_NOTES} more notes are in {rest}."
 
 
-def _value_lines(values: Sequence[NamedValue]) -> Iterator[str]:
-    cells = [(each.name, " ".join(filter(None, value_cells(each))), each.remark) for each in values]
-    widths = [max(map(cell_width, column)) for column in zip(*cells, strict=True)]
-    for name, value, remark in cells:
-        yield f"{_padded(name, widths[0])}   {_padded(value, widths[1])}   {remark}".rstrip()
-
-
 def table_lines(table: Table, width: int, rest: str) -> Iterator[str]:
     """The brief rows of a table, and the number of those that are left out between or after them."""
-    columns, rows = shown_columns(table, brief=True), table.brief_rows
-    lines = list(_grid(columns, width))
-    yield from lines[0]
-    last = -1
-    for row, text in zip(rows, lines[1:], strict=True):
-        if row > last + 1:
-            yield f"... {row - last - 1} more"
-        yield from text
-        last = row
-    if last + 1 < len(table):
-        yield f"... {len(table) - last - 1} more in {rest}"
-
-
-def _grid(columns: Sequence[ShownColumn], width: int) -> Iterator[list[str]]:
-    """The lines of the header, then those of each row."""
+    columns = shown_columns(table, brief=True)
     headings = [
         _UNIT.sub(lambda unit: unit[0].replace(" ", "\N{NO-BREAK SPACE}"), printable(to_plain(each.heading)))
         for each in columns
@@ -75,10 +58,16 @@ def _grid(columns: Sequence[ShownColumn], width: int) -> Iterator[list[str]]:
     cells = [[printable(to_plain(text)) for text in each.texts] for each in columns]
     widths, gap = _widths(headings, cells, width)
     right = [each.is_numeric for each in columns]
-    header = _row(headings, widths, right, gap)
-    yield [*header, "─" * min(width, sum(widths) + gap * (len(widths) - 1))]
-    for row in zip(*cells, strict=True):
-        yield _row(row, widths, right, gap)
+    yield from _row(headings, widths, right, gap)
+    yield "─" * min(width, sum(widths) + gap * (len(widths) - 1))
+    last = -1
+    for row, texts in zip(table.brief_rows, zip(*cells, strict=True), strict=True):
+        if row > last + 1:
+            yield f"... {row - last - 1} more"
+        yield from _row(texts, widths, right, gap)
+        last = row
+    if last + 1 < len(table):
+        yield f"... {len(table) - last - 1} more in {rest}"
 
 
 def _row(cells: Sequence[str], widths: Sequence[int], right: Sequence[bool], gap: int) -> list[str]:

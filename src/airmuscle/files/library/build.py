@@ -41,8 +41,6 @@ class TableReader:
         """The object that a table describes; `given` are fields that are not read from the table.
 
         kind  annotation of the place of the object, by which other classes are refused
-
-        Raises ParameterError, UnitError, UnknownNameError, FileError or ColumnError with the location.
         """
         for cls, read in self.named.items():
             if cls in fields.options(kind) and (part := read(table, location, self)) is not None:

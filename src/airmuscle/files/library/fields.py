@@ -139,10 +139,7 @@ def is_required(field: dataclasses.Field[Any]) -> bool:
 def check_required(
     cls: type[Any], given: Mapping[str, Any], hints: Mapping[str, Any], location: Location, is_named: bool
 ) -> None:
-    """Raise ParameterError if a required field of a class is not given, or is a blank text.
-
-    is_named  whether the table names the class
-    """
+    """Raise ParameterError if a required field is not given, or blank; `is_named`: the table names the class."""
     for field in dataclasses.fields(cls):
         value = given.get(field.name)
         if not is_required(field) or (field.name in given and not (isinstance(value, str) and not value.strip())):

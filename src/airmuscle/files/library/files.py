@@ -14,10 +14,7 @@ from ...core.errors import check_known, listed
 
 @dataclasses.dataclass(frozen=True)
 class Location:
-    """Location of a table in a file, or of the value of a `key` in it, for error messages.
-
-    Data files are relative to `folder`.
-    """
+    """Location of a table in a file, or of the value of a `key`, for messages; data files are relative to `folder`."""
 
     file: str
     table: str
@@ -63,10 +60,7 @@ def read_table(value: Any, known: Any, where: object, remedy: str = "") -> Mappi
 
 
 def read_number(value: Any, unit: str, where: object, about: str = "") -> float:
-    """Number in SI units, from a number in `unit` or a text with a unit; `about` is appended to the error message.
-
-    Raises ParameterError or UnitError.
-    """
+    """Number [SI] of a number in `unit` or a text. Raises ParameterError, which ends with `about`, or UnitError."""
     if isinstance(value, bool) or not isinstance(value, int | float | str):
         expected = "a number" if unit == "1" else f"a number in {unit}"
         raise ParameterError(f"{where} is {abridged(value)}; it must be {expected}, or a text with a unit{about}.")

@@ -3,7 +3,6 @@
 import dataclasses
 from collections.abc import Sequence
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
@@ -24,17 +23,11 @@ MAX_NAMES, MAX_NAME = 3, 60
 """Maximum number of file names in a title, and of characters of each (chosen)."""
 
 
-class InitialLaw(NamedTuple):
-    """An entry with the law, and the parameters to keep fixed because they only scale other parameters."""
-
-    entry: Entry
-    fixed: tuple[str, ...] = ()
-
-
 def find_initial_law(
     name: str, recordings: Sequence[Recording], degree: int, option: str = "--characteristic"
-) -> InitialLaw:
-    """The library entry or muscle file of that name, or the named model with initial values estimated from the data.
+) -> tuple[Entry, tuple[str, ...]]:
+    """The library entry or muscle file of that name, or the named model with initial values estimated from the data;
+    and the parameters to keep fixed because they only scale other parameters.
 
     Law and geometry of an entry are scaled to the resting length of the data. Raises ParameterError for a model whose
     initial values cannot be estimated, and for an entry that cannot be scaled.
@@ -48,16 +41,16 @@ def find_initial_law(
             laws = model_names(Characteristic)
             text = f" Or name a law: {', '.join(laws)}.{suggestion(name, laws)}"
             raise UnknownNameError(HintedText(error.message, text)) from None
-        return InitialLaw(entry_at_length(entry, *lengths, f"{option} {name}") if len(lengths) == 1 else entry)
+        return entry_at_length(entry, *lengths, f"{option} {name}") if len(lengths) == 1 else entry, ()
     cls = model_class(name, option)
     if not issubclass(cls, Characteristic):
         known = ", ".join(model_names(Characteristic))
         raise ParameterError(f"{option}: {name} is not a characteristic; there are {known}.")
     if issubclass(cls, ContractileSurface):
-        return InitialLaw(Entry(name, name, "chosen", cls.guess(recordings, degree)))
+        return Entry(name, name, "chosen", cls.guess(recordings, degree)), ()
     for candidate in standard_candidates(recordings):
         if type(candidate.law) is cls:
-            return InitialLaw(Entry(name, name, "chosen", candidate.law), candidate.fixed)
+            return Entry(name, name, "chosen", candidate.law), candidate.fixed
     has_length = all("resting_length" in run.constants for run in recordings)
     length = "" if has_length else " Or give the resting length, which allows more models to be initialised from data."
     raise ParameterError(
@@ -151,10 +144,7 @@ def missing_geometry(entry: Entry) -> list[str]:
 
 
 def campaign_entry(campaign: Campaign, title: str, resting_length: float | None = None) -> Entry:
-    """The muscle of a resting length [m] with all identified parts, by default that of the fills.
-
-    Raises IdentificationError without a static characteristic.
-    """
+    """The muscle of a resting length [m], by default of the fills. Raises IdentificationError without a static law."""
     stage, length = campaign.static, resting_length or campaign.resting_length
     law = campaign.law(length)
     if not isinstance(stage, StaticStage) or law is None:

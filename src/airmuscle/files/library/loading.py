@@ -4,9 +4,6 @@ A plant of the library is a file of the same form as a scenario, with its proven
 each number of the tables, by its path or the beginning of its path. Parts of a plant may be named: a muscle and a plant
 of the library or of a file, and an orifice or a driver with the values of a valve, `{ library = "matrix-821" }`; of a
 muscle and of a plant the other keys replace parts.
-
-The readers raise UnknownNameError, FileError, ParameterError or UnitError with the location, and issue the warning of
-an entry as an AirmuscleWarning.
 """
 
 import dataclasses
@@ -84,22 +81,18 @@ def entry_tables(name_or_path: str | Path, kind: type[Any] | None = None) -> tup
 def _tables_of_name(name: str, kind: type[Any] | None) -> tuple[dict[str, Any], Location]:
     """The tables of the entry of this kind, or of any, with a name or a unique beginning of it, and their location."""
     if kind is Entry:
-        _check_law_name(name)
+        noun = next((noun for noun, folder in FOLDERS.items() if name in list_names(folder)), NOUNS[Entry])
+        if noun == NOUNS[ProductEntry]:
+            laws = ", ".join(entries_of_product(name))
+            entries = f"its laws are {laws}" if laws else "no law of it is published; fit one to measurements"
+            what = f"'{name}' is a product, of which the library states the permitted values"
+            raise UnknownNameError(f"{what}; {entries}.")
+        if noun != NOUNS[Entry]:
+            raise UnknownNameError(f"'{name}' is a {noun}; a muscle or a law is required: {', '.join(list_laws())}.")
     noun, folders = ("library entry", list(FOLDERS.values())) if kind is None else (NOUNS[kind], [FOLDERS[NOUNS[kind]]])
     known = {name: folder for folder in folders for name in list_names(folder)}
     name = complete_name(name, sorted(known), noun)
     return read_toml(known[name] / f"{name}.toml"), Location(f"{name}.toml", "", known[name])
-
-
-def _check_law_name(name: str) -> None:
-    """Raise UnknownNameError for the name of a valve, a plant or a product."""
-    noun = next((noun for noun, folder in FOLDERS.items() if name in list_names(folder)), NOUNS[Entry])
-    if noun == NOUNS[ProductEntry]:
-        laws = entries_of_product(name)
-        entries = f"its laws are {', '.join(laws)}" if laws else "no law of it is published; fit one to measurements"
-        raise UnknownNameError(f"'{name}' is a product, of which the library states the permitted values; {entries}.")
-    if noun != NOUNS[Entry]:
-        raise UnknownNameError(f"'{name}' is a {noun}; a muscle or a law is required: {', '.join(list_laws())}.")
 
 
 def plant_tables(name: str) -> tuple[dict[str, Any], Location]:
@@ -129,8 +122,12 @@ def build_entry(tables: Mapping[str, Any], location: Location, kind: type[Any] =
     """
     given: dict[str, Any] = {"name": Path(location.file).stem}
     if kind is PlantEntry:
-        given |= _plant_parts(tables, location)
-        tables = {key: value for key, value in tables.items() if key not in (*SCENARIO_TABLES, "sources")}
+        keys, place = (*SCENARIO_TABLES, "sources"), location.inside("sources")
+        check_keys(tables, ("title", "provenance", "note", "warning", *keys, "reference"), location)
+        sources = read_table(tables.get("sources", {}), None, place, " of paths and sources")
+        given["plant"] = build_plant(tables["plant"], location.inside("plant"))
+        given["sources"] = tuple((path, read_text(sources, path, place, needed=True)) for path in sources)
+        tables = {key: value for key, value in tables.items() if key not in keys}
     cited: tuple[Reference, ...] = ()
     if kind is Entry and "product" in tables:
         if "ratings" in tables:
@@ -148,15 +145,6 @@ def build_entry(tables: Mapping[str, Any], location: Location, kind: type[Any] =
     inside = getattr(entry.characteristic, "geometry", None)
     geometry = inside if entry.geometry is None and isinstance(inside, Geometry) else entry.geometry
     return dataclasses.replace(entry, geometry=geometry, references=(*entry.references, *cited))
-
-
-def _plant_parts(tables: Mapping[str, Any], location: Location) -> dict[str, Any]:
-    """The plant of the tables of a file, and the sources of its numbers."""
-    check_keys(tables, ("title", "provenance", "note", "warning", *SCENARIO_TABLES, "sources", "reference"), location)
-    place = location.inside("sources")
-    sources = read_table(tables.get("sources", {}), None, place, " of paths and sources")
-    texts = tuple((path, read_text(sources, path, place, needed=True)) for path in sources)
-    return {"plant": build_plant(tables["plant"], location.inside("plant")), "sources": texts}
 
 
 def build_plant(table: Any, location: Location) -> Plant:

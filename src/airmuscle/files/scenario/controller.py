@@ -27,7 +27,6 @@ def build_law(table: Any, plant: Plant, units: Mapping[str, str], location: Loca
     """The controller of a table, with the laws inside it; `units` are those of the signals of the plant by name.
 
     The table is read twice: the first time without its numbers, to find the signals that determine their units.
-    Raises ParameterError, UnitError or UnknownNameError with the location.
     """
 
     def built(known: Mapping[str, str] | None) -> Controller:
@@ -156,10 +155,7 @@ def signal_units(plant: Plant, start: Mapping[str, float]) -> dict[str, str]:
 def build_control_loop(
     table: Mapping[str, Any], plant: Plant, units: Mapping[str, str], location: Location
 ) -> ControlLoop:
-    """The control loop of a table [input] with a controller; `units` are those of `signal_units`.
-
-    Raises ParameterError, UnitError, UnknownNameError, FileError or ColumnError with the location.
-    """
+    """The control loop of a table [input] with a controller; `units` are those of `signal_units`."""
     inner, remedy = location.inside("controller"), '. Write model = "PID", its parameters, sample_time and setpoint'
     controller_table = read_table(table["controller"], plant, inner, f"{remedy} in it")
     own = {key: value for key, value in controller_table.items() if key not in LOOP_KEYS}

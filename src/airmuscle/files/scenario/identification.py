@@ -55,7 +55,7 @@ def build_records(
     tables: Mapping[str, Any], shared: Mapping[str, Any], plant: Plant, observed: Observed, location: Location,
     predicted: bool = False,
 ) -> list[tuple[Experiment, Mapping[str, Any]]]:  # fmt: skip
-    """The experiments of all [[record]] of a file, with their tables [input]; as `build_experiment`."""
+    """The experiments of all [[record]] of a file, with their tables [input]."""
     rows = tables.get("record")
     if not isinstance(rows, list) or not rows:
         raise ParameterError(f'{location}: no record is given; write [[record]] with file = "fill.csv" for each.')
@@ -74,8 +74,6 @@ def build_experiment(
     shared     tables with the plant and the input of all records
     recording  if it was read before; then the table needs no file
     predicted  whether the record is predicted: its ambient air replaces that of the plant, which was found elsewhere
-
-    Raises FileError, ParameterError, UnitError, UnknownNameError or ColumnError with the location.
     """
     row: RecordTable = values.table_reader(plant).build(table, location, kind=RecordTable)
     given = dict(values.optional_table(shared, "input", location) if row.input is None else row.input)

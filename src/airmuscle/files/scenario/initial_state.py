@@ -42,10 +42,7 @@ def pressure_names(plant: Plant) -> tuple[str, ...]:
 def read_initial_values(
     table: Mapping[str, Any], plant: Plant, location: Location
 ) -> tuple[dict[str, float], dict[str, float]]:
-    """The stated gauge pressures of the muscles [Pa], and the values of other states [SI], by name.
-
-    Raises ParameterError or UnitError with the location.
-    """
+    """The stated gauge pressures of the muscles [Pa], and the values of other states [SI], by name."""
     names = pressure_names(plant)
     units = {PRESSURE: "Pa", **dict.fromkeys(names, "Pa")}
     units |= {s.name: s.unit for s in plant.states if not s.name.endswith("air_mass")}

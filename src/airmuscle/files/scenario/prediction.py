@@ -192,10 +192,7 @@ def _with_resting_length(recording: Recording, length: float) -> tuple[Recording
 
 
 def _band(entry: Entry, quantity: str, recording: Recording) -> tuple[float | None, str, list[str]]:
-    """The half width of the band of a record [SI], None if it is not known; its source or why not; and notes.
-
-    It is that of the measured specimens, of isometric runs for a held length, or that of other specimens.
-    """
+    """The half width of the band of a record [SI], None if it is not known; its source, or why not; and notes."""
     band = entry.error_band
     if band is None or band.quantity != quantity:
         return None, "", []

@@ -143,8 +143,7 @@ def build_scenario(
 ) -> Scenario:
     """The scenario of the tables of a file.
 
-    `plant` replaces the table [plant], `equilibrium` replaces the computed initial equilibrium. Raises FileError,
-    ParameterError, UnitError or UnknownNameError with the location.
+    `plant` replaces the table [plant], `equilibrium` the computed initial equilibrium. Raises as `load_scenario`.
     """
     check_keys(tables, [field.name for field in dataclasses.fields(ScenarioTables)], location)
     for key in ("plant", "run"):

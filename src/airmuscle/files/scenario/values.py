@@ -39,10 +39,7 @@ class Number:
 
 @dataclasses.dataclass(frozen=True)
 class BySignal:
-    """Reader of a table of numbers, or of pairs of minimum and maximum, by the names of quantities of the plant.
-
-    unit  of all numbers; by default that of the quantity, followed by `per`
-    """
+    """Reader of numbers, or pairs (minimum, maximum), by the names of quantities, in `unit` or theirs with `per`."""
 
     unit: str | None = None
     per: str = ""
@@ -202,10 +199,7 @@ RESERVED_KEYS = tuple(field.name for field in dataclasses.fields(SignalTable))
 def build_input_signal(
     table: Mapping[str, Any], commands: Sequence[Input], location: Location, unknown_name: str = NO_INPUT
 ) -> InputSignal:
-    """The input signal of a table. `unknown_name` begins the error message on a name that is not among the commands.
-
-    Raises ParameterError, UnitError, UnknownNameError, FileError or ColumnError with the location.
-    """
+    """The input signal of a table; `unknown_name` begins the error message on a name that is not among the commands."""
     if "controller" in table:
         raise ParameterError(f"{location}: only a scenario has a controller; give commanded inputs as rows or a file.")
     units = {command.name: command.unit for command in commands}

@@ -154,19 +154,13 @@ def _points(recording: Recording, length: float) -> tuple[Array, Array, Array]:
     coarse = slice(None, None, max(1, path.size // 400))
     travelled = np.append(0.0, np.cumsum(np.abs(np.diff(path[coarse]))))
     by_path = np.interp(np.linspace(0.0, travelled[-1], POINTS // 2), travelled, time[coarse])
-    instants = np.unique(np.concatenate([np.linspace(0.0, time[-1], POINTS // 2), by_path]))
-    instants = _separated(instants, float(time[-1]) / (8 * POINTS))
-    return instants, np.interp(instants, time, pressure), np.interp(instants, time, path)
-
-
-def _separated(instants: Array, distance: float) -> Array:
-    """The instants without those that follow another one too closely, always with the first and the last."""
-    first, *between, last = instants.tolist()
-    kept = [first]
-    for instant in between:
+    first, *between, last = np.unique(np.concatenate([np.linspace(0.0, time[-1], POINTS // 2), by_path])).tolist()
+    kept, distance = [first], float(time[-1]) / (8 * POINTS)
+    for instant in between:  # without those that follow another one too closely
         if instant - kept[-1] >= distance and last - instant >= distance:
             kept.append(instant)
-    return np.array([*kept, last])
+    instants = np.array([*kept, last])
+    return instants, np.interp(instants, time, pressure), np.interp(instants, time, path)
 
 
 def scenario_text(scenario: Scenario) -> str:

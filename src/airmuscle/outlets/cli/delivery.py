@@ -115,10 +115,7 @@ class Execution:
             yield min(local, tasks or local)
 
     def writes(self, out: Path) -> bool:
-        """Whether this process writes the output; false with a message if another one that has joined does.
-
-        Raises FileError for a folder that cannot be written to.
-        """
+        """Whether this process writes the output; false with a message if another one does. Raises FileError."""
         try:
             check_writable(out)
         except FolderInUseError:

@@ -178,8 +178,8 @@ def approximate(name: Name, model: Model, request: ApproximateRequest, out: Out 
     grid = sample_on_grid(entry.characteristic, limits, GRID_POINTS)
     length = getattr(entry.geometry, "resting_length", None)
     data = grid if length is None else grid.with_constants(resting_length=length)
-    initial = find_initial_law(model, [data], request.degree, "MODEL")
-    found = approximate_law(entry.characteristic, initial.entry.characteristic, limits)
+    initial, _ = find_initial_law(model, [data], request.degree, "MODEL")
+    found = approximate_law(entry.characteristic, initial.characteristic, limits)
     chapter, original = found.chapter(), type(entry.characteristic).__name__
     if out is not None:
         note = f"Approximated from {entry.name}: {found.summary}. {entry.note}".strip()

@@ -77,27 +77,23 @@ def hysteresis(
     chapters = hysteresis_chapters(fits, joint)
     if held is not None:
         chapters.append(creep_chapter(held.verdict, held.sentences, held.elements, held.standard_errors))
-    notes, parts = delay_notes(find_delay(recordings)), list[tuple[str, Any, str, str]]()
+    notes, parts = [*delay_notes(find_delay(recordings))], list[tuple[str, Any, str, str]]()
     if selected is None:
         of_all = " for all runs together" if joint else ""
-        notes = [*notes, f"no friction file: no model that a plant can use is justified{of_all}"]
+        notes.append(f"no friction file: no model that a plant can use is justified{of_all}")
     else:
         parts.append(("friction", selected.friction, selected.verdict, f"Friction from {selected.origin}"))
     if held is not None and held.elements.stiffnesses:
         parts.append(("creep", held.elements, held.verdict, "Creep"))
     elif held is not None:
-        notes = [*notes, "no creep elements are written"]
+        notes.append("no creep elements are written")
     chapters[0] = dataclasses.replace(chapters[0], notes=(*chapters[0].notes, *notes))
     chapters += reading_chapters(recordings)
     deliver("hysteresis", chapters, json=json, out=out, title="Friction", files=_files(entry, parts))
 
 
 def _files(entry: Entry | None, parts: Sequence[tuple[str, Any, str, str]]) -> dict[str, str]:
-    """The file of the muscle with friction and creep elements, whose checks apply to the characteristic alone and are
-    kept, or the files of these parts.
-
-    parts  name, object, verdict, and what the note of the muscle says before the verdict
-    """
+    """The file of the muscle with these parts (name, object, verdict, origin), or without one those of the parts."""
     if entry is None:
         return {f"{name}.toml": f"# {verdict}\n{part_toml(name, part)}" for name, part, verdict, _ in parts}
     if not parts:
@@ -107,5 +103,5 @@ def _files(entry: Entry | None, parts: Sequence[tuple[str, Any, str, str]]) -> d
     uncertainty = entry.uncertainty and without_parts(entry.uncertainty, changes)
     completed = dataclasses.replace(
         entry, name="muscle", note=note, uncertainty=uncertainty, error_band=None, **changes
-    )  # the band was stated without them
+    )  # the band was stated without them; the checks are those of the characteristic alone
     return {"muscle.toml": to_toml(completed)}

@@ -4,7 +4,7 @@ import dataclasses
 import itertools
 import re
 import tomllib
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
@@ -13,7 +13,7 @@ import typer
 from ...core import Reference, check_known, leaves, quantity, reference, with_parameters
 from ...files.library import PARTS, UNITS, Entry, load, load_law, model_class, scale_entry
 from ...files.library import evaluate as evaluate_entry
-from ...files.library.files import DATA, FOLDERS, LAWS, list_data, list_laws, list_plants, list_products, list_valves
+from ...files.library.files import DATA, FOLDERS, list_data, list_names
 from ...physics.muscle.characteristic import ForceLaw
 from ...physics.muscle.isobars import describe_point
 from ...report.write import rendered_figure, save_table
@@ -174,18 +174,18 @@ def list_entries(json: Json = False) -> None:
 
 def _library_rows() -> list[ListRow]:
     """All library entries, valves, plants and data sets, read from the files without building any model."""
-    parts: tuple[tuple[Path, Iterable[str], Callable[[Mapping[str, Any]], str]], ...] = (
-        (LAWS, list_laws(), _law_kind),
-        (FOLDERS["valve"], list_valves(), lambda tables: f"valve, {tables['valve']['model']}"),
-        (FOLDERS["plant"], list_plants(), lambda tables: f"plant, {tables['plant']['mechanism']['model']}"),
-        (FOLDERS["product"], list_products(), lambda _: "product, Ratings"),
-    )
+    kinds: dict[str, Callable[[Mapping[str, Any]], str]] = {
+        "muscle or law": _law_kind,
+        "valve": lambda tables: f"valve, {tables['valve']['model']}",
+        "plant": lambda tables: f"plant, {tables['plant']['mechanism']['model']}",
+        "product": lambda _: "product, Ratings",
+    }
     data, rows = {name: _data_row(DATA / f"{name}.csv") for name in list_data()}, []
-    for folder, names, kind_of in parts:
-        for name in names:
-            tables = tomllib.loads((folder / f"{name}.toml").read_text(encoding="utf-8"))
+    for noun, kind_of in kinds.items():
+        for name in list_names(FOLDERS[noun]):
+            tables = tomllib.loads((FOLDERS[noun] / f"{name}.toml").read_text(encoding="utf-8"))
             kind, provenance = kind_of(tables), tables["provenance"]
-            if folder == LAWS and name in data:  # one row with the data set of the same name
+            if kind_of is _law_kind and name in data:  # one row with the data set of the same name
                 measured = data.pop(name)
                 kind = f"{kind}; {measured.kind}"
                 provenance = "; ".join(filter(None, dict.fromkeys((provenance, measured.provenance))))

@@ -1,11 +1,10 @@
 """Arguments and options of commands: shared ones, those of declared requests, and completion of names by the shell."""
 
-import contextlib
 import functools
 import inspect
 import math
 import os
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Annotated, Any, TypeVar, get_type_hints
 
@@ -95,26 +94,17 @@ def with_requests(command: Command) -> Command:
 
     @functools.wraps(command)
     def expanded(**values: Any) -> None:
-        for name, cls in classes.items():
-            flags = {each.name: flag_of(each) for each in options_of(cls)}
-            given = {each: values.pop(each) for each in flags}
-            with _usage_errors():
-                values[name] = build(cls, given, flags.__getitem__)
-        with _usage_errors():
+        try:
+            for name, cls in classes.items():
+                flags = {each.name: flag_of(each) for each in options_of(cls)}
+                values[name] = build(cls, {each: values.pop(each) for each in flags}, flags.__getitem__)
             command(**values)
+        except RequestError as error:
+            raise typer.BadParameter(str(error)) from None
 
     setattr(expanded, "__signature__", inspect.Signature(parameters))  # noqa: B010
     expanded.__annotations__ = {parameter.name: parameter.annotation for parameter in parameters}
     return expanded  # type: ignore[return-value]
-
-
-@contextlib.contextmanager
-def _usage_errors() -> Iterator[None]:
-    """Turn an impossible request into an error of usage."""
-    try:
-        yield
-    except RequestError as error:
-        raise typer.BadParameter(str(error)) from None
 
 
 def flag_of(declared: Option) -> str:

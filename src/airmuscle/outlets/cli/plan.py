@@ -61,7 +61,16 @@ def plan(name: Name, request: PlanRequest, out: OptionalFolder = None, json: Jso
       airmuscle plan study.toml --separate circuit.fill.critical_ratio --separate gas.heat_transfer
     """
     if is_path(name) and {"fit", "record"} <= set(read_toml(Path(name))):
-        _plan_record(Path(name), request.separate, out, json)
+        pair = request.separate
+        if len(pair) not in (0, 2):
+            raise RequestError(f"--separate names {len(pair)} parameters; give two, or none")
+        if out is not None:
+            check_writable(out)
+        loaded = load_dynamic_fit(name)
+        chapter = rank_records(loaded.fit(), (pair[0], pair[1]) if pair else None).chapter()
+        chapter = dataclasses.replace(chapter, title=f"{chapter.title}: {loaded.title}")
+        ranking = {PLAN_FILE: lambda path: save_table(chapter.tables[0], path)}
+        deliver("plan", [chapter], json=json, out=out, title="Next record", files=ranking)
         return
     if request.separate:
         raise RequestError("--separate is for a study of fit-dynamic; NAME is a muscle or a law")
@@ -76,16 +85,3 @@ def plan(name: Name, request: PlanRequest, out: OptionalFolder = None, json: Jso
         check_writable(out)
     files = {PLAN_FILE: lambda path: write(design.recording(), path)}
     deliver("plan", [design.chapter()], json=json, out=out, files=files)
-
-
-def _plan_record(study: Path, separate: tuple[str, ...], out: Path | None, json: bool) -> None:
-    """Fit a study and rank the candidate records. Raises RequestError unless none or two parameters are separated."""
-    if len(separate) not in (0, 2):
-        raise RequestError(f"--separate names {len(separate)} parameters; give two, or none")
-    if out is not None:
-        check_writable(out)
-    loaded = load_dynamic_fit(study)
-    chapter = rank_records(loaded.fit(), (separate[0], separate[1]) if separate else None).chapter()
-    chapter = dataclasses.replace(chapter, title=f"{chapter.title}: {loaded.title}")
-    files = {PLAN_FILE: lambda path: save_table(chapter.tables[0], path)}
-    deliver("plan", [chapter], json=json, out=out, title="Next record", files=files)

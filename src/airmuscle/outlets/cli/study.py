@@ -47,10 +47,7 @@ def study(file: StudyFile, execution: Execution, out: Folder = Path("study"), js
 
 
 def _run(study: Study, folder: Path | None, execution: Execution) -> tuple[StudyResult, str]:
-    """The result of the study, and a sentence on the processes that share it.
-
-    A message states how many runs an earlier command has saved in the folder, and at an abort how many are saved.
-    """
+    """The result of the study, and a sentence on the processes that share it. Messages state how many are saved."""
     first = iter([True])
 
     def show(done: int, total: int) -> None:

@@ -61,10 +61,7 @@ def read_braid(text: str, where: str) -> Braid:
 
 
 def with_braid(entry: Entry, braid: Braid | None, recordings: Sequence[Recording]) -> Entry:
-    """The entry of an initial law with the braid of --braid as its geometry; unchanged without it.
-
-    Raises ParameterError for a law with a geometry of its own, and where the resting length is not known.
-    """
+    """The initial entry with the braid of --braid, if any, as its geometry. Raises ParameterError if it cannot."""
     if braid is None:
         return entry
     law = entry.characteristic

@@ -55,9 +55,9 @@ def fit_requested(
     if request.compare:
         return _compare(request, names, recordings, progress, workers)
     assert request.characteristic is not None
-    initial = find_initial_law(request.characteristic, recordings, request.degree)
-    start = with_braid(initial.entry, request.braid, recordings)
-    law, fixed = start.characteristic, (*request.fix, *initial.fixed)
+    initial, scaling = find_initial_law(request.characteristic, recordings, request.degree)
+    start = with_braid(initial, request.braid, recordings)
+    law, fixed = start.characteristic, (*request.fix, *scaling)
     found = fit(
         law, recordings, loss=request.loss(fitted_quantity_of(law).unit), fixed=fixed,
         censoring=UNCENSORED if request.uncensored else None, sigma=1.0 if request.equal_weights else None,
@@ -77,9 +77,8 @@ def _compare(
         check_one_length(resting_lengths(recordings))
     named, candidates = None, None  # without a named law those that the data determine
     if request.characteristic is not None:
-        named = find_initial_law(request.characteristic, recordings, request.degree)
-        law, fixed = named.entry.characteristic, (*request.fix, *named.fixed)
-        own = Candidate(f"{request.characteristic} (named)", law, fixed)
+        named, scaling = find_initial_law(request.characteristic, recordings, request.degree)
+        own = Candidate(f"{request.characteristic} (named)", named.characteristic, (*request.fix, *scaling))
         candidates = [*standard_candidates(recordings), own]
     both = None if request.purpose is None else request.purpose == "both"
     selection = select_law(
@@ -87,7 +86,7 @@ def _compare(
         progress=progress,
     )  # fmt: skip
     best = selection.recommended
-    geometry = named.entry.geometry if named and candidates and best.candidate is candidates[-1] else None
+    geometry = named.geometry if named and candidates and best.candidate is candidates[-1] else None
     initial = Entry(best.candidate.name, best.candidate.name, "chosen", best.candidate.law, geometry)
     unused = []
     if not isinstance(getattr(best.candidate.law, "geometry", None), Geometry):

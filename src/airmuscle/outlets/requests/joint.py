@@ -122,11 +122,7 @@ SCALED = "the scale of its forces is chosen: the record contains pressures and a
 
 
 def _scenarios(fit: ArmFit, names: Sequence[str], title: str, note: str) -> dict[str, str]:
-    """The arm with a pressure regulator for each muscle: at constant set points, and with a PID controller of
-    each angle to be tuned, which commands half the difference of the pressures of its pair.
-
-    names  of the muscles in the order of the pairs, first the one that raises the angle
-    """
+    """The arm at constant set points, and with a PID controller of each angle to be tuned; `names` as in the pairs."""
     middle = np.median(fit.inspection.episodes.rows("pressure"), axis=0)
     levels = [max(float(middle[muscle - 1]), 0.0) for pair in fit.pairs for muscle in pair]
     held = {f"{name}.setpoint": [[0.0, level]] for name, level in zip(names, levels, strict=True)}

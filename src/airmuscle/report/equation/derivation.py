@@ -171,7 +171,18 @@ def _labels(traced: _Traced, powers: Mapping[Node, tuple[int, ...]]) -> dict[Nod
     lists: dict[str, list[Node]] = {}
     for node, leaf in traced.parameters.items():
         lists.setdefault(_INDEX.sub("", leaf.path), []).append(node)
-    names = {node: name for nodes in lists.values() for node, name in _list_labels(nodes, traced, powers).items()}
+    names: dict[Node, str] = {}
+    for nodes in lists.values():
+        leaf = traced.parameters[nodes[0]]
+        base = re.sub(r"\W+", "_", leaf.declared.symbol).strip("_") or "c"
+        if not _INDEX.search(leaf.path):
+            names[nodes[0]] = base
+            continue
+        indices = ["".join(map(str, powers.get(node, ()))) for node in nodes]
+        if "" in indices or len(set(indices)) < len(indices):
+            indices = [str(i) for i in range(len(nodes))]
+        base = re.sub(r"_(ij|i|j|k)$", "", base)
+        names |= {node: f"{base}_{index}" for node, index in zip(nodes, indices, strict=True)}
     counts = Counter(names.values())
     taken = {symbol.name for symbol in ARGUMENTS.values()} | {PRESSURE_IN_BAR.name}
     for node, leaf in traced.parameters.items():
@@ -179,19 +190,6 @@ def _labels(traced: _Traced, powers: Mapping[Node, tuple[int, ...]]) -> dict[Nod
             owner = re.sub(r"\W+", "_", _INDEX.sub("", leaf.path).rpartition(".")[0]) or "law"
             names[node] = f"{names[node]}_{owner}"
     return names
-
-
-def _list_labels(nodes: Sequence[Node], traced: _Traced, powers: Mapping[Node, tuple[int, ...]]) -> dict[Node, str]:
-    """The names of the coefficients of one list, by their powers if these differ, or of one parameter."""
-    leaf = traced.parameters[nodes[0]]
-    base = re.sub(r"\W+", "_", leaf.declared.symbol).strip("_") or "c"
-    if not _INDEX.search(leaf.path):
-        return {nodes[0]: base}
-    base = re.sub(r"_(ij|i|j|k)$", "", base)
-    indices = ["".join(map(str, powers.get(node, ()))) for node in nodes]
-    if "" in indices or len(set(indices)) < len(indices):
-        indices = [str(i) for i in range(len(nodes))]
-    return {node: f"{base}_{index}" for node, index in zip(nodes, indices, strict=True)}
 
 
 def _named(
