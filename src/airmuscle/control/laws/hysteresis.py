@@ -9,7 +9,7 @@ import numpy as np
 from ...core import Array, Reference, Value, model, ops, parameter, select_prefix, with_prefix
 from ...core.errors import ParameterError, check_known
 from ...engine.loop import ControlLaw, EnclosingLaw, Measurement, Memory, Sampled
-from ...physics.muscle.friction.prandtl_ishlinskii import KUHNEN2003
+from ...physics.muscle.friction.slip_elements import KUHNEN2003
 
 
 @model

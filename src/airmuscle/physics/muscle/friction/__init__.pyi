@@ -2,9 +2,9 @@ from .base import Friction as Friction
 from .base import IdentifiedFriction as IdentifiedFriction
 from .base import NoFriction as NoFriction
 from .base import PressureScaledFriction as PressureScaledFriction
-from .bouc_wen import BoucWen as BoucWen
-from .dahl import Dahl as Dahl
-from .lugre import LuGre as LuGre
-from .maxwell_slip import MaxwellSlip as MaxwellSlip
+from .bristle import BoucWen as BoucWen
+from .bristle import Dahl as Dahl
+from .bristle import LuGre as LuGre
 from .path import LoopScales as LoopScales
-from .prandtl_ishlinskii import PrandtlIshlinskii as PrandtlIshlinskii
+from .slip_elements import MaxwellSlip as MaxwellSlip
+from .slip_elements import PrandtlIshlinskii as PrandtlIshlinskii

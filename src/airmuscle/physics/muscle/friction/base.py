@@ -70,10 +70,6 @@ class Friction(abc.ABC):
         """Factor of the force at a gauge pressure [Pa]; 1 unless the friction depends on the pressure."""
         return 1.0
 
-    def initial_state(self) -> dict[str, Value]:
-        """Bristle deflections of the relaxed state, all zero."""
-        return {state.name: 0.0 for state in self.states}
-
 
 @model
 class NoFriction(Friction):
@@ -102,18 +98,10 @@ class FrictionWrapper(Friction):
     states = forwarded("inner.states")
     presliding_distance = forwarded("inner.presliding_distance")
     identified_range = forwarded("inner.identified_range")
-
-    def pressure_factor(self, pressure: Value) -> Value:
-        return self.inner.pressure_factor(pressure)
-
-    def rates(self, bristles: Values, speed: Value) -> dict[str, Value]:
-        return self.inner.rates(bristles, speed)
-
-    def force(self, bristles: Values, speed: Value) -> Value:
-        return self.inner.force(bristles, speed)
-
-    def force_along(self, displacement: Any, time: Any = None) -> Any:
-        return self.inner.force_along(displacement, time)
+    pressure_factor = forwarded("inner.pressure_factor")
+    rates = forwarded("inner.rates")
+    force = forwarded("inner.force")
+    force_along = forwarded("inner.force_along")
 
 
 @model

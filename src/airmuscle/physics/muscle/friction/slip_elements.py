@@ -1,10 +1,12 @@
-"""Maxwell-slip friction model: parallel springs, each sliding at its deflection limit."""
+"""Friction of parallel elements that slide at their limits: Maxwell slip, and the model of Prandtl and Ishlinskii."""
 
 from typing import Any, ClassVar, Self
 
 from ....core import ParameterError, Reference, StateVariable, Value, Values, model, ops, parameter, published
 from .base import Friction
 from .path import LoopScales, stop_operators
+
+KUHNEN2003 = published("kuhnen-2003")
 
 
 def element_rate(deflection: Value, limit: Value, transition: Value, speed: Value) -> Value:
@@ -94,3 +96,70 @@ class MaxwellSlip(SlipElements):
 
     def force_along(self, displacement: Any, time: Any = None) -> Any:
         return self.element_deflections(displacement) @ self.stiffnesses
+
+
+@model
+class PrandtlIshlinskii(SlipElements):
+    """Modified Prandtl-Ishlinskii model: F = S(Sum k_i E_ri[x]),  S(u) = u + Sum w_j S_dj(u).
+
+    E_r: stop operator, which follows x within the limits -r..r. S_d: dead zone, max(u - d, 0) for d > 0 and
+    min(u - d, 0) for d < 0. x: displacement [m]; k_i, r_i: stiffness and limit of each stop; d_j [N], w_j [1]:
+    threshold and weight of each dead zone. S must be increasing, otherwise friction would supply energy: on either
+    side, one plus the sum of the active weights must not be negative. Without dead zones the model is the Maxwell-slip
+    model. `force_along` is exact; in a plant a stop begins to slide over the last fraction eta of its deflection, as in
+    MaxwellSlip. Stop operators instead of Kuhnen's play operators give a force that saturates; the remainder
+    x - E_r[x] belongs to the parallel spring of the muscle. Reference: Kuhnen (2003); Al Janaideh et al. (2011).
+    """
+
+    references: ClassVar[tuple[Reference, ...]] = (KUHNEN2003, published("al-janaideh-2011"))
+    element: ClassVar[tuple[str, str]] = ("stop", "stop")
+
+    stiffnesses: tuple[float, ...] = parameter("N/m", "k_i", "stiffness of each stop", bounds=(0.0, 1e9))
+    limits: tuple[float, ...] = parameter("m", "r_i", "deflection limit of each stop", bounds=(1e-9, 1.0), fitted=False)
+    thresholds: tuple[float, ...] = parameter(
+        "N", "d_j", "threshold force of each dead zone", bounds=(-1e5, 1e5), fitted=False, default=()
+    )
+    weights: tuple[float, ...] = parameter("1", "w_j", "weight of each dead zone", bounds=(-1.0, 100.0), default=())
+    transition: float = parameter(
+        "1", "eta", "fraction of the deflection over which sliding begins in a plant", bounds=(1e-4, 1.0),
+        fitted=False, default=0.05,
+    )  # fmt: skip
+
+    @classmethod
+    def guess(cls, scales: LoopScales) -> Self:
+        return cls(
+            scales.element_stiffnesses, scales.element_limits, (0.1 * scales.amplitude, -0.1 * scales.amplitude),
+            (0.0, 0.0),
+        )  # fmt: skip
+
+    def check(self) -> None:
+        super().check()
+        if len(self.thresholds) != len(self.weights) or 0.0 in self.thresholds:
+            raise ParameterError(
+                f"PrandtlIshlinskii: {len(self.thresholds)} thresholds and {len(self.weights)} weights; give one "
+                "threshold, other than 0, and one weight per dead zone."
+            )
+        for sign in (1.0, -1.0):
+            slope = 1.0
+            for threshold, weight in sorted(zip(self.thresholds, self.weights, strict=True), key=lambda z: abs(z[0])):
+                slope += weight if sign * threshold > 0 else 0.0
+                if slope < 0:
+                    raise ParameterError(
+                        f"PrandtlIshlinskii: with the weight {weight:g} at {threshold:g} N the force would decrease "
+                        "with deflection, and friction would supply energy. On either side of zero force, the sum of "
+                        "the weights must not be less than -1."
+                    )
+
+    def force(self, bristles: Values, speed: Value) -> Value:
+        return self.apply_dead_zones(super().force(bristles, speed))
+
+    def apply_dead_zones(self, force: Value) -> Value:
+        """S(u): force [N] after the dead zones, from the force u [N] of the stops."""
+        total = force
+        for threshold, weight in zip(self.thresholds, self.weights, strict=True):
+            excess = force - threshold
+            total = total + weight * ops.where(threshold > 0, ops.maximum(excess, 0.0), ops.minimum(excess, 0.0))
+        return total
+
+    def force_along(self, displacement: Any, time: Any = None) -> Any:
+        return self.apply_dead_zones(stop_operators(displacement, self.limits) @ self.stiffnesses)
