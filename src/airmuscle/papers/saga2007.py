@@ -13,7 +13,7 @@ import airmuscle as am
 from ..core import autodiff
 from ..physics.muscle.characteristic.saga2007 import RUBBER_TEST_STRAIN
 from ..physics.muscle.geometry.meridian import FERRARESI_2001, SAGA_2007
-from ..physics.muscle.geometry.pleated import DAERDEN_LEFEBER_2001
+from ..physics.muscle.geometry.straight_fibre import DAERDEN_LEFEBER_2001
 from ..report.chapter import Chapter, Table
 from ..report.claims import Claim, claims_of
 from . import saga2007_muscle as values

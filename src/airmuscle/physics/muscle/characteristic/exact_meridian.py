@@ -8,14 +8,12 @@ import numpy as np
 from ....core import Array, Reference, Value, model, parameter
 from ..geometry.base import Profile, check_contraction_range
 from ..geometry.meridian import SAGA_2007, CircularArc
-from ..geometry.pleated import DAERDEN_LEFEBER_2001, PleatedTube, unwrap_scalar
+from ..geometry.straight_fibre import DAERDEN_LEFEBER_2001, PleatedTube, unwrap_scalar
 from .base import PressureLaw, Slopes
 from .rubber import RubberLaw, RubberLine
 from .solve import as_arrays, check_numbers, check_solution, find_first_root
 
 NODES = 120  # Gauss points over half the meridian
-
-
 _MAX_ITERATIONS = 60
 _LOAD_STEPS = (1.0, 0.7, 0.5, 0.35, 0.25, 0.18, 0.12, 0.08, 0.05, 0.03, 0.02, 0.01, 0.005, 0.002, 0.0)
 _LENGTH_TOLERANCE = 1e-13
@@ -126,19 +124,15 @@ class ExactMeridian(RubberLaw, PressureLaw):
         start = np.maximum((load + rubber) / area, 1.05 * self._min_pressure(radius))
         shape = self._solve_shape(c, MeridianShape(radius, start, load, None, None), unknown=1)
         failed = np.isnan(shape.pressure)
-        if failed.any():
-            self._solve_by_unloading(shape, c, load, start * area, failed)
+        if failed.any():  # by continuation from a larger load, which is reduced step by step
+            c, target, extra = c[failed], load[failed], (start * area)[failed]
+            radius, area, rubber = self._circle_estimate(c)
+            other = MeridianShape(radius, (target + extra + rubber) / area, target, None, None)
+            for fraction in _LOAD_STEPS:
+                other = self._solve_shape(c, other._replace(force=target + fraction * extra), unknown=1)
+            for values, solved in zip(shape, other, strict=True):
+                values[..., failed] = solved
         return MeridianShape(*map(unwrap_scalar, shape))
-
-    def _solve_by_unloading(self, shapes: MeridianShape, contraction: Any, load: Any, scale: Any, failed: Any) -> None:
-        """Solve the failed shapes in place by continuation from a larger load, which is reduced step by step."""
-        c, target, extra = contraction[failed], load[failed], scale[failed]
-        radius, area, rubber = self._circle_estimate(c)
-        shape = MeridianShape(radius, (target + extra + rubber) / area, target, None, None)
-        for fraction in _LOAD_STEPS:
-            shape = self._solve_shape(c, shape._replace(force=target + fraction * extra), unknown=1)
-        for values, solved in zip(shapes, shape, strict=True):
-            values[..., failed] = solved
 
     def shape_at_pressure(self, pressure: Value, contraction: Value) -> MeridianShape:
         """Shape at a pressure [Pa] and a contraction [1]; its force is NaN if there is no solution."""

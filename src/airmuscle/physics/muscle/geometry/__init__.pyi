@@ -8,8 +8,8 @@ from .meridian import Catenary as Catenary
 from .meridian import CircularArc as CircularArc
 from .meridian import Parabola as Parabola
 from .meridian import TrueArcParabola as TrueArcParabola
-from .pleated import PleatedTube as PleatedTube
 from .straight_fibre import HalfShellFibreSum as HalfShellFibreSum
+from .straight_fibre import PleatedTube as PleatedTube
 from .straight_fibre import PrintedFibreSum as PrintedFibreSum
 from .straight_fibre import StraightFibre as StraightFibre
 from .straight_fibre import UniformFibreSum as UniformFibreSum
