@@ -8,7 +8,7 @@ from typing import Any, ClassVar, TypeVar
 from ...core import ParameterError, Reference, Value, Values, model, ops
 from ...core.declaration import forwarded
 from ...core.system import Input, StateVariable, add_prefix, select_prefix, with_prefix
-from .gas import NO_FLOW, Air, AirStates, Ambient, Flow
+from .gas import NO_FLOW, Air, Airs, Ambient, Flow
 from .supply import AirSource, SharedSupply, Supply
 from .valve import Orifice, orifice_flow
 
@@ -59,14 +59,12 @@ class Circuit(abc.ABC):
         """State variables without those of the supply."""
         return ()
 
-    def own_steady_state(self, air_states: AirStates, ambient: Ambient) -> dict[str, Value]:
+    def own_steady_state(self, muscles: Airs, ambient: Ambient) -> dict[str, Value]:
         """Steady state without the supply, for zero inputs and the air states of the muscles."""
         return {}
 
     @abc.abstractmethod
-    def supplied_flow(
-        self, inlet: Air, air_states: AirStates, state: Values, inputs: Values, ambient: Ambient
-    ) -> CircuitFlows:
+    def supplied_flow(self, inlet: Air, muscles: Airs, state: Values, inputs: Values, ambient: Ambient) -> CircuitFlows:
         """Flows for the air state at the supply and the air states of the muscles; `rates` without the supply."""
 
     def validity_warnings(self, columns: Mapping[str, Any], ambient: Ambient) -> dict[str, str]:
@@ -82,14 +80,14 @@ class Circuit(abc.ABC):
         """State variables of circuit and supply."""
         return (*self.own_states(ambient), *add_prefix(SUPPLY, self.supply.states(ambient)))
 
-    def steady_state(self, air_states: AirStates, ambient: Ambient) -> dict[str, Value]:
+    def steady_state(self, muscles: Airs, ambient: Ambient) -> dict[str, Value]:
         """Steady state of circuit and supply for zero inputs and the air states of the muscles."""
-        return {**self.own_steady_state(air_states, ambient), **with_prefix(SUPPLY, self.supply.steady_state(ambient))}
+        return {**self.own_steady_state(muscles, ambient), **with_prefix(SUPPLY, self.supply.steady_state(ambient))}
 
-    def compute_flows(self, air_states: AirStates, state: Values, inputs: Values, ambient: Ambient) -> CircuitFlows:
+    def compute_flows(self, muscles: Airs, state: Values, inputs: Values, ambient: Ambient) -> CircuitFlows:
         """Flows and rates of circuit and supply; `drawn` is the flow from outside the plant."""
         supply = select_prefix(SUPPLY, state)
-        flows = self.supplied_flow(self.supply.air(supply, ambient), air_states, state, inputs, ambient)
+        flows = self.supplied_flow(self.supply.air(supply, ambient), muscles, state, inputs, ambient)
         rates, inflow = self.supply.balance(supply, flows.drawn, ambient)
         return dataclasses.replace(flows, rates={**flows.rates, **with_prefix(SUPPLY, rates)}, drawn=inflow)
 
@@ -114,7 +112,11 @@ def port_prefix(number: int) -> str:
 
 def key_by_muscle(prefixes: Sequence[str], values: Mapping[str, T]) -> dict[str, T]:
     """The values of a circuit, with the prefix of port i replaced by that of muscle i."""
-    return {_replace_port_prefix(name, prefixes): value for name, value in values.items()}
+    muscles, keyed = {port_prefix(number): prefix for number, prefix in enumerate(prefixes, 1)}, dict[str, T]()
+    for name, value in values.items():
+        port, dot, rest = name.partition(".")
+        keyed[muscles[port + dot] + rest if port + dot in muscles else name] = value
+    return keyed
 
 
 def key_by_port(prefixes: Sequence[str], values: Mapping[str, T]) -> dict[str, T]:
@@ -123,13 +125,6 @@ def key_by_port(prefixes: Sequence[str], values: Mapping[str, T]) -> dict[str, T
     for number, prefix in enumerate(prefixes, 1):
         keyed |= {port_prefix(number) + n.removeprefix(prefix): v for n, v in values.items() if n.startswith(prefix)}
     return keyed
-
-
-def _replace_port_prefix(name: str, prefixes: Sequence[str]) -> str:
-    for number, prefix in enumerate(prefixes, 1):
-        if name.startswith(port_prefix(number)):
-            return prefix + name.removeprefix(port_prefix(number))
-    return name
 
 
 def ambient_air(ambient: Ambient) -> Air:
@@ -158,10 +153,8 @@ class FillDischarge(ValvePair):
 
     inputs = (Input("fill"), Input("discharge"))
 
-    def supplied_flow(
-        self, inlet: Air, air_states: AirStates, state: Values, inputs: Values, ambient: Ambient
-    ) -> CircuitFlows:
-        return self.valve_flows(inlet, air_states[0], inputs["fill"], inputs["discharge"], ambient)
+    def supplied_flow(self, inlet: Air, muscles: Airs, state: Values, inputs: Values, ambient: Ambient) -> CircuitFlows:
+        return self.valve_flows(inlet, muscles[0], inputs["fill"], inputs["discharge"], ambient)
 
 
 @model
@@ -170,11 +163,9 @@ class ThreePositionValve(ValvePair):
 
     inputs = (Input("valve", "1", -1.0, 1.0, "1 fill, 0 closed, -1 discharge"),)
 
-    def supplied_flow(
-        self, inlet: Air, air_states: AirStates, state: Values, inputs: Values, ambient: Ambient
-    ) -> CircuitFlows:
+    def supplied_flow(self, inlet: Air, muscles: Airs, state: Values, inputs: Values, ambient: Ambient) -> CircuitFlows:
         position = inputs["valve"]
-        return self.valve_flows(inlet, air_states[0], ops.maximum(position, 0.0), ops.maximum(-position, 0.0), ambient)
+        return self.valve_flows(inlet, muscles[0], ops.maximum(position, 0.0), ops.maximum(-position, 0.0), ambient)
 
 
 @model
@@ -185,9 +176,7 @@ class ClosedChamber(Circuit):
 
     inputs = ()
 
-    def supplied_flow(
-        self, inlet: Air, air_states: AirStates, state: Values, inputs: Values, ambient: Ambient
-    ) -> CircuitFlows:
+    def supplied_flow(self, inlet: Air, muscles: Airs, state: Values, inputs: Values, ambient: Ambient) -> CircuitFlows:
         return CircuitFlows((NO_FLOW,))
 
 
@@ -198,11 +187,9 @@ class WithLeak(CircuitWrapper):
     circuit: Circuit
     leak: Orifice
 
-    def supplied_flow(
-        self, inlet: Air, air_states: AirStates, state: Values, inputs: Values, ambient: Ambient
-    ) -> CircuitFlows:
-        inner = self.circuit.supplied_flow(inlet, air_states, state, inputs, ambient)
-        leakage = [orifice_flow(self.leak, air, ambient_air(ambient)) for air in air_states]
+    def supplied_flow(self, inlet: Air, muscles: Airs, state: Values, inputs: Values, ambient: Ambient) -> CircuitFlows:
+        inner = self.circuit.supplied_flow(inlet, muscles, state, inputs, ambient)
+        leakage = [orifice_flow(self.leak, air, ambient_air(ambient)) for air in muscles]
         flows = tuple(flow - leak for flow, leak in zip(inner.flows, leakage, strict=True))
         return dataclasses.replace(inner, flows=flows, exhausted=sum(leakage, inner.exhausted))
 
@@ -236,11 +223,11 @@ class Manifold(Circuit):
     def _named_branches(self) -> Iterator[tuple[str, Circuit]]:
         return zip((f"{name}." for name in self.names), self.branches, strict=True)
 
-    def _branch_air(self, air_states: AirStates) -> Iterator[tuple[str, Circuit, tuple[Air, ...]]]:
+    def _branch_air(self, muscles: Airs) -> Iterator[tuple[str, Circuit, tuple[Air, ...]]]:
         """Prefix and circuit of each branch, with the air states of its muscles."""
         first = 0
         for name, branch in self._named_branches():
-            yield name, branch, air_states[first : first + branch.port_count]
+            yield name, branch, muscles[first : first + branch.port_count]
             first += branch.port_count
 
     @property
@@ -254,9 +241,9 @@ class Manifold(Circuit):
     def own_states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
         return tuple(s for name, branch in self._named_branches() for s in add_prefix(name, branch.own_states(ambient)))
 
-    def own_steady_state(self, air_states: AirStates, ambient: Ambient) -> dict[str, Value]:
+    def own_steady_state(self, muscles: Airs, ambient: Ambient) -> dict[str, Value]:
         state: dict[str, Value] = {}
-        for name, branch, branch_air in self._branch_air(air_states):
+        for name, branch, branch_air in self._branch_air(muscles):
             state |= with_prefix(name, branch.own_steady_state(branch_air, ambient))
         return state
 
@@ -266,14 +253,11 @@ class Manifold(Circuit):
             warnings |= with_prefix(name, branch.validity_warnings(select_prefix(name, columns), ambient))
         return warnings
 
-    def supplied_flow(
-        self, inlet: Air, air_states: AirStates, state: Values, inputs: Values, ambient: Ambient
-    ) -> CircuitFlows:
+    def supplied_flow(self, inlet: Air, muscles: Airs, state: Values, inputs: Values, ambient: Ambient) -> CircuitFlows:
         total = CircuitFlows(())
-        for name, branch, branch_air in self._branch_air(air_states):
-            part = branch.supplied_flow(
-                inlet, branch_air, select_prefix(name, state), select_prefix(name, inputs), ambient
-            )
+        for name, branch, branch_air in self._branch_air(muscles):
+            own, commands = select_prefix(name, state), select_prefix(name, inputs)
+            part = branch.supplied_flow(inlet, branch_air, own, commands, ambient)
             rates, outputs = with_prefix(name, part.rates), with_prefix(name, part.outputs)
             total += dataclasses.replace(part, rates=rates, outputs=outputs)
         return total

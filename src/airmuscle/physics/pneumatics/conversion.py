@@ -1,6 +1,6 @@
-"""Conversion between the sonic conductance C and other flow figures of data sheets; combined valves.
+"""Sonic conductance C from other flow figures of data sheets; combined valves.
 
-The flow laws use C [m3/(s Pa)]. The functions of each pair are inverse to each other.
+The flow laws use C [m3/(s Pa)]. All figures are proportional to it, except that the diameter is so to its root.
 
     nominal flow    volume flow at the reference atmosphere of ISO 8778 from 6 to 5 bar gauge, ambient pressure 1 bar:
                     Q = C p1 phi(p2/p1), p1 = 7 bar, p2 = 6 bar absolute; reproduces SMC's tables of C, b and Q exactly
@@ -40,79 +40,45 @@ _KV_AREA: float = 1.0 / 3600.0 / ops.sqrt(2.0 * 1e5 / 1000.0)
 """Area [m2] of Kv = 1: 1 m3/h of water, 1000 kg/m3, at 1 bar."""
 
 
-def nominal_flow(conductance: float, critical_ratio: float) -> float:
-    """Nominal volume flow [m3/s] at the reference atmosphere, from 6 to 5 bar gauge. Raises ParameterError."""
-    return flow_at_reference(conductance, critical_ratio, NOMINAL_UPSTREAM, NOMINAL_DOWNSTREAM)
-
-
 def conductance_from_nominal_flow(volume_flow: float, critical_ratio: float) -> float:
     """C [m3/(s Pa)] from the nominal flow [m3/s] at the reference atmosphere. Raises ParameterError."""
     return conductance_from_flow(volume_flow, critical_ratio, NOMINAL_UPSTREAM, NOMINAL_DOWNSTREAM)
 
 
-def flow_at_reference(conductance: float, critical_ratio: float, upstream: float, downstream: float) -> float:
-    """Volume flow [m3/s] at the reference atmosphere between two absolute pressures [Pa], for air at 293.15 K.
-
-    Raises ParameterError for a value that is not positive and finite, or if `downstream` is not less than `upstream`.
-    """
-    _check_positive("conductance", conductance)
-    return conductance * _unit_flow(critical_ratio, upstream, downstream)
-
-
 def conductance_from_flow(volume_flow: float, critical_ratio: float, upstream: float, downstream: float) -> float:
     """C [m3/(s Pa)] from a volume flow [m3/s] at the reference atmosphere between two absolute pressures [Pa].
 
-    Raises ParameterError.
+    The air has 293.15 K. Raises ParameterError for a value that is not positive and finite, or if `downstream` is not
+    less than `upstream`.
     """
-    _check_positive("volume_flow", volume_flow)
-    return volume_flow / _unit_flow(critical_ratio, upstream, downstream)
-
-
-def kv(conductance: float, critical_ratio: float) -> float:
-    """Kv [m3/h] from the sonic conductance. Raises ParameterError."""
-    _check_positive("conductance", conductance)
-    return conductance * REFERENCE_DENSITY * _REFERENCE_SPEED / (_KV_AREA * _near_equal_factor(critical_ratio))
+    return _positive("volume_flow", volume_flow) / _unit_flow(critical_ratio, upstream, downstream)
 
 
 def conductance_from_kv(kv: float, critical_ratio: float) -> float:
     """C [m3/(s Pa)] from Kv [m3/h]. Raises ParameterError."""
-    _check_positive("Kv", kv)
-    return kv * _KV_AREA * _near_equal_factor(critical_ratio) / (REFERENCE_DENSITY * _REFERENCE_SPEED)
-
-
-def cv(conductance: float, critical_ratio: float) -> float:
-    """Cv [US gallons per minute] from the sonic conductance. Raises ParameterError."""
-    return kv(conductance, critical_ratio) / KV_PER_CV
+    _positive("Kv", kv)
+    ratio = Valve(1e-8, critical_ratio).critical_ratio  # Valve declares the bounds
+    return kv * _KV_AREA * float(ops.sqrt(1.0 - ratio)) / (REFERENCE_DENSITY * _REFERENCE_SPEED)
 
 
 def conductance_from_cv(cv: float, critical_ratio: float) -> float:
     """C [m3/(s Pa)] from Cv [US gallons per minute]. Raises ParameterError."""
-    _check_positive("Cv", cv)
-    return conductance_from_kv(KV_PER_CV * cv, critical_ratio)
-
-
-def effective_area(conductance: float) -> float:
-    """Effective area S [m2] from the sonic conductance. Raises ParameterError."""
-    _check_positive("conductance", conductance)
-    return conductance * REFERENCE_DENSITY * _REFERENCE_SPEED / _NOZZLE_FACTOR
+    return conductance_from_kv(KV_PER_CV * _positive("Cv", cv), critical_ratio)
 
 
 def conductance_from_area(area: float) -> float:
     """C [m3/(s Pa)] from the effective area S [m2]. Raises ParameterError."""
-    _check_positive("area", area)
-    return area * _NOZZLE_FACTOR / (REFERENCE_DENSITY * _REFERENCE_SPEED)
-
-
-def diameter(conductance: float, discharge_coefficient: float) -> float:
-    """Diameter [m] of the round hole with the same choked flow. Raises ParameterError."""
-    _check_discharge_coefficient(discharge_coefficient)
-    return float(ops.sqrt(effective_area(conductance) / discharge_coefficient * 4.0 / ops.pi))
+    return _positive("area", area) * _NOZZLE_FACTOR / (REFERENCE_DENSITY * _REFERENCE_SPEED)
 
 
 def conductance_from_diameter(diameter: float, discharge_coefficient: float) -> float:
     """C [m3/(s Pa)] of a round hole from its diameter [m] and discharge coefficient. Raises ParameterError."""
-    _check_positive("diameter", diameter)
-    _check_discharge_coefficient(discharge_coefficient)
+    _positive("diameter", diameter)
+    if _positive("discharge coefficient", discharge_coefficient) > 1.0:
+        raise ParameterError(
+            f"discharge coefficient is {discharge_coefficient:g}; it must be at most 1 (about 0.6 for a sharp-edged "
+            "hole)."
+        )
     return conductance_from_area(discharge_coefficient * ops.pi / 4.0 * diameter**2)
 
 
@@ -132,8 +98,8 @@ def leak_valve(
 
 def _unit_flow(critical_ratio: float, upstream: float, downstream: float) -> float:
     """Volume flow [m3/s] at the reference atmosphere for C = 1, by the law of `Valve` including its laminar chord."""
-    _check_positive("upstream pressure", upstream)
-    _check_positive("downstream pressure", downstream)
+    _positive("upstream pressure", upstream)
+    _positive("downstream pressure", downstream)
     if not downstream < upstream:
         raise ParameterError(
             f"the downstream pressure is {downstream:g} Pa; it must be less than the upstream pressure of {upstream:g} "
@@ -143,21 +109,11 @@ def _unit_flow(critical_ratio: float, upstream: float, downstream: float) -> flo
     return float(law.mass_flow(upstream, downstream, 1.0, REFERENCE_TEMPERATURE) / (REFERENCE_DENSITY * 1e-8))
 
 
-def _near_equal_factor(critical_ratio: float) -> float:
-    return float(ops.sqrt(1.0 - Valve(1e-8, critical_ratio).critical_ratio))  # Valve declares the bounds
-
-
-def _check_positive(what: str, value: float) -> None:
+def _positive(what: str, value: float) -> float:
+    """The value. Raises ParameterError unless it is a finite number greater than zero."""
     if isinstance(value, bool) or not isinstance(value, float | int) or not 0.0 < value < float("inf"):
         raise ParameterError(f"{what} is {value!r}; it must be a finite number greater than zero.")
-
-
-def _check_discharge_coefficient(value: float) -> None:
-    _check_positive("discharge coefficient", value)
-    if value > 1.0:
-        raise ParameterError(
-            f"discharge coefficient is {value:g}; it must be at most 1 (about 0.6 for a sharp-edged hole)."
-        )
+    return value
 
 
 def in_series(*valves: Valve) -> Valve:
@@ -180,9 +136,11 @@ def in_series(*valves: Valve) -> Valve:
     6358-3:2014 uses a numerical method).
     """
     _check_valves(valves, "in_series")
-    if len(valves) == 1:
-        return valves[0]
-    conductance = _choked_flow(valves)
+    low, conductance = 0.0, min(valve.conductance for valve in valves)
+    if not _passes(valves, conductance):
+        while low < (middle := (low + conductance) / 2.0) < conductance:
+            low, conductance = (middle, conductance) if _passes(valves, middle) else (low, middle)
+        conductance = low
     ratio = 1.0 - conductance**2 * sum((1.0 - v.critical_ratio) / v.conductance**2 for v in valves)
     return _equivalent_valve(conductance, ratio, valves)
 
@@ -196,8 +154,6 @@ def in_parallel(*valves: Valve) -> Valve:
     it is exact for equal b. Raises ParameterError as `in_series`.
     """
     _check_valves(valves, "in_parallel")
-    if len(valves) == 1:
-        return valves[0]
     conductance = sum(v.conductance for v in valves)
     near_equal = sum(v.conductance / ops.sqrt(1.0 - v.critical_ratio) for v in valves)
     return _equivalent_valve(conductance, 1.0 - (conductance / near_equal) ** 2, valves)
@@ -218,16 +174,6 @@ def _check_valves(valves: tuple[Valve, ...], rule: str) -> None:
             )
 
 
-def _choked_flow(valves: tuple[Valve, ...]) -> float:
-    """Largest flow of valves in series over the upstream pressure, as a conductance [m3/(s Pa)]."""
-    low, high = 0.0, min(valve.conductance for valve in valves)
-    if _passes(valves, high):
-        return high
-    while low < (middle := (low + high) / 2.0) < high:
-        low, high = (middle, high) if _passes(valves, middle) else (low, middle)
-    return low
-
-
 def _passes(valves: tuple[Valve, ...], flow: float) -> bool:
     """Whether each valve passes a flow at the pressure that the ones before it leave; both over the upstream values."""
     pressure = 1.0
@@ -240,5 +186,7 @@ def _passes(valves: tuple[Valve, ...], flow: float) -> bool:
 
 
 def _equivalent_valve(conductance: float, ratio: float, parts: tuple[Valve, ...]) -> Valve:
-    """Valve with b >= 0 (negative only by rounding) and the widest laminar range of its parts."""
+    """Valve with b >= 0 (negative only by rounding) and the widest laminar range of its parts; a single part itself."""
+    if len(parts) == 1:
+        return parts[0]
     return Valve(conductance, ops.maximum(ratio, 0.0), min(part.laminar_ratio for part in parts))

@@ -61,8 +61,15 @@ class Air(NamedTuple):
     temperature: Value
 
 
-AirStates = tuple[Air, ...]
+Airs = tuple[Air, ...]
 """Air states of muscles, or of the segments of a tube."""
+
+
+def upstream_temperature(first: Air, second: Air, forward: Value) -> Value:
+    """Temperature [K] of air that flows from `first` to `second` where `forward`, otherwise in the other direction."""
+    if second.temperature is first.temperature:
+        return first.temperature  # avoids a selection between two equal temperatures
+    return ops.where(forward, first.temperature, second.temperature)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -144,9 +151,9 @@ class BarotropicGas(Gas):
     def energy(self, air_mass: Value, volume: Value, ambient: Ambient) -> Value:
         """Available energy [J]; its derivative with respect to volume is minus the absolute pressure."""
 
-    @abc.abstractmethod
     def temperature(self, pressure: Value, air_mass: Value, volume: Value, ambient: Ambient) -> Value:
-        """Temperature [K] of an air mass [kg] at an absolute pressure [Pa] in a volume [m3]."""
+        """Temperature [K] of an air mass [kg] at an absolute pressure [Pa] in a volume [m3]; ambient by default."""
+        return ambient.temperature
 
     def states(self, volume: Value, ambient: Ambient) -> tuple[StateVariable, ...]:
         nominal = self.air_mass(ambient.pressure, volume, ambient)
@@ -179,9 +186,6 @@ class Isothermal(BarotropicGas):
 
     def air_mass(self, pressure: Value, volume: Value, ambient: Ambient) -> Value:
         return pressure * volume / (GAS_CONSTANT * ambient.temperature)
-
-    def temperature(self, pressure: Value, air_mass: Value, volume: Value, ambient: Ambient) -> Value:
-        return ambient.temperature
 
     def energy(self, air_mass: Value, volume: Value, ambient: Ambient) -> Value:
         ratio = self.pressure(air_mass, volume, ambient) / ambient.pressure

@@ -5,7 +5,7 @@ from typing import ClassVar
 
 from ...core import Input, Reference, StateVariable, Value, Values, model, ops, parameter, published, within
 from .circuit import CircuitFlows, ValvePair
-from .gas import Air, AirStates, Ambient, absolute_pressure, gauge_pressure
+from .gas import Air, Airs, Ambient, absolute_pressure, gauge_pressure
 from .valve import ISO6358, proportional_opening
 
 
@@ -47,18 +47,16 @@ class ProportionalValve(ValvePair):
         return (StateVariable("spool", "1", 1.0, "spool position"),
                 StateVariable("spool_speed", "1/s", speed, "spool speed"))  # fmt: skip
 
-    def own_steady_state(self, air_states: AirStates, ambient: Ambient) -> dict[str, Value]:
+    def own_steady_state(self, muscles: Airs, ambient: Ambient) -> dict[str, Value]:
         return {"spool": 0.0, "spool_speed": 0.0}
 
     def opening(self, position: Value) -> Value:
         """Opening of a control edge for a spool position towards this edge."""
         return proportional_opening(position - self.overlap, 1.0 - self.overlap)
 
-    def supplied_flow(
-        self, inlet: Air, air_states: AirStates, state: Values, inputs: Values, ambient: Ambient
-    ) -> CircuitFlows:
+    def supplied_flow(self, inlet: Air, muscles: Airs, state: Values, inputs: Values, ambient: Ambient) -> CircuitFlows:
         spool, total = state["spool"], CircuitFlows(())
-        for air, position in zip(air_states, (spool, -spool), strict=False):
+        for air, position in zip(muscles, (spool, -spool), strict=False):
             total += self.valve_flows(inlet, air, self.opening(position), self.opening(-position), ambient)
         speed, acceleration = self.spool.rates(spool, state["spool_speed"], inputs["command"])
         return dataclasses.replace(total, rates={"spool": speed, "spool_speed": acceleration})
@@ -89,13 +87,11 @@ class ProportionalRegulator(ValvePair):
         return (StateVariable("lagged_setpoint", "Pa", 1e5, "lagged set point, gauge pressure"),
                 StateVariable("lagged_setpoint_rate", "Pa/s", rate, "rate of the lagged set point"))  # fmt: skip
 
-    def own_steady_state(self, air_states: AirStates, ambient: Ambient) -> dict[str, Value]:
-        return {"lagged_setpoint": gauge_pressure(air_states[0].pressure, ambient), "lagged_setpoint_rate": 0.0}
+    def own_steady_state(self, muscles: Airs, ambient: Ambient) -> dict[str, Value]:
+        return {"lagged_setpoint": gauge_pressure(muscles[0].pressure, ambient), "lagged_setpoint_rate": 0.0}
 
-    def supplied_flow(
-        self, inlet: Air, air_states: AirStates, state: Values, inputs: Values, ambient: Ambient
-    ) -> CircuitFlows:
-        (air,) = air_states
+    def supplied_flow(self, inlet: Air, muscles: Airs, state: Values, inputs: Values, ambient: Ambient) -> CircuitFlows:
+        (air,) = muscles
         setpoint, setpoint_rate = state["lagged_setpoint"], state["lagged_setpoint_rate"]
         error = absolute_pressure(setpoint, ambient) - air.pressure
         opened, vented = (proportional_opening(each, self.band) for each in (error, -error))
@@ -158,8 +154,8 @@ class PressureRegulator(ValvePair):
             StateVariable("valve_position", "1", 1.0, "position of the main valve"),
         )
 
-    def own_steady_state(self, air_states: AirStates, ambient: Ambient) -> dict[str, Value]:
-        pressure = gauge_pressure(air_states[0].pressure, ambient)
+    def own_steady_state(self, muscles: Airs, ambient: Ambient) -> dict[str, Value]:
+        pressure = gauge_pressure(muscles[0].pressure, ambient)
         delayed = {f"delayed_setpoint{i}": pressure for i in range(1, DELAY_STAGES + 1)}
         rest = {"integral_error": 0.0, "pilot_position": -self.overlap, "valve_position": -self.overlap}
         return {**delayed, "sensed_pressure": pressure, **rest}
@@ -172,10 +168,8 @@ class PressureRegulator(ValvePair):
         leakage = self.leak * ops.clip((position + self.overlap) / (2.0 * self.overlap), 0.0, 1.0)
         return ops.clip(position - self.overlap, 0.0, 1.0) + leakage
 
-    def supplied_flow(
-        self, inlet: Air, air_states: AirStates, state: Values, inputs: Values, ambient: Ambient
-    ) -> CircuitFlows:
-        (air,) = air_states
+    def supplied_flow(self, inlet: Air, muscles: Airs, state: Values, inputs: Values, ambient: Ambient) -> CircuitFlows:
+        (air,) = muscles
         flows = self.valve_flows(inlet, air, *self.openings(state["valve_position"]), ambient)
         rates = self._rates(state, inputs["setpoint"], gauge_pressure(air.pressure, ambient))
         return dataclasses.replace(flows, rates=rates)

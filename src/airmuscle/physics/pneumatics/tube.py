@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 from ...core import Reference, Value, Values, model, ops, parameter, published, unflatten, within
 from ...core.system import StateVariable, add_prefix, select_prefix, with_prefix
 from .circuit import Circuit, CircuitFlows, CircuitWrapper, ambient_air, port_prefix
-from .gas import GAS_CONSTANT, Air, AirStates, Ambient, Flow, Gas, Isothermal, gauge_pressure
+from .gas import GAS_CONSTANT, Air, Airs, Ambient, Flow, Gas, Isothermal, gauge_pressure, upstream_temperature
 from .valve import Orifice, Valve, orifice_flow
 
 MAX_SEGMENTS = 200
@@ -51,15 +51,13 @@ class TubeModel(abc.ABC):
         segment = self.resting_segment(air, ambient)
         return {f"{prefix}{name}": value for prefix in self.prefixes for name, value in segment.items()}
 
-    def air_states(self, state: Values, ambient: Ambient) -> AirStates:
+    def air_states(self, state: Values, ambient: Ambient) -> Airs:
         """Air state of each segment, from valve to muscle."""
         segments = (select_prefix(prefix, state) for prefix in self.prefixes)
         return tuple(self.gas.air(segment, self.segment_volume, ambient) for segment in segments)
 
     @abc.abstractmethod
-    def rates(
-        self, state: Values, air_states: AirStates, flow: Flow, muscle: Air, ambient: Ambient
-    ) -> tuple[dict[str, Value], Flow]:
+    def rates(self, state: Values, air_states: Airs, flow: Flow, muscle: Air, ambient: Ambient) -> tuple[Values, Flow]:
         """Time derivatives of the states for a flow from the valve, and the flow into the muscle."""
 
     def validity_warnings(self, columns: Mapping[str, Any], ambient: Ambient) -> dict[str, str]:
@@ -125,9 +123,7 @@ class Tube(TubeModel):
     def segment_volume(self) -> Value:
         return self.volume / self.segment_count
 
-    def rates(
-        self, state: Values, air_states: AirStates, flow: Flow, muscle: Air, ambient: Ambient
-    ) -> tuple[dict[str, Value], Flow]:
+    def rates(self, state: Values, air_states: Airs, flow: Flow, muscle: Air, ambient: Ambient) -> tuple[Values, Flow]:
         rates: dict[str, Value] = {}
         for prefix, air, downstream in zip(self.prefixes, air_states, (*air_states[1:], muscle), strict=True):
             outflow = orifice_flow(self.orifice, air, downstream, self.segment_count**0.5)
@@ -190,13 +186,11 @@ class DistributedTube(TubeModel):
     def resting_segment(self, air: Air, ambient: Ambient) -> dict[str, Value]:
         return {**super().resting_segment(air, ambient), "flow": 0.0}
 
-    def rates(
-        self, state: Values, air_states: AirStates, flow: Flow, muscle: Air, ambient: Ambient
-    ) -> tuple[dict[str, Value], Flow]:
+    def rates(self, state: Values, air_states: Airs, flow: Flow, muscle: Air, ambient: Ambient) -> tuple[Values, Flow]:
         rates: dict[str, Value] = {}
         for prefix, air, downstream in zip(self.prefixes, air_states, (*air_states[1:], muscle), strict=True):
             mass_flow = state[f"{prefix}flow"]
-            outflow = _convected_flow(mass_flow, air, downstream)
+            outflow = Flow.at(upstream_temperature(air, downstream, mass_flow >= 0), mass_flow)
             segment = self.gas.rates(select_prefix(prefix, state), air, flow - outflow, 0.0, ambient)
             rates |= with_prefix(prefix, segment)
             density = (_density(air) + _density(downstream)) / 2.0
@@ -234,14 +228,6 @@ def _density(air: Air) -> Value:
     return air.pressure / (GAS_CONSTANT * air.temperature)
 
 
-def _convected_flow(mass_flow: Value, air: Air, downstream: Air) -> Flow:
-    """A mass flow and its enthalpy flow, with the temperature of the upstream side."""
-    temperature = air.temperature
-    if downstream.temperature is not air.temperature:
-        temperature = ops.where(mass_flow >= 0, air.temperature, downstream.temperature)
-    return Flow.at(temperature, mass_flow)
-
-
 @model
 class WithTubes(CircuitWrapper):
     """Circuit with a tube between its valves and each of its muscles.
@@ -263,9 +249,9 @@ class WithTubes(CircuitWrapper):
         tube = self.tube.states(ambient)
         return (*self.circuit.own_states(ambient), *(s for prefix in self.prefixes for s in add_prefix(prefix, tube)))
 
-    def own_steady_state(self, air_states: AirStates, ambient: Ambient) -> dict[str, Value]:
-        state = self.circuit.own_steady_state(air_states, ambient)
-        for prefix, air in zip(self.prefixes, air_states, strict=True):
+    def own_steady_state(self, muscles: Airs, ambient: Ambient) -> dict[str, Value]:
+        state = self.circuit.own_steady_state(muscles, ambient)
+        for prefix, air in zip(self.prefixes, muscles, strict=True):
             state |= with_prefix(prefix, self.tube.steady_state(air, ambient))
         return state
 
@@ -275,15 +261,13 @@ class WithTubes(CircuitWrapper):
             warnings |= with_prefix(prefix, self.tube.validity_warnings(select_prefix(prefix, columns), ambient))
         return warnings
 
-    def supplied_flow(
-        self, inlet: Air, air_states: AirStates, state: Values, inputs: Values, ambient: Ambient
-    ) -> CircuitFlows:
+    def supplied_flow(self, inlet: Air, muscles: Airs, state: Values, inputs: Values, ambient: Ambient) -> CircuitFlows:
         tubes = [select_prefix(prefix, state) for prefix in self.prefixes]
         in_tubes = [self.tube.air_states(tube, ambient) for tube in tubes]
         inner = self.circuit.supplied_flow(inlet, tuple(segments[0] for segments in in_tubes), state, inputs, ambient)
         rates, outputs, flows = dict(inner.rates), dict(inner.outputs), []
         for prefix, tube, segments, inflow, air in zip(
-            self.prefixes, tubes, in_tubes, inner.flows, air_states, strict=True
+            self.prefixes, tubes, in_tubes, inner.flows, muscles, strict=True
         ):
             tube_rates, outflow = self.tube.rates(tube, segments, inflow, air, ambient)
             rates |= with_prefix(prefix, tube_rates)

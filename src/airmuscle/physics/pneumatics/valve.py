@@ -4,7 +4,7 @@ import abc
 from typing import ClassVar
 
 from ...core import Reference, Value, model, ops, parameter, published
-from .gas import REFERENCE_DENSITY, REFERENCE_TEMPERATURE, Air, Flow
+from .gas import REFERENCE_DENSITY, REFERENCE_TEMPERATURE, Air, Flow, upstream_temperature
 
 
 class Orifice(abc.ABC):
@@ -129,9 +129,7 @@ class CheckValve(Orifice):
 
 def orifice_flow(orifice: Orifice, first: Air, second: Air, opening: Value = 1.0) -> Flow:
     """Mass flow [kg/s] and enthalpy flow [W] from `first` to `second`, with the temperature of the upstream side."""
-    temperature = first.temperature
-    if second.temperature is not first.temperature:  # avoids a selection between two equal temperatures
-        temperature = ops.where(first.pressure >= second.pressure, first.temperature, second.temperature)
+    temperature = upstream_temperature(first, second, first.pressure >= second.pressure)
     return Flow.at(temperature, orifice.mass_flow(first.pressure, second.pressure, opening, temperature))
 
 

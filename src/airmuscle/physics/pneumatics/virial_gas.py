@@ -47,9 +47,6 @@ class VirialGas(BarotropicGas):
         """Density [kg/m3] at the pressure at which an ideal gas has the density `ideal`; the root near the latter."""
         return 2.0 * ideal / (1.0 + ops.sqrt(1.0 + 4.0 * self.virial_coefficient * ideal))
 
-    def temperature(self, pressure: Value, air_mass: Value, volume: Value, ambient: Ambient) -> Value:
-        return ambient.temperature
-
     def energy(self, air_mass: Value, volume: Value, ambient: Ambient) -> Value:
         thermal = GAS_CONSTANT * ambient.temperature
         density = air_mass / volume
