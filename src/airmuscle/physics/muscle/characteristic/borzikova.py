@@ -4,7 +4,6 @@ The coefficients are given as printed in the paper, in per cent, bar and newton.
 not refitted.
 """
 
-import abc
 from typing import ClassVar
 
 import numpy as np
@@ -54,9 +53,8 @@ class PlaneCurves:
 
     def curve_at(self, force: float) -> PlaneCurve:
         """Return the curve of one load [N]. Raises GeometryLimitError if the paper has no curve for it."""
-        for curve in self.curves:
-            if curve.force == force:
-                return curve
+        if found := [curve for curve in self.curves if curve.force == force]:
+            return found[0]
         loads = ", ".join(f"{c.force:g}" for c in self.curves)
         raise GeometryLimitError(
             f"No plane curve at {force:g} N; curves exist at {loads} N. Use a surface between these loads."
@@ -117,12 +115,11 @@ class _PolynomialSurface(ContractionLaw):
     force_degree: int = 2
 
     def check(self) -> None:
-        name = type(self).__name__
         expected = (self.pressure_degree + 1) * (self.force_degree + 1)
         if len(self.coefficients) != expected:
             raise ParameterError(
-                f"{name} with pressure_degree {self.pressure_degree} and force_degree {self.force_degree} needs "
-                f"{expected} coefficients, not {len(self.coefficients)}."
+                f"{type(self).__name__} with pressure_degree {self.pressure_degree} and force_degree "
+                f"{self.force_degree} needs {expected} coefficients, not {len(self.coefficients)}."
             )
 
     @property
@@ -134,14 +131,6 @@ class _PolynomialSurface(ContractionLaw):
     def force_range(self) -> tuple[float, float]:
         """Validity range in force [N]; solutions are searched within it."""
         return (self.min_force, self.max_force)
-
-    @abc.abstractmethod
-    def contraction(self, pressure: Value, force: Value) -> Value: ...
-
-    def inside_validity_range(self, pressure: Value, force: Value) -> Value:
-        """Return whether gauge pressure [Pa] and force [N] are within the validity range."""
-        in_pressure = ops.both(pressure >= self.min_pressure, pressure <= self.max_pressure)
-        return ops.both(in_pressure, ops.both(force >= self.min_force, force <= self.max_force))
 
     def polynomial(self, pressure: Value, force: Value) -> Value:
         """Sum_ij a_ij p^i F^j at gauge pressure [Pa] and force [N]; linear extrapolation outside the validity range."""
@@ -165,9 +154,8 @@ class BorzikovaDirect(_PolynomialSurface):
     """Polynomial contraction surface: k = Sum_{i=0..m} Sum_{j=0..n} a_ij p^i F^j.
 
     k: contraction in per cent; p: gauge pressure in bar; F: load in N; m = 4 and n = 2 give the 15 coefficients of the
-    printed matrix. Outside the validity range the surface is extrapolated linearly; `inside_validity_range` tests for
-    it. Reference: Borzíková et al., the printed matrix, which belongs to this polynomial and not to the exponent of
-    equation (1).
+    printed matrix. Outside the validity range the surface is extrapolated linearly. Reference: Borzíková et al., the
+    printed matrix, which belongs to this polynomial and not to the exponent of equation (1).
     """
 
     def contraction(self, pressure: Value, force: Value) -> Value:

@@ -127,17 +127,7 @@ class ContractileSurface(ForceLaw):
         """Force [N] before the limits are applied, extrapolated linearly outside the validity range."""
         x, q = self._scale(pressure, contraction)
         inner_q, inner_x = ops.clip(q, -1.0, 1.0), ops.clip(x, -1.0, 1.0)
-        value, by_x, by_q = self._horner(inner_x, inner_q)
-        return value + ops.minimum(by_x, 0.0) * (x - inner_x) + ops.maximum(by_q, 0.0) * (q - inner_q)
-
-    def _scale(self, pressure: Value, contraction: Value) -> tuple[Value, Value]:
-        """Scaled contraction x and pressure q, from -1 to 1 on the validity range."""
-        half_p = (self.max_pressure - self.min_pressure) / 2
-        half_c = (self.max_contraction - self.min_contraction) / 2
-        return (contraction - self.min_contraction) / half_c - 1, (pressure - self.min_pressure) / half_p - 1
-
-    def _horner(self, x: Value, q: Value) -> tuple[Value, Value, Value]:
-        """Polynomial and its derivatives with respect to x and q, by Horner's method in both variables."""
+        # the polynomial and its derivatives by x and q, by Horner's method in both variables
         value: Value = 0.0
         by_x: Value = 0.0
         by_q: Value = 0.0
@@ -147,12 +137,18 @@ class ContractileSurface(ForceLaw):
             row: Value = 0.0
             slope: Value = 0.0
             for a in reversed(self.coefficients[start : start + self.degree + 1 - j]):
-                slope = slope * x + row
-                row = row * x + a
-            by_q = by_q * q + value
-            value = value * q + row
-            by_x = by_x * q + slope
-        return value, by_x, by_q
+                slope = slope * inner_x + row
+                row = row * inner_x + a
+            by_q = by_q * inner_q + value
+            value = value * inner_q + row
+            by_x = by_x * inner_q + slope
+        return value + ops.minimum(by_x, 0.0) * (x - inner_x) + ops.maximum(by_q, 0.0) * (q - inner_q)
+
+    def _scale(self, pressure: Value, contraction: Value) -> tuple[Value, Value]:
+        """Scaled contraction x and pressure q, from -1 to 1 on the validity range."""
+        half_p = (self.max_pressure - self.min_pressure) / 2
+        half_c = (self.max_contraction - self.min_contraction) / 2
+        return (contraction - self.min_contraction) / half_c - 1, (pressure - self.min_pressure) / half_p - 1
 
     def monomial_coefficients(self, pressure_unit: float = 1.0) -> dict[tuple[int, int], float]:
         """Return the coefficients of eps^i p^j in the validity range, p in units of `pressure_unit` [Pa] (1e5: bar).
@@ -177,23 +173,14 @@ class ContractileSurface(ForceLaw):
 
 @functools.cache
 def _term_labels(degree: int) -> tuple[str, ...]:
-    return tuple(f"{_power_label('x', i)} {_power_label('q', j)}".strip() or "1" for i, j in exponents(degree))
-
-
-def _power_label(symbol: str, exponent: int) -> str:
-    """Return a power as text, empty for exponent 0."""
-    return "" if exponent == 0 else symbol if exponent == 1 else f"{symbol}^{exponent}"
+    x, q = (["", symbol, *(f"{symbol}^{power}" for power in range(2, degree + 1))] for symbol in "xq")
+    return tuple(f"{x[i]} {q[j]}".strip() or "1" for i, j in exponents(degree))
 
 
 def _powers_of_linear(constant: float, factor: float, degree: int) -> list[list[float]]:
     """Coefficients of (constant + factor t)^i in t, for i up to `degree`."""
     powers = [[1.0]]
     for _ in range(degree):
-        last = powers[-1]
-        powers.append(
-            [
-                constant * (last[m] if m < len(last) else 0.0) + factor * (last[m - 1] if m else 0.0)
-                for m in range(len(last) + 1)
-            ]
-        )
+        multiplied = zip([*powers[-1], 0.0], [0.0, *powers[-1]], strict=True)
+        powers.append([constant * same + factor * lower for same, lower in multiplied])
     return powers

@@ -80,12 +80,8 @@ def virtual_work_defect(
 def _largest(
     law: Characteristic, sides: Callable[[Array, Array], tuple[Array, Array]], validity_range: ValidityRange, unit: str
 ) -> EnergyDefect:
-    p, c = (
-        side.reshape(-1)
-        for side in np.meshgrid(
-            np.linspace(*validity_range.pressure, _POINTS), np.linspace(*validity_range.contraction, _POINTS)
-        )
-    )
+    edges = (np.linspace(*limits, _POINTS) for limits in (validity_range.pressure, validity_range.contraction))
+    p, c = (side.reshape(-1) for side in np.meshgrid(*edges))
     taut = np.asarray(law.force(p, c)) > 0
     if not taut.any():
         raise SolveError(f"{type(law).__name__} is slack in its whole validity range; the defect is not defined.")

@@ -79,15 +79,8 @@ def as_force_law(law: Characteristic, validity_range: ValidityRange, *, degree: 
     x, q = _scale(validity_range, pressure[known], contraction[known])
     powers = np.stack([x**i * q**j for i, j in exponents(degree)], axis=1)
     coefficients = np.linalg.lstsq(powers, force[known], rcond=None)[0]
-    surface = ContractileSurface(
-        tuple(float(a) for a in coefficients),
-        *validity_range.pressure,
-        *validity_range.contraction,
-        -_NO_CLAMP,
-        _NO_CLAMP,
-        degree,
-    )
-    return _with_errors(law, surface, validity_range)
+    limits = (*validity_range.pressure, *validity_range.contraction, -_NO_CLAMP, _NO_CLAMP)
+    return _with_errors(law, ContractileSurface(tuple(coefficients.tolist()), *limits, degree), validity_range)
 
 
 def _with_errors(

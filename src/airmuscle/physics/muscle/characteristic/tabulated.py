@@ -1,6 +1,7 @@
 """Characteristic interpolated from a table of force over contraction at several pressures, without overshoot."""
 
 import functools
+from collections.abc import Callable
 from typing import Any, ClassVar
 
 import numpy as np
@@ -72,13 +73,7 @@ class Tabulated(Characteristic):
         c, load = as_arrays(contraction, force)
         forces = table.forces(c)
         between = (forces[:-1] <= load) & (load <= forces[1:])
-        solvable = between.any(axis=0)
-        if not solvable.all():
-            first = int(np.argmin(solvable.reshape(-1)))
-            column = forces.reshape(table.levels.size, -1)[:, first]
-            raise SolveError(
-                self._no_pressure_message(c.flat[first], load.flat[first]) + _describe_table_forces(column)
-            )
+        _check_solvable(between.any(axis=0), self._no_pressure_message, (c, load), forces)
         j = between.argmax(axis=0)
         low, high = (np.take_along_axis(side, j[None], axis=0)[0] for side in (forces[:-1], forces[1:]))
         fraction = np.where(high > low, (load - low) / np.where(high > low, high - low, 1.0), 0.0)
@@ -89,13 +84,7 @@ class Tabulated(Characteristic):
         p, load = as_arrays(pressure, force)
         low, high = table.contraction_limits(p)
         ends = np.array([table.evaluate(p, low)[0], table.evaluate(p, high)[0]])
-        unsolvable = ~((load <= ends[0]) & (load >= ends[1]))
-        if unsolvable.any():
-            first = int(np.argmax(unsolvable.reshape(-1)))
-            raise SolveError(
-                self._no_contraction_message(p.flat[first], load.flat[first])
-                + _describe_table_forces(ends.reshape(2, -1)[:, first])
-            )
+        _check_solvable((load <= ends[0]) & (load >= ends[1]), self._no_contraction_message, (p, load), ends)
         for _ in range(_BISECTIONS):
             middle = (low + high) / 2
             above = table.evaluate(p, middle)[0] > load
@@ -188,8 +177,14 @@ def _interpolate(fraction: Array, low: Array, high: Array) -> Array:
     return mixed
 
 
-def _describe_table_forces(forces: Array) -> str:
-    """Return a sentence with the range of the tabulated forces [N] at a point."""
-    if np.isnan(forces).all():
-        return "The table does not cover this point."
-    return f"Tabulated forces at this point: {describe_range(np.nanmin(forces), np.nanmax(forces), 'N')}."
+def _check_solvable(
+    solvable: npt.NDArray[np.bool_], message: Callable[[float, float], str], given: tuple[Array, Array], forces: Array
+) -> None:
+    """Raise SolveError for the first point without a solution, with the range of the tabulated forces [N] there."""
+    if not solvable.all():
+        first = int(np.argmin(solvable.reshape(-1)))
+        column = forces.reshape(len(forces), -1)[:, first]
+        known = "The table does not cover this point."
+        if not np.isnan(column).all():
+            known = f"Tabulated forces at this point: {describe_range(np.nanmin(column), np.nanmax(column), 'N')}."
+        raise SolveError(message(*(values.flat[first] for values in given)) + known)
