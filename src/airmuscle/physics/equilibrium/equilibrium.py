@@ -100,21 +100,17 @@ def find_equilibria(
     """
     one = _statics(plant, pressure, air_mass, inputs)
     rows, x = _balances(one)
-    if not rows.size and (len(one.plants.mechanism.coordinates) == 0 or _is_degenerate(one)):
-        raise no_equilibrium(one)
+    count = len(one.plants.mechanism.coordinates)
+    if not rows.size and count < 2:
+        everywhere = grid(one) if count else None
+        # in equilibrium everywhere, or without a permitted position
+        if everywhere is None or not one.accelerations(everywhere[:, np.isfinite(everywhere[0]), None]).any():
+            raise no_equilibrium(one)
     states, stable = _judged(one, rows, x)
     return tuple(
         Equilibrium(dict(zip(one.names, state.tolist(), strict=True)), bool(s))
         for state, s in zip(states, stable, strict=True)
     )
-
-
-def _is_degenerate(one: Statics) -> bool:
-    """Whether a plant with one coordinate is in equilibrium everywhere, or has no permitted position."""
-    if len(one.plants.mechanism.coordinates) != 1:
-        return False
-    x = grid(one)
-    return not one.accelerations(x[:, np.isfinite(x[0]), None]).any()
 
 
 def find_equilibrium(
@@ -219,7 +215,8 @@ def _nearest(statics: Statics) -> Array:
         return table
     there = statics.of(rows)
     states, stable = _judged(statics, rows, x)
-    contracted = there.contracted(x[:, None])[:, 0]
+    squares = [eps[:, 0] ** 2 for eps in there.contractions(x[:, None])]
+    contracted = sum(squares, np.zeros(rows.size))
     order = np.lexsort((contracted, rows))  # of several with equal contraction, the first
     order = order[stable[order]]
     first = np.diff(rows[order], prepend=-1) > 0

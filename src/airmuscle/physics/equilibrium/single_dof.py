@@ -2,7 +2,6 @@
 
 import functools
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -138,57 +137,28 @@ def _roots(plants: Statics, f: Array, rows: Rows, low: Array, high: Array) -> tu
 
 def between(plants: Statics, low: Array, high: Array) -> Array:
     """The roots between points (R,) of different sign by the false position method (Illinois variant)."""
-    search = _Search(np.arange(low.size), low, high, _accelerations(plants, low), _accelerations(plants, high), low)
+    at_low, at_high, last = _accelerations(plants, low), _accelerations(plants, high), low
     close = np.maximum(CLOSE * (high - low), np.spacing(np.maximum(np.abs(low), np.abs(high))))
-    roots, ended = low.copy(), np.zeros(low.size, dtype=bool)
+    rows, roots, ended = np.arange(low.size), low.copy(), np.zeros(low.size, dtype=bool)
     for _ in range(200):
-        middle = search.middle()
+        with np.errstate(all="ignore"):
+            crossing = low + (high - low) * at_low / (at_low - at_high)
+        # an end itself if the root is within its rounding error
+        middle = np.where(np.isfinite(crossing), np.clip(crossing, low, high), 0.5 * (low + high))
         at = _accelerations(plants, middle)
-        roots[search.rows] = np.where(ended, roots[search.rows], middle)
-        inside = (search.low < middle) & (middle < search.high)
-        ended |= (at == 0.0) | (np.abs(middle - search.last) <= close[search.rows]) | ~inside
+        roots[rows] = np.where(ended, roots[rows], middle)
+        ended |= (at == 0.0) | (np.abs(middle - last) <= close[rows]) | ~((low < middle) & (middle < high))
         if ended.all():
             break
-        search = search.narrowed(middle, at)
+        replaces_low = at * at_low > 0.0  # the value at an end that is retained twice is halved (Illinois)
+        at_low = np.where(replaces_low, at, at_low * np.where(last >= high, 0.5, 1.0))
+        at_high = np.where(replaces_low, at_high * np.where(last <= low, 0.5, 1.0), at)
+        low, high, last = np.where(replaces_low, middle, low), np.where(replaces_low, high, middle), middle
         if 2 * ended.sum() > ended.size:  # continue with the unfinished rows only
             kept = np.flatnonzero(~ended)
-            plants, search, ended = plants.of(kept), search.of(kept), ended[kept]
+            plants, rows, ended = plants.of(kept), rows[kept], ended[kept]
+            low, high, at_low, at_high, last = (v[kept] for v in (low, high, at_low, at_high, last))
     return roots
-
-
-class _Search(NamedTuple):
-    """Bracketing interval of every row: both ends, the function values there, and the last point evaluated."""
-
-    rows: Rows
-    low: Array
-    high: Array
-    at_low: Array
-    at_high: Array
-    last: Array
-
-    def of(self, kept: Rows) -> "_Search":
-        """Some of the rows."""
-        return _Search(self.rows[kept], *(part[kept] for part in self[1:]))
-
-    def middle(self) -> Array:
-        """Zero of the secant through the ends; an end itself if the root is within its rounding error."""
-        with np.errstate(all="ignore"):
-            crossing = self.low + (self.high - self.low) * self.at_low / (self.at_low - self.at_high)
-        return np.where(np.isfinite(crossing), np.clip(crossing, self.low, self.high), 0.5 * (self.low + self.high))
-
-    def narrowed(self, middle: Array, at: Array) -> "_Search":
-        """The subinterval that contains the root; the value at an end that is retained twice is halved (Illinois)."""
-        as_low = at * self.at_low > 0.0
-        at_low = self.at_low * np.where(self.last >= self.high, 0.5, 1.0)
-        at_high = self.at_high * np.where(self.last <= self.low, 0.5, 1.0)
-        return _Search(
-            self.rows,
-            np.where(as_low, middle, self.low),
-            np.where(as_low, self.high, middle),
-            np.where(as_low, at, at_low),
-            np.where(as_low, at_high, at),
-            middle,
-        )
 
 
 def _nears_zero(f: Array) -> npt.NDArray[np.bool_]:

@@ -239,10 +239,6 @@ class Statics:
             evaluate_rates(self.compiled.address["rhs"], self.precomputed, self.inputs, states, rates)
         return np.asarray(rates[..., [self.names.index(c.speed) for c in self.plants.mechanism.coordinates]])
 
-    def contracted(self, x: Array) -> Array:
-        """Sum of squared contractions (N, K): the distance from full length."""
-        return sum((eps**2 for eps in self.contractions(x)), np.zeros(x.shape[:2]))
-
     def state(self, x: Mapping[str, float]) -> dict[str, float]:
         """The state at rest of the first plant at coordinates by name, as a mapping."""
         place = np.array([[[x[c.name] for c in self.plants.mechanism.coordinates]]])

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import Array, describe_model
+from ...core import describe_model
 from ...core.diagnostics import ColumnLimit, Columns, Diagnostic, DiagnosticCode
 from ..muscle import INNER_CONTRACTION, ElasticSeriesElement, Muscle, RatedRange
 from ..muscle.friction import NoFriction
@@ -49,14 +49,21 @@ def with_tolerance(limits: Sequence[ColumnLimit]) -> tuple[tuple[ColumnLimit, fl
 def extrapolation(limits: Sequence[tuple[ColumnLimit, float, float]], columns: Columns) -> list[Diagnostic]:
     """Diagnostics of a run that left the validity range of a characteristic, the range of the data of a friction, or
     the contraction range of a geometry; `limits` are those of `with_tolerance`."""
-    diagnostics: list[Diagnostic] = []
-    if not columns["time"].size:
-        return diagnostics
-    for limit, low, high in limits:
-        if limit.column in columns:
-            smallest, largest = columns.limits(limit.column)
-            if smallest < low or largest > high:
-                diagnostics.append(_excess(columns["time"], columns[limit.column], limit))
+    diagnostics, time = list[Diagnostic](), columns["time"]
+    for limit, low, high in limits if time.size else ():
+        if limit.column not in columns:
+            continue
+        smallest, largest = columns.limits(limit.column)
+        if smallest < low or largest > high:
+            values, (scale, unit) = columns[limit.column], _shown_unit(limit.quantity)
+            excess = np.maximum(limit.bounds[0] - values, values - limit.bounds[1])
+            worst, rows = int(np.argmax(excess)), int(np.count_nonzero(excess > 0))
+            where, meaning = _outside(limit)
+            text = (
+                f"{limit.subject} was {where} in {percent_of_rows(rows / values.size)} of the rows, by at most "
+                f"{excess[worst] / scale:.4g} {unit} at {time[worst]:.4g} s; {meaning}"
+            )
+            diagnostics.append(Diagnostic(limit.code, limit.subject, text, rows))
     return diagnostics
 
 
@@ -79,20 +86,6 @@ def limits_of(muscle: Muscle, prefix: str) -> Iterator[tuple[DiagnosticCode, str
         yield DiagnosticCode.FRICTION_EXTRAPOLATION, f"{prefix}shortening_speed", "speed", identified.speed
     own = INNER_CONTRACTION if isinstance(muscle.series, ElasticSeriesElement) else "contraction"
     yield DiagnosticCode.GEOMETRY_LIMIT, f"{prefix}{own}", own, muscle.geometry.contraction_range
-
-
-def _excess(time: Array, values: Array, limit: ColumnLimit) -> Diagnostic:
-    """The diagnostic of a column of pressure, speed or contraction that exceeds its limits."""
-    low, high = limit.bounds
-    excess = np.maximum(low - values, values - high)
-    scale, unit = _shown_unit(limit.quantity)
-    worst, rows = int(np.argmax(excess)), int(np.count_nonzero(excess > 0))
-    where, meaning = _outside(limit)
-    text = (
-        f"{limit.subject} was {where} in {percent_of_rows(rows / values.size)} of the rows, by at most "
-        f"{excess[worst] / scale:.4g} {unit} at {time[worst]:.4g} s; {meaning}"
-    )
-    return Diagnostic(limit.code, limit.subject, text, rows)
 
 
 def percent_of_rows(share: float) -> str:
@@ -129,8 +122,8 @@ def rated_temperature(muscles: Sequence[Muscle], ambient_temperature: float) -> 
 
 def components(remarks: Mapping[str, str]) -> list[Diagnostic]:
     """Diagnostics of components that were beyond the validity of their model, by the prefixes of their names."""
-    named = {name.removesuffix("."): text for name, text in remarks.items()}
-    return [Diagnostic(DiagnosticCode.COMPONENT, name, f"{name}: {text}") for name, text in named.items()]
+    named = ((name.removesuffix("."), text) for name, text in remarks.items())
+    return [Diagnostic(DiagnosticCode.COMPONENT, name, f"{name}: {text}") for name, text in named]
 
 
 class Enclosure(NamedTuple):
@@ -143,13 +136,19 @@ class Enclosure(NamedTuple):
 
 
 def geometry_limit_hint(enclosure: Enclosure) -> str:
-    """Remedy for a muscle at a limit of its geometry; empty if it is not at a limit."""
+    """Remedy for a muscle at a limit of its geometry; empty if it is not at a limit.
+
+    The force is singular there if at 1 bar it grows beyond all bounds towards this end of the range, or is not finite.
+    """
     muscle, inner = enclosure.muscle, float(enclosure.inner_contraction)
     low, high = muscle.geometry.contraction_range
     margin = MARGIN * (high - low)
     if low + margin < inner < high - margin:
         return ""
-    if _is_singular(muscle, inner, margin):
+    inside = float(np.clip(inner, low + margin, high - margin))
+    with np.errstate(all="ignore"):
+        there, near = (float(abs(muscle.contractile.force(1e5, each))) for each in (inner, inside))
+    if not there <= SINGULAR_FACTOR * max(near, 1.0):
         return (
             f"At a contraction of {100 * inner:.2f} %, an end of the geometry of {muscle.name}, the force of "
             f"{type(muscle.contractile).__name__} is singular: no run begins there or passes through. Begin inside "
@@ -161,12 +160,3 @@ def geometry_limit_hint(enclosure: Enclosure) -> str:
         f"{100 * high:.2f} %). Keep the load from moving it so far: wrap the mechanism in WithEndStops, or choose a "
         "higher pressure or a smaller load."
     )
-
-
-def _is_singular(muscle: Muscle, contraction: float, margin: float) -> bool:
-    """Whether the force at 1 bar grows beyond all bounds towards this end of the range, or is not finite there."""
-    low, high = muscle.geometry.contraction_range
-    inside = float(np.clip(contraction, low + margin, high - margin))
-    with np.errstate(all="ignore"):
-        there, near = (float(abs(muscle.contractile.force(1e5, each))) for each in (contraction, inside))
-    return not there <= SINGULAR_FACTOR * max(near, 1.0)

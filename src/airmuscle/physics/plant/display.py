@@ -42,11 +42,11 @@ class Animation:
                 "recording.rows(...)."
             )
         self.times = time[0] + np.arange(count) * speed / FRAMES
-        pressures = [f"{prefix}pressure" for prefix in scene.prefixes]
-        names = [*pressures, *(f"{prefix}contraction" for prefix in scene.prefixes), *scene.coordinates]
+        prefixes = scene.muscles.prefixes
+        pressures = [f"{prefix}pressure" for prefix in prefixes]
+        names = [*pressures, *(f"{prefix}contraction" for prefix in prefixes), *scene.coordinates]
         self._columns = {name: np.interp(self.times, time, recording[name]) for name in names}
-        self._scene, self._largest = scene, max(float(recording[name].max()) for name in pressures)
-        scene.make_room([float(recording[f"{prefix}contraction"].max()) for prefix in scene.prefixes])
+        self._scene, self._full_scale = scene, max(scene.muscles.pressure, 1.0)
         self.figure, self._drawn = self._prepare(recording, pressures)
         self.draw(0)
         self.figure.draw_without_rendering()
@@ -64,7 +64,7 @@ class Animation:
         left, right, lower, upper = self._scene.limits
         drawn.set(xlim=(left, right), ylim=(lower, upper), aspect="equal")
         drawn.set_axis_off()
-        time, coordinate = recording["time"], self._scene.coordinate
+        time, coordinate = recording["time"], self._scene.coordinates[0]
         factor, unit = (180 / np.pi, "°") if coordinate != "position" else (1e3, "mm")
         for name, colour in zip(self._scene.coordinates, LINES, strict=False):
             axes[0, 1].plot(time, factor * recording[name], color=colour)
@@ -79,7 +79,7 @@ class Animation:
             axes[1, 1].legend(loc="best", frameon=False, fontsize=8)
         self._cursors = [axis.axvline(time[0], color=BLACK, linewidth=0.8) for axis in axes[:, 1]]
         self._colours = mpl.colormaps["YlOrRd"]
-        scale = mpl.cm.ScalarMappable(mpl.colors.Normalize(0.0, max(self._largest, 1.0) / _BAR), self._colours)
+        scale = mpl.cm.ScalarMappable(mpl.colors.Normalize(0.0, self._full_scale / _BAR), self._colours)
         colour_bar = figure.colorbar(scale, ax=drawn, location="left", shrink=0.6)
         colour_bar.set_label("gauge pressure [bar]", fontsize=9)
         colour_bar.ax.tick_params(labelsize=8)
@@ -101,7 +101,7 @@ class Animation:
         for x, y, radius in drawing.circles:
             axes.add_patch(Circle((x, y), radius, facecolor="white", edgecolor=BLACK, linewidth=1.2, zorder=3))
         for points, pressure in drawing.shapes:
-            colour = _METAL if pressure is None else self._colours(max(pressure, 0.0) / max(self._largest, 1.0))
+            colour = _METAL if pressure is None else self._colours(max(pressure, 0.0) / self._full_scale)
             axes.add_patch(Polygon(points, facecolor=colour, edgecolor=BLACK, linewidth=0.8, zorder=4))
         axes.text(0.02, 0.0, f"{self.times[frame]:.2f} s", transform=axes.transAxes, fontsize=9)
         for cursor in self._cursors:
@@ -143,15 +143,10 @@ class Animation:
     def _matplotlib(self) -> Any:
         from matplotlib.animation import FuncAnimation
 
-        def frame(index: int) -> list[Any]:
-            self.draw(index)
-            return []
-
-        return FuncAnimation(self.figure, frame, frames=self.times.size, interval=1000 / FRAMES, blit=False)
+        return FuncAnimation(self.figure, self.draw, frames=self.times.size, interval=1000 / FRAMES, blit=False)
 
     def _repr_html_(self) -> str:
-        text: str = self._matplotlib().to_jshtml(fps=FRAMES)
-        return text
+        return str(self._matplotlib().to_jshtml(fps=FRAMES))
 
 
 MAX_CHARTS = 2
@@ -164,8 +159,8 @@ class PlantDisplay(NotebookDisplay):
     def animate(self, recording: Recording, speed: float = 1.0) -> Animation:
         """Animation of a run of this plant; see Recording.animate."""
         plant: Any = self
-        scene = scene_of([muscle.geometry for muscle in plant.muscles], plant.prefixes, plant.mechanism)
-        return Animation(scene, recording, speed)
+        geometries = [muscle.geometry for muscle in plant.muscles]
+        return Animation(scene_of(geometries, plant.prefixes, plant.mechanism, recording), recording, speed)
 
     def _card(self) -> Card:
         plant: Any = self

@@ -1,12 +1,12 @@
 """Drawing of a plant in the plane: outlines of the muscles, cables, pulley or load, at one row of a recording."""
 
-import abc
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from ...core import Array, ParameterError, select_prefix
+from ...recording import Recording
 from ..mechanism import AntagonisticJoint, Mechanism, PlanarArm
 from ..mechanism.base import Translation
 from ..mechanism.wrapper import MechanismWrapper
@@ -52,44 +52,22 @@ def muscle_outline(geometry: Geometry, contraction: float) -> Array:
     return np.vstack([right, right[::-1] * (-1.0, 1.0)])
 
 
-class Scene(abc.ABC):
-    """A plant that can be drawn (interface)."""
+class MuscleShapes:
+    """The muscles of a plant along a run, with the space that they need."""
 
-    def __init__(self, geometries: Sequence[Geometry], prefixes: Sequence[str], mechanism: Any) -> None:
-        self.geometries, self.prefixes, self.mechanism = tuple(geometries), tuple(prefixes), mechanism
-        self.length = max(g.resting_length for g in self.geometries)
-        self.fitting_radii = [0.5 * float(muscle_outline(g, 0.0)[:, 0].max()) for g in self.geometries]
-        self.spacing = 0.0
+    def __init__(self, geometries: Sequence[Geometry], prefixes: Sequence[str], recording: Recording) -> None:
+        self.geometries, self.prefixes = geometries, prefixes
+        self.length = max(g.resting_length for g in geometries)
+        self.fitting_radii = [0.5 * float(muscle_outline(g, 0.0)[:, 0].max()) for g in geometries]
+        pressures, contractions = ([recording[f"{p}{each}"] for p in prefixes] for each in ("pressure", "contraction"))
+        self.pressure = max(float(pressure.max()) for pressure in pressures)
+        """Maximum gauge pressure [Pa]."""
+        largest = zip(geometries, (max(float(c.max()), 0.0) for c in contractions), strict=True)
+        widths = [float(muscle_outline(geometry, contraction)[:, 0].max()) for geometry, contraction in largest]
+        self.spacing = 1.08 * max(widths)
         """Distance [m] of a muscle from the middle at which it does not touch another one."""
 
-    def make_room(self, contractions: Sequence[float]) -> None:
-        """Set the spacing for the maximum contraction of each muscle."""
-        widths = [
-            float(muscle_outline(g, max(c, 0.0))[:, 0].max())
-            for g, c in zip(self.geometries, contractions, strict=True)
-        ]
-        self.spacing = 1.08 * max(widths)
-
-    @property
-    @abc.abstractmethod
-    def limits(self) -> tuple[float, float, float, float]:
-        """Left, right, lower and upper edge of the drawing [m]."""
-
-    @property
-    @abc.abstractmethod
-    def coordinate(self) -> str:
-        """The column that is plotted beside the drawing."""
-
-    @property
-    def coordinates(self) -> tuple[str, ...]:
-        """The columns by which the mechanism is drawn."""
-        return (self.coordinate,)
-
-    @abc.abstractmethod
-    def draw(self, row: Row) -> Drawing:
-        """The drawing at one row."""
-
-    def _muscle(self, index: int, row: Row, x: float, y: float, upwards: float) -> tuple[list[Shape], float]:
+    def shapes(self, index: int, row: Row, x: float, y: float, upwards: float) -> tuple[list[Shape], float]:
         """A muscle with both fittings, from y on upwards (1) or downwards (-1); its shapes and its other end."""
         geometry, own = self.geometries[index], select_prefix(self.prefixes[index], row)
         fitting = FITTING * geometry.resting_length
@@ -98,100 +76,91 @@ class Scene(abc.ABC):
         middle = y + upwards * (fitting + length / 2)
         end = y + upwards * (2 * fitting + length)
         ends = [(y, y + upwards * fitting), (end - upwards * fitting, end)]
-        boxes = [Shape(_box(x, self.fitting_radii[index], *pair)) for pair in ends]
+        boxes = [_box(x, self.fitting_radii[index], *pair) for pair in ends]
         return [Shape(outline + np.array([x, middle]), own["pressure"]), *boxes], end
 
 
-class JointScene(Scene):
+class Scene(NamedTuple):
+    """A plant that can be drawn.
+
+    limits       left, right, lower and upper edge of the drawing [m]
+    coordinates  columns by which the mechanism is drawn; the first is plotted beside it
+    draw         function from one row to the drawing
+    """
+
+    muscles: MuscleShapes
+    limits: tuple[float, float, float, float]
+    coordinates: tuple[str, ...]
+    draw: Callable[[Row], Drawing]
+
+
+def _joint_scene(muscles: MuscleShapes, joint: AntagonisticJoint) -> Scene:
     """Two muscles side by side below a pulley, whose angle a pointer shows."""
+    length, radius = muscles.length, joint.radius
+    base, place = -1.35 * length, max(radius, muscles.spacing)
+    half = max(0.62 * length, 2.05 * muscles.spacing)
 
-    mechanism: AntagonisticJoint
-    coordinate = "angle"
-
-    @property
-    def limits(self) -> tuple[float, float, float, float]:
-        half = max(0.62 * self.length, 2.05 * self.spacing)
-        return -half, half, -1.45 * self.length, 0.62 * self.length
-
-    def draw(self, row: Row) -> Drawing:
-        base, radius, angle = -1.35 * self.length, self.mechanism.radius, row["angle"]
-        shapes, lines = [Shape(_box(0.0, 0.5 * self.length, base - 0.03 * self.length, base))], []
-        place = max(radius, self.spacing)
+    def draw(row: Row) -> Drawing:
+        shapes, lines = [_box(0.0, 0.5 * length, base - 0.03 * length, base)], []
         for index, side in enumerate((-1.0, 1.0)):
-            muscle, top = self._muscle(index, row, side * place, base, 1.0)
+            muscle, top = muscles.shapes(index, row, side * place, base, 1.0)
             shapes += muscle
             lines.append(np.array([[side * place, top], [side * radius, 0.0]]))
-        tip = 0.5 * self.length * np.array([-np.sin(angle), np.cos(angle)])
+        tip = 0.5 * length * np.array([-np.sin(row["angle"]), np.cos(row["angle"])])
         lines.append(np.array([[0.0, 0.0], tip]))
         return Drawing(shapes, lines, [(0.0, 0.0, radius), (*tip.tolist(), 0.2 * radius)])
 
+    return Scene(muscles, (-half, half, -1.45 * length, 0.62 * length), ("angle",), draw)
 
-class LiftScene(Scene):
+
+def _lift_scene(muscles: MuscleShapes, load: Translation) -> Scene:
     """A muscle that hangs from a ceiling, with the load below it."""
+    length = muscles.length
 
-    coordinate = "position"
+    def draw(row: Row) -> Drawing:
+        muscle, end = muscles.shapes(0, row, 0.0, 0.0, -1.0)
+        ceiling = _box(0.0, 0.3 * length, 0.0, 0.03 * length)
+        mass = _box(0.0, 0.13 * length, end - 0.2 * length, end - 0.04 * length)
+        return Drawing([ceiling, *muscle, mass], [np.array([[0.0, end], [0.0, end - 0.04 * length]])], [])
 
-    @property
-    def limits(self) -> tuple[float, float, float, float]:
-        return -0.5 * self.length, 0.5 * self.length, -1.5 * self.length, 0.1 * self.length
-
-    def draw(self, row: Row) -> Drawing:
-        ceiling = Shape(_box(0.0, 0.3 * self.length, 0.0, 0.03 * self.length))
-        muscle, end = self._muscle(0, row, 0.0, 0.0, -1.0)
-        load = Shape(_box(0.0, 0.13 * self.length, end - 0.2 * self.length, end - 0.04 * self.length))
-        cable = np.array([[0.0, end], [0.0, end - 0.04 * self.length]])
-        return Drawing([ceiling, *muscle, load], [cable], [])
+    return Scene(muscles, (-0.5 * length, 0.5 * length, -1.5 * length, 0.1 * length), ("position",), draw)
 
 
-class ArmScene(Scene):
+def _arm_scene(muscles: MuscleShapes, arm: PlanarArm) -> Scene:
     """The links of a planar arm, with its muscles side by side above them."""
+    count, coordinates = len(muscles.geometries), tuple(c.name for c in arm.coordinates)
+    lengths = [link.length for link in arm.links]
+    reach = float(sum(lengths))
+    half = max(1.1 * reach, 1.2 * muscles.spacing * count)
 
-    mechanism: PlanarArm
-
-    @property
-    def reach(self) -> float:
-        """The length of the arm [m]."""
-        return float(sum(link.length for link in self.mechanism.links))
-
-    @property
-    def limits(self) -> tuple[float, float, float, float]:
-        half = max(1.1 * self.reach, 1.2 * self.spacing * len(self.geometries))
-        return -half, half, -1.15 * self.reach, 0.25 * self.reach + 1.25 * self.length
-
-    @property
-    def coordinate(self) -> str:
-        return self.coordinates[0]
-
-    @property
-    def coordinates(self) -> tuple[str, ...]:
-        return tuple(c.name for c in self.mechanism.coordinates)
-
-    def draw(self, row: Row) -> Drawing:
-        angles = np.cumsum([row[name] for name in self.coordinates])
-        steps = [
-            link.length * np.array([np.sin(a), -np.cos(a)])
-            for link, a in zip(self.mechanism.links, angles, strict=True)
-        ]
+    def draw(row: Row) -> Drawing:
+        angles = np.cumsum([row[name] for name in coordinates])
+        steps = [length * np.array([np.sin(a), -np.cos(a)]) for length, a in zip(lengths, angles, strict=True)]
         points = np.vstack([np.zeros(2), np.cumsum(steps, axis=0)])
-        shapes = [Shape(_box(0.0, 0.15 * self.reach, 0.03 * self.reach, 0.06 * self.reach))]
-        for index in range(len(self.geometries)):
-            place = 2.2 * self.spacing * (index - 0.5 * (len(self.geometries) - 1))
-            shapes += self._muscle(index, row, place, 0.15 * self.reach, 1.0)[0]
-        return Drawing(shapes, [points], [(*point.tolist(), 0.03 * self.reach) for point in points])
+        shapes = [_box(0.0, 0.15 * reach, 0.03 * reach, 0.06 * reach)]
+        for index in range(count):
+            place = 2.2 * muscles.spacing * (index - 0.5 * (count - 1))
+            shapes += muscles.shapes(index, row, place, 0.15 * reach, 1.0)[0]
+        return Drawing(shapes, [points], [(*point.tolist(), 0.03 * reach) for point in points])
+
+    limits = (-half, half, -1.15 * reach, 0.25 * reach + 1.25 * muscles.length)
+    return Scene(muscles, limits, coordinates, draw)
 
 
-def scene_of(geometries: Sequence[Geometry], prefixes: Sequence[str], mechanism: Mechanism) -> Scene:
-    """The scene of a plant. Raises ParameterError for a mechanism that is neither a joint of two muscles, a planar arm
-    nor a translation by one muscle."""
-    inner: Mechanism = mechanism
+def scene_of(
+    geometries: Sequence[Geometry], prefixes: Sequence[str], mechanism: Mechanism, recording: Recording
+) -> Scene:
+    """The scene of a plant along a run. Raises ParameterError for a mechanism that is neither a joint of two muscles, a
+    planar arm nor a translation by one muscle."""
+    inner: Any = mechanism
     while isinstance(inner, MechanismWrapper):
         inner = inner.inner
-    if isinstance(inner, AntagonisticJoint):
-        return JointScene(geometries, prefixes, inner)
-    if isinstance(inner, PlanarArm):
-        return ArmScene(geometries, prefixes, inner)
-    if isinstance(inner, Translation) and len(geometries) == 1:
-        return LiftScene(geometries, prefixes, inner)
+    scenes: dict[type, Callable[[MuscleShapes, Any], Scene]] = {AntagonisticJoint: _joint_scene, PlanarArm: _arm_scene}
+    if len(geometries) == 1:
+        scenes[Translation] = _lift_scene
+    for kind, scene in scenes.items():
+        if isinstance(inner, kind):
+            return scene(MuscleShapes(geometries, prefixes, recording), inner)
     raise ParameterError(
         f"animate: {type(inner).__name__} with {len(geometries)} muscles cannot be drawn; possible are an "
         "AntagonisticJoint, a PlanarArm, and a load on one muscle (HangingMass, SpringLoad). "
@@ -199,7 +168,6 @@ def scene_of(geometries: Sequence[Geometry], prefixes: Sequence[str], mechanism:
     )
 
 
-def _box(x: float, half_width: float, lower: float, upper: float) -> Array:
-    return np.array(
-        [[x - half_width, lower], [x + half_width, lower], [x + half_width, upper], [x - half_width, upper]]
-    )
+def _box(x: float, half_width: float, lower: float, upper: float) -> Shape:
+    left, right = x - half_width, x + half_width
+    return Shape(np.array([[left, lower], [right, lower], [right, upper], [left, upper]]))

@@ -8,7 +8,7 @@ from ...core.declaration import forwarded
 from ..muscle import ElasticSeriesElement, Muscle
 from ..muscle.friction import NoFriction
 from .plant import Plant
-from .static_plant import MuscleState, PlantEvaluation
+from .static_plant import MuscleState
 
 _METERS = (
     StateVariable("work_of_tension", "J", 1.0, "work of all tensions on the mechanism"),
@@ -84,19 +84,15 @@ class WithEnergyMeters(System):
 
     def rates(self, state: Values, inputs: Values) -> dict[str, Value]:
         """The plant's rates, and the power that each meter integrates."""
-        return self._rates_of(self.plant.evaluate(state, inputs), state, inputs)
+        return self.rates_and_outputs(state, inputs)[0]
 
     def outputs(self, state: Values, inputs: Values) -> dict[str, Any]:
         """The plant's outputs; kinetic, potential and the muscles' air energy [J]; mass of all air [kg]."""
-        return self._outputs_of(self.plant.evaluate(state, inputs), state)
+        return self.rates_and_outputs(state, inputs)[1]
 
     def rates_and_outputs(self, state: Values, inputs: Values) -> tuple[dict[str, Value], dict[str, Any]]:
         """Both from one evaluation of the plant."""
-        at = self.plant.evaluate(state, inputs)
-        return self._rates_of(at, state, inputs), self._outputs_of(at, state)
-
-    def _rates_of(self, at: PlantEvaluation, state: Values, inputs: Values) -> dict[str, Value]:
-        plant = self.plant
+        plant, at = self.plant, self.plant.evaluate(state, inputs)
         powers: dict[str, Value] = dict.fromkeys((meter.name for meter in self.meters), 0.0)
         for part, muscle, flow in zip(plant.muscles, at.muscles, at.flows, strict=True):
             powers["work_of_tension"] += muscle.tension * muscle.speed
@@ -109,18 +105,13 @@ class WithEnergyMeters(System):
         for circuit in at.circuits:
             powers["air_supplied"] += circuit.drawn.mass
             powers["air_exhausted"] += circuit.exhausted.mass
-        return {**plant.rates_of(at, state), **powers}
-
-    def _outputs_of(self, at: PlantEvaluation, state: Values) -> dict[str, Any]:
-        plant = self.plant
-        own = {s.name: state[s.name] for s in plant.states}
-        return {
-            **plant.outputs_of(at),
+        energies = {
             "kinetic_energy": plant.mechanism.kinetic_energy(state, state),
             "potential_energy": plant.mechanism.potential_energy(state),
             "air_energy": sum(plant.gas.available_energy(m.states, m.volume, plant.ambient) for m in at.muscles),
-            "air_total": total_air(own),
+            "air_total": total_air({s.name: state[s.name] for s in plant.states}),
         }
+        return {**plant.rates_of(at, state), **powers}, {**plant.outputs_of(at), **energies}
 
 
 def total_air(state: Mapping[str, Any]) -> Value:

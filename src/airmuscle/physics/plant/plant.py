@@ -61,11 +61,6 @@ class Plant(PlantDisplay, StaticPlant):
         """Inputs of the circuits, then of the mechanism, with their ranges."""
         return (*(i for p, c in self._circuits() for i in add_prefix(p, c.inputs)), *self.mechanism.inputs)
 
-    @functools.cached_property
-    def inputs(self) -> tuple[str, ...]:
-        """The names of all inputs."""
-        return tuple(i.name for i in self.input_variables)
-
     @property
     def output_units(self) -> Mapping[str, str]:
         """Units of the accelerations."""
@@ -94,9 +89,7 @@ class Plant(PlantDisplay, StaticPlant):
         """Whether a parameter affects the equilibrium; those of a circuit without states do not."""
         return not path.startswith("circuit") or any(circuit.states(self.ambient) for circuit in self.circuits)
 
-    def circuit_flows(
-        self, muscles: tuple[MuscleState, ...], state: Values, inputs: Values
-    ) -> tuple[CircuitFlows, ...]:
+    def circuit_flows(self, muscles: Sequence[MuscleState], state: Values, inputs: Values) -> tuple[CircuitFlows, ...]:
         """Flows, rates and outputs of every circuit."""
         air_states = self._by_circuit([muscle.air for muscle in muscles])
         return tuple(

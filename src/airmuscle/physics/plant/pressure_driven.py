@@ -6,16 +6,16 @@ from dataclasses import replace
 from typing import ClassVar
 
 from ...core import ParameterError, Value, Values, check_known, model, parameter
-from ...core.system import Input, StateVariable, System, select_prefix, with_prefix
+from ...core.system import Input, StateVariable, select_prefix, with_prefix
 from ..mechanism import ExternalLoad, Mechanism
 from ..muscle import Muscle
 from ..muscle.muscle import MuscleForce
 from .plant import Plant
-from .static_plant import states_of_muscle
+from .static_plant import MuscleSystem, states_of_muscle
 
 
 @model
-class PressureDriven(System):
+class PressureDriven(MuscleSystem):
     """Muscles and a mechanism at given pressures: p_i' = (p_m,i - p_i)/T_i for each muscle i.
 
     p_m,i the input `NAME.measured_pressure` (gauge), p_i the pressure that acts, T_i its lag behind the reading: the
@@ -40,16 +40,6 @@ class PressureDriven(System):
             raise ParameterError("PressureDriven: two muscles have the same name; give each one of its own.")
 
     @functools.cached_property
-    def prefixes(self) -> tuple[str, ...]:
-        """Prefixes of the names of each muscle's quantities."""
-        return ("",) if len(self.muscle) == 1 else tuple(f"{m.name}." for m in self.muscle)
-
-    @property
-    def resting_lengths(self) -> list[Value]:
-        """Resting lengths of the muscles [m]."""
-        return [m.geometry.resting_length for m in self.muscle]
-
-    @functools.cached_property
     def states(self) -> tuple[StateVariable, ...]:
         """Coordinates and speeds, states of the mechanism, pressures, states of the muscles."""
         moving = [state for coordinate in self.mechanism.coordinates for state in coordinate.states]
@@ -63,10 +53,6 @@ class PressureDriven(System):
         infinity = float("inf")
         measured = (Input(f"{p}measured_pressure", "Pa", -infinity, infinity, "gauge pressure") for p in self.prefixes)
         return (*measured, *self.mechanism.inputs)
-
-    @functools.cached_property
-    def inputs(self) -> tuple[str, ...]:
-        return tuple(i.name for i in self.input_variables)
 
     def _pulls(self, state: Values) -> list[tuple[Value, MuscleForce, dict[str, Value]]]:
         """The contraction, the forces and the own states of every muscle."""

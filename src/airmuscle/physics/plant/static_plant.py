@@ -95,14 +95,11 @@ class PlantEvaluation(NamedTuple):
         return [flow for circuit in self.circuits for flow in circuit.flows]
 
 
-class StaticPlant(System):
-    """Muscles that circuits fill and that act on a mechanism (base class of Plant): what an equilibrium needs."""
+class MuscleSystem(System):
+    """Muscles that act on a mechanism (base class)."""
 
     muscle: Muscle | tuple[Muscle, ...]
-    circuit: Circuit | tuple[Circuit, ...]
     mechanism: Mechanism
-    gas: Gas
-    ambient: Ambient
 
     @functools.cached_property
     def muscles(self) -> tuple[Muscle, ...]:
@@ -110,14 +107,32 @@ class StaticPlant(System):
         return self.muscle if isinstance(self.muscle, tuple) else (self.muscle,)
 
     @functools.cached_property
-    def circuits(self) -> tuple[Circuit, ...]:
-        """The circuits: one for each muscle, or a single one for all."""
-        return self.circuit if isinstance(self.circuit, tuple) else (self.circuit,)
-
-    @functools.cached_property
     def prefixes(self) -> tuple[str, ...]:
         """Prefixes of the names of each muscle's quantities."""
         return ("",) if len(self.muscles) == 1 else tuple(f"{m.name}." for m in self.muscles)
+
+    @property
+    def resting_lengths(self) -> list[Value]:
+        """Resting lengths of the muscles [m]."""
+        return [m.geometry.resting_length for m in self.muscles]
+
+    @functools.cached_property
+    def inputs(self) -> tuple[str, ...]:
+        """The names of all inputs."""
+        return tuple(i.name for i in self.input_variables)
+
+
+class StaticPlant(MuscleSystem):
+    """Muscles that circuits fill and that act on a mechanism (base class of Plant): what an equilibrium needs."""
+
+    circuit: Circuit | tuple[Circuit, ...]
+    gas: Gas
+    ambient: Ambient
+
+    @functools.cached_property
+    def circuits(self) -> tuple[Circuit, ...]:
+        """The circuits: one for each muscle, or a single one for all."""
+        return self.circuit if isinstance(self.circuit, tuple) else (self.circuit,)
 
     @property
     def circuit_prefixes(self) -> tuple[str, ...]:
@@ -127,11 +142,6 @@ class StaticPlant(System):
     @property
     def _shared(self) -> bool:
         return len(self.circuits) < len(self.muscles)
-
-    @property
-    def resting_lengths(self) -> list[Value]:
-        """Resting lengths of the muscles [m]."""
-        return [m.geometry.resting_length for m in self.muscles]
 
     def _circuits(self) -> Iterator[tuple[str, Circuit]]:
         return zip(self.circuit_prefixes, self.circuits, strict=True)
