@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ...core import Array, ArrayProgram, ParameterError, Value, Values, make_program
+from ...core import Array, ArrayProgram, ParameterError, Values, make_program
 from ...engine.compile.cache.kernel import Kernel, aligned_array
 from ...engine.compile.function import LANES, Function
-from ..muscle import ElasticSeriesElement, Muscle
+from ..muscle import ElasticSeriesElement
 from ..plant.plant import Plant
 from ..pneumatics.gas import absolute_pressure
 from .static_stiffness import enclosed_pressure_slope
@@ -38,7 +38,7 @@ STEPS = 128
 """Number of steps of the angle in the search for equilibria (chosen)."""
 CHUNK = 1000
 """Number of points that are searched at once, which limits the memory (chosen)."""
-_RESIDUAL = 1e-11
+RESIDUAL = 1e-11
 """Relative residual of torque and stiffness at which a solution is accepted (chosen)."""
 _MARGIN = 1e-12
 """Fraction of the pressure range by which a solution may exceed it through rounding."""
@@ -148,7 +148,12 @@ def torque_functions(plant: Plant, *, limited: bool = True) -> tuple[TracedRow, 
         torque = arm * tension
         stiffness = -casadi.jacobian(torque, angle)
         by_pressure = casadi.jacobian(torque, pressure)
-        squeezed = by_pressure * _pressure_slope(plant, muscle, pressure, contraction) * arm / length
+        own: Values = muscle.steady_state(pressure, contraction)
+        volume = muscle.volume(contraction, own)
+        content = plant.gas.state_at(absolute_pressure(pressure, plant.ambient), volume, plant.ambient)
+        air = plant.gas.air(content, volume, plant.ambient)
+        by_contraction = enclosed_pressure_slope(plant, muscle, contraction, volume, air, content)
+        squeezed = by_pressure * by_contraction * arm / length
         row = casadi.horzcat(
             torque, stiffness, by_pressure, casadi.jacobian(stiffness, pressure), tension, stiffness - squeezed, arm
         )
@@ -156,15 +161,6 @@ def torque_functions(plant: Plant, *, limited: bool = True) -> tuple[TracedRow, 
         affine = not any(casadi.which_depends(by_pressure, pressure, 1, False))
         functions.append(TracedRow(function, QUANTITIES, affine))
     return tuple(functions)
-
-
-def _pressure_slope(plant: Plant, muscle: Muscle, pressure: Value, contraction: Value) -> Value:
-    """dp/deps [Pa] of the air that is enclosed at a pressure, with the wall in steady state."""
-    own: Values = muscle.steady_state(pressure, contraction)
-    volume = muscle.volume(contraction, own)
-    content = plant.gas.state_at(absolute_pressure(pressure, plant.ambient), volume, plant.ambient)
-    air = plant.gas.air(content, volume, plant.ambient)
-    return enclosed_pressure_slope(plant, muscle, contraction, volume, air, content)
 
 
 def taut_branch(function: TracedRow, angle: Array, levels: Array) -> tuple[Array, Array]:
@@ -286,13 +282,3 @@ def _bracketed_root(
         if done.all():
             break
     return x
-
-
-def are_balanced(first: Sequence[Array], second: Sequence[Array], torque: Array, stiffness: Array) -> Mask:
-    """Whether torque and stiffness are balanced by two taut muscles, each given by torque, stiffness and tension."""
-    (q, k, tension), (other_q, other_k, other_tension) = first, second
-    scale = np.abs(q) + np.abs(other_q) + np.abs(torque)
-    rigid = np.abs(k) + np.abs(other_k) + np.abs(stiffness)
-    balanced = np.abs(q + other_q - torque) <= _RESIDUAL * scale
-    stiff = np.abs(k + other_k - stiffness) <= _RESIDUAL * rigid
-    return np.asarray(balanced & stiff & (tension > 0.0) & (other_tension > 0.0))

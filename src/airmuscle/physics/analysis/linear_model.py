@@ -151,10 +151,8 @@ class LinearModel:
         control = sampled_model.imported_control()
         if self.system is None:
             raise ParameterError("to_control: this model has no system; use the result of linearise.")
-        response = _Response(compile_system(self.system), self.inputs, self.outputs, dict(self.input_values))
-        return control.NonlinearIOSystem(
-            response.rates, response.outputs, name=type(self.system).__name__, **sampled_model.control_names(self)
-        )
+        name, names = type(self.system).__name__, sampled_model.control_names(self)
+        return control.NonlinearIOSystem(*_responses(self, self.system), name=name, **names)
 
     def __repr__(self) -> str:
         poles = [p.value for p in self.poles]
@@ -172,32 +170,26 @@ def _as_text(pole: complex, smallest: float) -> str:
     return f"{complex(*parts):.4g}" if parts[1] else f"{parts[0]:.4g}"
 
 
-class _Response:
-    """Rates and outputs of a compiled system, as python-control calls them."""
+def _responses(model: LinearModel, system: System) -> tuple[Callable[..., Array], Callable[..., Array]]:
+    """Rates (n,) and outputs (k,) of the system of a model, as python-control calls them."""
+    compiled, base = compile_system(system), np.array([*model.input_values.values(), 0.0])
+    known, sizes = compiled.description, compiled.sizes
+    places = [known.input_names.index(name) for name in model.inputs]
+    chosen = [[*known.state_names, *known.output_names].index(name) for name in model.outputs]
 
-    def __init__(
-        self, compiled: CompiledSystem, inputs: Sequence[str], outputs: Sequence[str], values: Mapping[str, float]
-    ) -> None:
-        known = compiled.description
-        self._compiled, self._u = compiled, np.array([*values.values(), 0.0])
-        self._inputs = [known.input_names.index(name) for name in inputs]
-        self._outputs = [[*known.state_names, *known.output_names].index(name) for name in outputs]
-
-    def rates(self, t: float, x: npt.ArrayLike, u: npt.ArrayLike, params: object) -> Array:
-        """The rates (n,)."""
-        return self._call("rhs", self._compiled.sizes.states, x, u)
-
-    def outputs(self, t: float, x: npt.ArrayLike, u: npt.ArrayLike, params: object) -> Array:
-        """The chosen outputs (k,), of which the states are some."""
-        state = np.asarray(x, dtype=float)
-        return np.concatenate([state, self._call("outputs", self._compiled.sizes.outputs, x, u)])[self._outputs]
-
-    def _call(self, function: str, size: int, x: npt.ArrayLike, u: npt.ArrayLike) -> Array:
-        inputs, result = self._u.copy(), np.zeros(size + 1)
-        inputs[self._inputs] = np.atleast_1d(np.asarray(u, dtype=float))[: len(self._inputs)]
-        state = np.ascontiguousarray(x, dtype=float)
-        self._compiled.call(function, state, inputs, self._compiled.precomputed, result)
+    def call(function: str, size: int, x: npt.ArrayLike, u: npt.ArrayLike) -> Array:
+        inputs, result = base.copy(), np.zeros(size + 1)
+        inputs[places] = np.atleast_1d(np.asarray(u, dtype=float))[: len(places)]
+        compiled.call(function, np.ascontiguousarray(x, dtype=float), inputs, compiled.precomputed, result)
         return result[:size]
+
+    def rates(t: float, x: npt.ArrayLike, u: npt.ArrayLike, params: object) -> Array:
+        return call("rhs", sizes.states, x, u)
+
+    def outputs(t: float, x: npt.ArrayLike, u: npt.ArrayLike, params: object) -> Array:
+        return np.concatenate([np.asarray(x, dtype=float), call("outputs", sizes.outputs, x, u)])[chosen]
+
+    return rates, outputs
 
 
 def linearise(plant: System, state: Mapping[str, float], inputs: Mapping[str, float] | None = None) -> LinearModel:

@@ -10,7 +10,7 @@ from ...recording import Recording
 from ..plant.plant import Plant
 from ..pneumatics.gas import gauge_pressure
 from . import joint_torque
-from .joint_torque import LEVELS, TracedRow, affine_candidates, general_candidates, torque_functions
+from .joint_torque import LEVELS, RESIDUAL, TracedRow, affine_candidates, general_candidates, torque_functions
 
 ANGLES = 121
 """Number of angles of the reachable region (chosen)."""
@@ -178,12 +178,16 @@ class JointStatics(ShortRepr):
         self, angle: Array, pressures: Array, torque: Array | None = None, stiffness: Array | None = None
     ) -> JointPoints:
         """The states at angles (N, S) and pressures (N, S, 2); only those of this torque and stiffness if given."""
-        muscles = [f(angle, pressures[..., i], *RESULTS) for i, f in enumerate(self.torques)]
-        (q, k, tension, shut), (other_q, other_k, other_tension, other_shut) = muscles
+        first, second = (f(angle, pressures[..., i], *RESULTS) for i, f in enumerate(self.torques))
+        (q, k, tension, shut), (other_q, other_k, other_tension, other_shut) = first, second
         with np.errstate(invalid="ignore"):
             known = np.isfinite(angle) & np.isfinite(pressures).all(axis=2)
             if torque is not None and stiffness is not None:
-                known &= joint_torque.are_balanced(muscles[0][:3], muscles[1][:3], torque, stiffness)
+                scale = np.abs(q) + np.abs(other_q) + np.abs(torque)
+                rigid = np.abs(k) + np.abs(other_k) + np.abs(stiffness)
+                known &= np.abs(q + other_q - torque) <= RESIDUAL * scale
+                known &= np.abs(k + other_k - stiffness) <= RESIDUAL * rigid
+                known &= (tension > 0.0) & (other_tension > 0.0)  # both are taut
             restoring = k + other_k + self.load(angle, "slope")[0]
             stable = np.where(restoring > 0.0, 1.0, 0.0)
         cocontraction = np.minimum(np.abs(q), np.abs(other_q))
