@@ -1,9 +1,9 @@
 """End stops of a mechanism: Hunt-Crossley contacts at both ends of the range of a coordinate."""
 
-import abc
 from typing import ClassVar
 
 from ...core import ParameterError, Reference, Value, Values, model, ops, parameter, published
+from ...core.declaration import forwarded
 from .base import Mechanism
 from .wrapper import CoordinateWrapper
 
@@ -54,17 +54,13 @@ class EndStops(CoordinateWrapper):
     lower_stop: float
     upper_stop: float
     what: ClassVar[str] = "end stops"
-
-    @property
-    @abc.abstractmethod
-    def lever_arm(self) -> Value:
-        """Displacement of the contact point per unit of the coordinate."""
+    lever_arm: Value
+    """Displacement of the contact point per unit of the coordinate."""
 
     def check(self) -> None:
         super().check()
-        low, high = self.lower_stop, self.upper_stop
+        owner, low, high = type(self).__name__, self.lower_stop, self.upper_stop
         if not low < high:
-            owner = type(self).__name__
             raise ParameterError(f"{owner}: lower_stop is {low:g}; it must be less than upper_stop, {high:g}.")
 
     def _contacts(self, q: Values, v: Values) -> tuple[tuple[Value, Value], ...]:
@@ -122,6 +118,4 @@ class JointWithEndStops(EndStops):
     """Name of the coordinate with end stops; required if several coordinates have this unit."""
     unit: ClassVar[str] = "rad"
 
-    @property
-    def lever_arm(self) -> Value:
-        return self.stop_radius
+    lever_arm = forwarded("stop_radius")

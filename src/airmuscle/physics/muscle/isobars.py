@@ -54,11 +54,17 @@ def compute_isobars(
     None stands for round pressures over the validity range; without one up to twice the pressure of the working point,
     or over the law's pressure range.
     """
+    from matplotlib.ticker import MaxNLocator
+
     if pressures is None:
         low, high = validity_range.pressure if validity_range else characteristic.pressure_range
         if validity_range is None and point is not None and point.pressure > low:
             high = min(2.0 * point.pressure, high)
-        pressures = _round_pressures(low, high)
+        # about seven round pressures from low to high, including the ends if they are round
+        ticks = np.asarray(MaxNLocator(nbins=7, steps=[1, 2, 5, 10]).tick_values(low, high), dtype=float)
+        margin = 1e-9 * (high - low)
+        inside = ticks[(ticks >= low - margin) & (ticks <= high + margin)]
+        pressures = inside if inside.size > 1 else np.array([low, high])
     low, high = _contraction_axis(characteristic, validity_range, point, pressures)
     contractions = np.linspace(low, high, POINTS if characteristic.traceable else COARSE_POINTS)
     forces = [forces_along(characteristic, float(pressure), contractions) for pressure in pressures]
@@ -125,16 +131,6 @@ def _force_axis_limit(curves: Isobars, point: WorkingPoint | None, measured: Rec
     return max(1e-9, min(limit, float(pulling.max(initial=0.0))), *points)
 
 
-def _round_pressures(low: float, high: float) -> Array:
-    """Return about seven round pressures from low to high, including the ends if they are round."""
-    from matplotlib.ticker import MaxNLocator
-
-    ticks = np.asarray(MaxNLocator(nbins=7, steps=[1, 2, 5, 10]).tick_values(low, high), dtype=float)
-    margin = 1e-9 * (high - low)
-    inside: Array = ticks[(ticks >= low - margin) & (ticks <= high + margin)]
-    return inside if inside.size > 1 else np.array([low, high])
-
-
 def _contraction_axis(
     characteristic: Characteristic, validity_range: ValidityRange | None, point: WorkingPoint | None, pressures: Array
 ) -> tuple[float, float]:
@@ -162,14 +158,10 @@ def forces_along(characteristic: Characteristic, pressure: float, contractions: 
 
     It is NaN where the law is undefined or the tension negative.
     """
-    if isinstance(characteristic, ContractionLaw):
-        return _invert_contraction_law(characteristic, pressure, contractions)
-    forces = values_or_nan(lambda c: characteristic.force(pressure, c), contractions)
-    return np.where(np.isfinite(forces) & (forces >= 0), forces, np.nan)
-
-
-def _invert_contraction_law(characteristic: ContractionLaw, pressure: float, contractions: Array) -> Array:
-    """Return the tension of a contraction law along an isobar, by interpolation of its inverse without a search."""
+    if not isinstance(characteristic, ContractionLaw):
+        forces = values_or_nan(lambda c: characteristic.force(pressure, c), contractions)
+        return np.where(np.isfinite(forces) & (forces >= 0), forces, np.nan)
+    # by interpolation of the inverse, without a search
     forces = np.linspace(*characteristic.force_range, 4 * POINTS)
     values = values_or_nan(lambda force: characteristic.contraction(pressure, force), forces)
     finite = np.isfinite(values)

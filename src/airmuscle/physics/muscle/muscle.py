@@ -6,17 +6,7 @@ from collections.abc import Mapping
 from types import MappingProxyType
 from typing import Any, ClassVar, NamedTuple
 
-from ...core import (
-    Reference,
-    StateVariable,
-    Value,
-    Values,
-    autodiff,
-    contraction_text,
-    model,
-    ops,
-    quantity_text,
-)
+from ...core import Reference, StateVariable, Value, Values, autodiff, contraction_text, model, ops, quantity_text
 from ...core.errors import AirmuscleWarning, ParameterError
 from ...recording.notebook import Card, NotebookDisplay
 from .characteristic import HOSOVSKY_HILL, Characteristic, Clamped, ForceLaw, VirtualWork
@@ -66,7 +56,6 @@ class Muscle(QuantityMethods, NotebookDisplay):
         "static_force": ("Pa", "1"),
         "stiffness": ("Pa", "1"),
     }
-
     accepted: ClassVar[Mapping[str, type]] = MappingProxyType({"contractile": Characteristic})
     """Types of fields in Python; a muscle in a plant, and so one of a file, needs the annotated one."""
 

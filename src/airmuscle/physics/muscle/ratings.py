@@ -1,6 +1,6 @@
 """Ratings of a muscle: values that its maker permits for force, pressure, contraction, length and temperature."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 from ...core import INFINITY, ParameterError, model, parameter, parameters
@@ -10,8 +10,14 @@ FORCE_BOUNDS = (0.0, 1e6)
 LENGTH_BOUNDS = (1e-3, 20.0)
 TEMPERATURE_BOUNDS = (1.0, 1000.0)
 """Physical bounds; a limit that is not stated is equal to its bound."""
-QUANTITIES = ("force", "pressure", "contraction", "length", "temperature")
-"""Rated quantities."""
+QUANTITIES: dict[str, tuple[Any, ...]] = {
+    "force": (1.0, "N"),
+    "pressure": (1e3, "kPa"),
+    "contraction": (0.01, "%"),
+    "length": (1e-3, "mm"),
+    "temperature": (1.0, "°C", 273.15),
+}
+"""Rated quantities, with the factor, the unit and the offset of their display."""
 
 
 class RatedRange(NamedTuple):
@@ -81,14 +87,9 @@ class Ratings:
     def ranges(self) -> Iterator[RatedRange]:
         """Permitted ranges of force, pressure, contraction, length and temperature that state a limit."""
         stated = {name: getattr(self, name) for name in self.stated}
-        stretch = -stated.get("max_prestretch", INFINITY)
-        rows = (
-            RatedRange("force", -INFINITY, stated.get("max_force", INFINITY), 1.0, "N"),
-            RatedRange("pressure", *_limits(stated, "pressure"), 1e3, "kPa"),
-            RatedRange("contraction", stretch, stated.get("max_contraction", INFINITY), 0.01, "%"),
-            RatedRange("length", *_limits(stated, "length"), 1e-3, "mm"),
-            RatedRange("temperature", *_limits(stated, "temperature"), 1.0, "°C", 273.15),
-        )
+        limits = {q: (stated.get(f"min_{q}", -INFINITY), stated.get(f"max_{q}", INFINITY)) for q in QUANTITIES}
+        limits["contraction"] = (-stated.get("max_prestretch", INFINITY), limits["contraction"][1])
+        rows = (RatedRange(quantity, *limits[quantity], *display) for quantity, display in QUANTITIES.items())
         return (row for row in rows if row.low > -INFINITY or row.high < INFINITY)
 
     def excesses(self, **values: float) -> tuple[str, ...]:
@@ -105,7 +106,3 @@ class Ratings:
             for row in self.ranges()
             if row.quantity in values and not row.contains(values[row.quantity])
         )
-
-
-def _limits(stated: Mapping[str, float], quantity: str) -> tuple[float, float]:
-    return stated.get(f"min_{quantity}", -INFINITY), stated.get(f"max_{quantity}", INFINITY)
