@@ -229,11 +229,9 @@ def _figure(choice: MuscleChoice) -> Any:
     radius = "" if choice.design.radius is None else f", radius {1e3 * choice.design.radius:.4g} mm"
     title = f"{choice.size}{radius}"
     figure = isobar_figure(entry.characteristic, title, compute_isobars(entry.characteristic, valid), valid)
-    axes = figure.axes[0]
-    _draw_limits(axes, choice)
-    _draw_load(axes, choice)
-    _draw_points(axes, choice)
-    plotting.legend_outside(axes)
+    _draw_limits(figure.axes[0], choice)
+    _draw_motion(figure.axes[0], choice)
+    plotting.legend_outside(figure.axes[0])
     return figure
 
 
@@ -249,21 +247,16 @@ def _draw_limits(axes: Any, choice: MuscleChoice) -> None:
         axes.axvline(100 * permitted, color=plotting.BLACK, linestyle="-.", linewidth=1.0, label="maximum contraction")
 
 
-def _draw_load(axes: Any, choice: MuscleChoice) -> None:
-    """Draw the load of one muscle over the stroke, and with the safety factor; a joint has no single path."""
-    if not isinstance(choice.requirement, LiftRequirement):
-        return
-    displacement, load = choice.requirement.path
-    contraction = 100 * (choice.design.extended.contraction + displacement / choice.length)
-    factor = choice.conditions.safety_factor
-    axes.plot(contraction, load / choice.count, color=plotting.RED, linewidth=2.0, label="load", zorder=3)
-    axes.plot(contraction, factor * load / choice.count, color=plotting.RED, linestyle="--", linewidth=1.2,
-              label=f"load x {factor:.3g}", zorder=3)  # fmt: skip
-
-
-def _draw_points(axes: Any, choice: MuscleChoice) -> None:
-    lift = isinstance(choice.requirement, LiftRequirement)
-    names = ("start", "end") if lift else ("extended", "contracted")
+def _draw_motion(axes: Any, choice: MuscleChoice) -> None:
+    """Both working points, and of a lift the load of one muscle over the stroke, alone and with the safety factor."""
+    names = ("extended", "contracted")
+    if isinstance(choice.requirement, LiftRequirement):
+        names, (displacement, load) = ("start", "end"), choice.requirement.path
+        contraction = 100 * (choice.design.extended.contraction + displacement / choice.length)
+        factor = choice.conditions.safety_factor
+        axes.plot(contraction, load / choice.count, color=plotting.RED, linewidth=2.0, label="load", zorder=3)
+        axes.plot(contraction, factor * load / choice.count, color=plotting.RED, linestyle="--", linewidth=1.2,
+                  label=f"load x {factor:.3g}", zorder=3)  # fmt: skip
     points = zip((choice.design.extended, choice.design.contracted), names, ("o", "s"), strict=True)
     for point, name, marker in points:
         axes.plot(

@@ -2,6 +2,7 @@
 
 import dataclasses
 import math
+import operator
 from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
@@ -117,29 +118,19 @@ SortKey = Callable[[MuscleChoice], float | None]
 """Criterion of a ranking: the smaller the better; a choice without a value is last."""
 
 
-def by_air(choice: MuscleChoice) -> float | None:
-    """Air of a cycle [kg]."""
-    return choice.air
+by_air: SortKey = operator.attrgetter("air")
+"""Air of a cycle [kg]."""
+by_length: SortKey = operator.attrgetter("length")
+"""Nominal length [m]."""
+by_count: SortKey = operator.attrgetter("total_count")
+"""Number of all muscles."""
+by_diameter: SortKey = operator.attrgetter("diameter")
+"""Maximum outer diameter [m]."""
 
 
-def by_length(choice: MuscleChoice) -> float | None:
-    """Nominal length [m]."""
-    return choice.length
-
-
-def by_count(choice: MuscleChoice) -> float | None:
-    """Number of all muscles."""
-    return float(choice.total_count)
-
-
-def by_reserve(choice: MuscleChoice) -> float | None:
+def by_reserve(choice: MuscleChoice) -> float:
     """Force reserve, largest first."""
     return -choice.design.reserve
-
-
-def by_diameter(choice: MuscleChoice) -> float | None:
-    """Maximum outer diameter [m]."""
-    return choice.diameter
 
 
 SORT_KEYS: Mapping[str, SortKey] = MappingProxyType({

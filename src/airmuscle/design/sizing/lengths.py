@@ -58,8 +58,8 @@ class LiftSearch:
     @property
     def _ends(self) -> tuple[LoadLimits, LoadLimits]:
         """Loads of one muscle [N] at the start and at the end."""
-        least, greatest = self._loads(np.array([0.0, self.requirement.stroke]))
-        return LoadLimits(least[0], greatest[0]), LoadLimits(least[1], greatest[1])
+        start, end = zip(*self._loads(np.array([0.0, self.requirement.stroke])), strict=True)
+        return LoadLimits(*start), LoadLimits(*end)
 
     @property
     def _path(self) -> tuple[Array, LoadLimits]:
@@ -232,7 +232,11 @@ class JointSearch:
                     f"at {muscle.pressure_range[1] / 1e5:.4g} bar, the contracted muscle is not stronger than the "
                     f"extended one at {muscle.pressure_range[0] / 1e5:.4g} bar, at any contraction"
                 )
-            extended, contracted = _around(extended, int(i), low, high), _around(contracted, int(k), low, high)
+            step = float(extended[1] - extended[0]), float(contracted[1] - contracted[0])
+            extended, contracted = (
+                np.linspace(max(low, middle - width), min(high, middle + width), ZOOM_GRID)
+                for middle, width in zip(best[1:], step, strict=True)
+            )
         return best
 
     def required_length(self, muscle: StaticMuscle) -> float:
@@ -278,11 +282,11 @@ class JointSearch:
         lengths = self._needed(muscle, np.array([extended]), np.array([contracted])).ravel()
         limiting = int(np.argmax(lengths[:2]))  # the muscle whose torque determines the shortest length
         if lengths[2] > lengths[limiting]:
+            reached, needed = (1e3 * self._radius(each, contracted - extended) for each in (length, shortest))
             return (
-                f"with {1e3 * length:.4g} mm, the pulley has a radius of at most "
-                f"{1e3 * self._radius(length, contracted - extended):.4g} mm; the muscles on both sides, "
-                f"{1e3 * float(muscle.outer_diameter(np.array(contracted))):.4g} mm thick at pressure, need "
-                f"{1e3 * self._radius(shortest, contracted - extended):.4g} mm"
+                f"with {1e3 * length:.4g} mm, the pulley has a radius of at most {reached:.4g} mm; the muscles on both "
+                f"sides, {1e3 * float(muscle.outer_diameter(np.array(contracted))):.4g} mm thick at pressure, need "
+                f"{needed:.4g} mm"
             )
         needed = self.conditions.safety_factor * self._torques[limiting]
         reached = needed * length / shortest  # the needed length is proportional to the torque
@@ -291,9 +295,3 @@ class JointSearch:
             f"with {1e3 * length:.4g} mm, the torque at the ends is at most {reached:.4g} N m; {needed:.4g} N m is "
             f"needed{inertia}"
         )
-
-
-def _around(grid: Array, index: int, low: float, high: float) -> Array:
-    """A finer grid around a point of a grid, within the limits."""
-    step = float(grid[1] - grid[0])
-    return np.linspace(max(low, grid[index] - step), min(high, grid[index] + step), ZOOM_GRID)

@@ -3,7 +3,7 @@
 import dataclasses
 import math
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -23,8 +23,7 @@ TRIAL = 1e-8
 """Conductance [m3/(s Pa)] for which the time is computed first; the time is inversely proportional to it."""
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class AirPath:
+class AirPath(NamedTuple):
     """Absolute pressures [Pa] and air masses [kg] of one muscle along the path from long to short, (N,) each."""
 
     pressure: Array
@@ -122,8 +121,7 @@ def scenario_text(choice: MuscleChoice) -> str:
     return scenario_toml(title, plant, inputs, run, _note(choice, is_inertia_chosen))
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class SizingScenario:
+class SizingScenario(NamedTuple):
     """The scenario of the first choice that can be simulated: choice, text, and a sentence on it; none without."""
 
     choice: MuscleChoice | None
@@ -187,8 +185,12 @@ def _lift(choice: MuscleChoice) -> tuple[Plant, dict[str, Any], dict[str, Any], 
     fill, discharge = scenario_valves(choice)
     damping = 2.0 * DAMPING_RATIO * math.sqrt(choice.count * _stiffness(choice) * mass) / choice.count
     names = tuple(f"muscle{i + 1}" for i in range(choice.count)) if choice.count > 1 else ("muscle",)
+    several, muscles = choice.count > 1, _muscles(choice, names, damping)
     circuit = FillDischarge(Supply(choice.conditions.supply), fill, discharge)
-    plant = _plant(choice, _muscles(choice, names, damping), circuit, mechanism)
+    plant = Plant(
+        muscles if several else muscles[0], (circuit,) * choice.count if several else circuit, mechanism, Isothermal(),
+        choice.conditions.ambient,
+    )  # fmt: skip
     rows = {"fill": (RESTING, RESTING + MOVING), "discharge": (2 * RESTING + MOVING, 1.0)}
     prefixes = [f"{name}." for name in names] if choice.count > 1 else [""]
     inputs = {f"{prefix}{name}": [[start * cycle, 1.0], [end * cycle, 0.0]]
@@ -224,7 +226,8 @@ def _joint(choice: MuscleChoice) -> tuple[Plant, dict[str, Any], dict[str, Any],
     )  # fmt: skip
     supply = choice.conditions.supply
     regulator = ProportionalRegulator(Supply(supply), fill, discharge, LAG, BAND, max_setpoint=supply)
-    plant = _plant(choice, _muscles(choice, ("left", "right"), damping), regulator, joint)
+    muscles = _muscles(choice, ("left", "right"), damping)
+    plant = Plant(muscles, (regulator, regulator), joint, Isothermal(), choice.conditions.ambient)
     low, high = design.extended.pressure, design.contracted.pressure
     middle = 0.5 * (low + high)
     inputs = {
@@ -237,14 +240,6 @@ def _joint(choice: MuscleChoice) -> tuple[Plant, dict[str, Any], dict[str, Any],
         "initial_state": {"pressure": middle, "angle": 0.0},
     }
     return plant, inputs, run, inertia != requirement.inertia
-
-
-def _plant(choice: MuscleChoice, muscles: tuple[Muscle, ...], circuit: Any, mechanism: Mechanism) -> Plant:
-    single = len(muscles) == 1
-    return Plant(
-        muscles[0] if single else muscles, circuit if single else (circuit,) * len(muscles), mechanism, Isothermal(),
-        choice.conditions.ambient,
-    )  # fmt: skip
 
 
 def _note(choice: MuscleChoice, chosen_inertia: bool) -> str:

@@ -13,7 +13,7 @@ from ...files.library import Entry, list_products, load_law, own_length, product
 from .choice import MuscleChoice, Requirement, SortKey, UnsuitableMuscle, by_air, rank
 from .lengths import JointSearch, LiftSearch
 from .requirement import LiftRequirement, SizingConditions
-from .static_muscle import LengthRange, at_length, least_sufficient, length_range, static_muscle
+from .static_muscle import at_length, least_sufficient, length_range, static_muscle
 
 LENGTHS = 49
 """Lengths that are tried for a law that depends on its length, before the shortest is refined (chosen)."""
@@ -139,14 +139,13 @@ def _choices_of(
             reason = str(error).removeprefix(f"{entry.name}: ").rstrip(".")
             failed = UnsuitableMuscle(entry.name, count if isinstance(error, SolveError) else 0, reason)
         else:
-            choices += [] if any(_is_dominated(choice, other) for other in choices) else [choice]
+            is_dominated = any(
+                other.length <= choice.length * (1.0 + 1e-9)
+                and (choice.air is None or other.air is None or other.air <= choice.air)
+                for other in choices
+            )
+            choices += [] if is_dominated else [choice]
     return choices, failed
-
-
-def _is_dominated(choice: MuscleChoice, other: MuscleChoice) -> bool:
-    """Whether another choice of the same type with fewer muscles is as short and takes as little air."""
-    less_air = choice.air is None or other.air is None or other.air <= choice.air
-    return less_air and other.length <= choice.length * (1.0 + 1e-9)
 
 
 def choose(entry: Entry, requirement: Requirement, conditions: SizingConditions, count: int = 1) -> MuscleChoice:
@@ -175,8 +174,9 @@ def choose(entry: Entry, requirement: Requirement, conditions: SizingConditions,
     return choice
 
 
-def _shortest_length(entry: Entry, search: Search, lengths: LengthRange) -> float:
+def _shortest_length(entry: Entry, search: Search, lengths: tuple[float, float]) -> float:
     """The shortest length of the range that suffices, or the largest of the range."""
+    low, high = lengths
 
     def needed(length: float) -> float:
         return search.required_length(static_muscle(at_length(entry, length), search.conditions))
@@ -187,19 +187,19 @@ def _shortest_length(entry: Entry, search: Search, lengths: LengthRange) -> floa
         except AirmuscleError:
             return False
 
-    if lengths.low == lengths.high:
-        return lengths.high
+    if low == high:
+        return high
     if not _depends_on_length(entry, search, lengths):
-        return float(np.clip(needed(lengths.high), *lengths))
-    previous = lengths.low
-    for length in np.geomspace(*lengths, LENGTHS).tolist():
+        return float(np.clip(needed(high), low, high))
+    previous = low
+    for length in np.geomspace(low, high, LENGTHS).tolist():
         if suffices(length):
-            return length if length == lengths.low else least_sufficient(suffices, previous, length)
+            return length if length == low else least_sufficient(suffices, previous, length)
         previous = length
-    return lengths.high
+    return high
 
 
-def _depends_on_length(entry: Entry, search: Search, lengths: LengthRange) -> bool:
+def _depends_on_length(entry: Entry, search: Search, lengths: tuple[float, float]) -> bool:
     """Whether the force at equal pressure and contraction, or its range, depends on the length."""
     if own_length(entry) is None:
         return False

@@ -27,13 +27,6 @@ TRIAL_RATIO = 1.001
 """Ratio of lengths of the trial that finds whether a law can be scaled (chosen)."""
 
 
-class LengthRange(NamedTuple):
-    """Nominal lengths [m] of a muscle; both are equal if the law holds for one length only."""
-
-    low: float
-    high: float
-
-
 class EndPoint(NamedTuple):
     """End point of a motion for one muscle: gauge pressure [Pa], contraction [1], tension [N], and the tension [N] of
     which the muscle is capable there at its maximum pressure."""
@@ -157,36 +150,27 @@ def static_muscle(entry: Entry, conditions: SizingConditions) -> StaticMuscle:
     return StaticMuscle(entry, (low, high), contraction)
 
 
-def length_range(entry: Entry, max_length: float) -> LengthRange:
-    """Nominal lengths [m] for which the law of an entry can be used, from three diameters (chosen) up to `max_length`.
-
-    Raises ParameterError if there are none, with the reason.
-    """
+def length_range(entry: Entry, max_length: float) -> tuple[float, float]:
+    """Least and greatest nominal length [m] for which the law of an entry can be used: from three diameters (chosen) up
+    to `max_length`, or the only one for which it holds. Raises ParameterError if there are none, with the reason."""
     low, high = LENGTH_BOUNDS if entry.ratings is None else (entry.ratings.min_length, entry.ratings.max_length)
-    length = own_length(entry)
-    if length is not None and not _can_be_scaled(entry, length):
-        low = high = length
-    elif entry.ratings is not None:
+    if entry.ratings is not None:
         low = max(low, LEAST_DIAMETERS * entry.ratings.diameter)
+    if (length := own_length(entry)) is not None:
+        try:
+            scale_entry(dataclasses.replace(entry, ratings=None), resting_length=TRIAL_RATIO * length)
+        except ParameterError:
+            low = high = length
     if low > max_length:
         what = "only length" if low == high else "least length"
         raise ParameterError(f"its {what} is {1e3 * low:.4g} mm; at most {1e3 * max_length:.4g} mm is allowed")
-    return LengthRange(low, min(high, max_length))
+    return low, min(high, max_length)
 
 
 def at_length(entry: Entry, length: float) -> Entry:
     """The entry with this resting length [m]; a law in pressure and contraction alone is unchanged."""
     own = own_length(entry)
     return entry if own is None or own == length else scale_entry(entry, resting_length=length)
-
-
-def _can_be_scaled(entry: Entry, length: float) -> bool:
-    unrated = dataclasses.replace(entry, ratings=None)
-    try:
-        scale_entry(unrated, resting_length=TRIAL_RATIO * length)
-    except ParameterError:
-        return False
-    return True
 
 
 def _solve_for_force(law: Characteristic, pressure: Any, contraction: Any) -> Any:
