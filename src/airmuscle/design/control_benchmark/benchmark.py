@@ -134,14 +134,11 @@ class BenchmarkResult(ShortRepr):
         errors = np.array([[self.values(n, task.name, "rmse", group) for task in self.tasks] for n in names])
         with np.errstate(divide="ignore", invalid="ignore"):
             logarithms = np.log(errors / errors.min(axis=0))
-        scores = np.exp(np.where(np.isfinite(errors), logarithms, math.inf).mean(axis=1))
-        return {name: scores[i] * self.wear(name, group) for i, name in enumerate(names)}
-
-    def wear(self, contender: str, group: Group) -> Array:
-        """By which factor a valve at rest lives shorter than REST_LIFE (searches, truths); 1 where it lives longer."""
+        scores = dict(zip(names, np.exp(np.where(np.isfinite(errors), logarithms, math.inf).mean(axis=1)), strict=True))
         if REST_TASK not in [task.name for task in self.tasks]:
-            return np.ones((len(self.seeds), len(self.truths)))
-        return np.asarray(np.maximum(1.0, REST_LIFE / self.values(contender, REST_TASK, "valve_life", group)))
+            return scores
+        lives = {name: self.values(name, REST_TASK, "valve_life", group) for name in names}
+        return {name: score * np.maximum(1.0, REST_LIFE / lives[name]) for name, score in scores.items()}
 
     def scores(self, group: Group = Group.MODELS) -> dict[str, Spread]:
         """The scores of a group over searches and truths, ascending by their medians."""

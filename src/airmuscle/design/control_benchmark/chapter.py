@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core import Reference, cite, conversion, counted
+from ...core import cite, conversion, counted
 from ...report.chapter import Chapter, NamedValue, Table, TableColumn
 from .benchmark import REST_LIFE, REST_TASK, BenchmarkResult, Group
 from .commissioning import RESTARTS, SEARCH_SPREAD
@@ -30,34 +30,40 @@ def _column(metric: str, values: Sequence[float], **declared: Any) -> TableColum
 
 def benchmark_chapter(result: BenchmarkResult, curves: Sequence[LearningCurve] = ()) -> Chapter:
     """The chapter of a benchmark: for each group ranking and errors, then searches, gains, truths and all metrics."""
-    tables: list[Table] = []
+    joint, tables = result.joint, list[Table]()
     for group in result.groups:
         is_ordered = len(result.contenders(group)) > 1 and len(result.truths) > 1
         tables += [ranking_table(result, group), *([order_table(result, group)] if is_ordered else [])]
         tables.append(error_table(result, "rmse", group))
-    tables += [table for table in (search_table(result), gains_table(result)) if table]
-    tables += [truth_table(result), metrics_table(result)]
-    tables += [learning_table(curves)] if curves else []
-    tables += [failures] if (failures := failure_table(result)) else []
+    further = search_table(result), gains_table(result), truth_table(result), metrics_table(result)
+    last = learning_table(curves) if curves else None, failure_table(result)
+    tables += [table for table in (*further, *last) if table is not None]
     learned = [f"learning: {each.errors[0]:.3g} degrees in trial 1, {each.errors[-1]:.3g} in trial {each.errors.size}"
                for each in curves]  # fmt: skip
+    sources = cite((joint.model, *(truth.plant for truth in joint.truths), *(each.law for each in result.results)))
+    tuned = [reference for each in result.results if each.tuning for reference in each.tuning.references]
     return Chapter(
         name="benchmark",
-        title=f"Control of an antagonistic joint with {result.joint.name}",
+        title=f"Control of an antagonistic joint with {joint.name}",
         summary=tuple(_summary(result)),
         values=(NamedValue("seeds", ", ".join(map(str, result.seeds)), brief=False),),
         tables=tuple(tables),
         plots=benchmark_plots(result, curves),
         notes=tuple(learned),
-        references=_references(result),
+        references=tuple({reference.key: reference for reference in (*sources, BONE2019, *tuned)}.values()),
         chosen=_settings(result),
     )
 
 
 def ranking_table(result: BenchmarkResult, group: Group) -> Table:
     """The contenders of a group by score, with what they cost."""
-    scores = result.scores(group)
-    rest = {name: _at_rest(result, name, group) for name in scores}
+    scores, tasks = result.scores(group), [task.name for task in result.tasks]
+    air = [[result.metric(name, task, "air", group).median for task in tasks] for name in scores]
+    errors = [[result.values(name, task, "rmse", group) for task in tasks] for name in scores]
+    strokes, life = (
+        [result.metric(name, REST_TASK, metric, group).median if REST_TASK in tasks else math.nan for name in scores]
+        for metric in ("strokes", "valve_life")
+    )
     return Table(
         f"ranking_{group.name.lower()}",
         f"Ranking, {group}",
@@ -66,10 +72,10 @@ def ranking_table(result: BenchmarkResult, group: Group) -> Table:
             "score": [each.median for each in scores.values()],
             "lowest": [each.low for each in scores.values()],
             "highest": [each.high for each in scores.values()],
-            "air, mean": _column("air", [_mean(result, name, "air", group) for name in scores]),
-            "strokes at rest": _column("strokes", [strokes for strokes, _ in rest.values()]),
-            "valve life at rest": _column("valve_life", [life for _, life in rest.values()], short="life at rest"),
-            "runs completed": TableColumn([_completed(result, name, group) for name in scores], "1", "%", brief=False),
+            "air, mean": _column("air", [sum(each) / len(each) for each in air]),
+            "strokes at rest": _column("strokes", strokes),
+            "valve life at rest": _column("valve_life", life, short="life at rest"),
+            "runs completed": TableColumn([float(np.isfinite(e).mean()) for e in errors], "1", "%", brief=False),
         },
         "Score: geometric mean over the tasks of the rms error, divided by the smallest of the group on the same "
         f"truth, times {REST_LIFE:g} h over the life of the busiest valve in the task '{REST_TASK}' where it is "
@@ -209,23 +215,6 @@ def _rows(
     return Table(key, title, columns, shown=shown) if rows else None
 
 
-def _at_rest(result: BenchmarkResult, name: str, group: Group) -> tuple[float, float]:
-    """Median strokes [1/s] and valve life [h] at rest; NaN without the task."""
-    if REST_TASK not in [task.name for task in result.tasks]:
-        return math.nan, math.nan
-    strokes, life = (result.metric(name, REST_TASK, metric, group).median for metric in ("strokes", "valve_life"))
-    return strokes, life
-
-
-def _mean(result: BenchmarkResult, name: str, metric: str, group: Group) -> float:
-    values = [result.metric(name, task.name, metric, group).median for task in result.tasks]
-    return sum(values) / len(values)
-
-
-def _completed(result: BenchmarkResult, name: str, group: Group) -> float:
-    return float(np.isfinite([result.values(name, task.name, "rmse", group) for task in result.tasks]).mean())
-
-
 def _summary(result: BenchmarkResult) -> list[str]:
     joint = result.joint
     number = len({each.name for each in result.results})
@@ -242,16 +231,12 @@ def _summary(result: BenchmarkResult) -> list[str]:
     ]
 
 
-def _references(result: BenchmarkResult) -> tuple[Reference, ...]:
-    plants = (result.joint.model, *(truth.plant for truth in result.joint.truths))
-    sources = cite((*plants, *(each.law for each in result.results)))
-    tuned = [reference for each in result.results if each.tuning for reference in each.tuning.references]
-    return tuple({reference.key: reference for reference in (*sources, BONE2019, *tuned)}.values())
-
-
 def _settings(result: BenchmarkResult) -> tuple[tuple[str, str, str], ...]:
-    joint = result.joint
-    sensors = [(f"sensor of {sensor.column}", _sensor_text(sensor), "chosen") for sensor in joint.sensors]
+    joint, sensors = result.joint, list[tuple[str, str, str]]()
+    for sensor in joint.sensors:
+        known = {f.name: getattr(sensor, f.name) for f in dataclasses.fields(sensor) if f.name != "column"}
+        text = ", ".join(f"{name} {value:.4g}" for name, value in known.items() if value)
+        sensors.append((f"sensor of {sensor.column}", text, "chosen"))
     return (
         ("valves", joint.valve, "chosen"),
         ("mean pressure", f"{joint.mean_pressure / 1e5:g} bar", "chosen"),
@@ -259,8 +244,3 @@ def _settings(result: BenchmarkResult) -> tuple[tuple[str, str, str], ...]:
         ("objective of tuning", str(joint.objective), "chosen"),
         *sensors,
     )
-
-
-def _sensor_text(sensor: object) -> str:
-    fields = [f for f in dataclasses.fields(sensor) if f.name != "column"]  # type: ignore[arg-type]
-    return ", ".join(f"{f.name} {getattr(sensor, f.name):.4g}" for f in fields if getattr(sensor, f.name))

@@ -3,7 +3,7 @@
 import contextlib
 import dataclasses
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import TypeVar
 
 import numpy as np
@@ -71,7 +71,11 @@ def find_gains(
     completed = complete(joint, contender, seed)
     if not completed.bounds or not sets_per_gain:
         return None
-    cases = list(_cases(joint, completed.law))
+    cases = []
+    for task in joint.tuning_tasks:
+        loop = task_loop(joint, completed.law, task, joint.model, joint.drivers)
+        for name, plant in joint.family.items():
+            cases.append(LoopCase(f"{task.name}, {name}", plant, loop, joint.start(plant)))
     return tune(
         cases, completed.bounds, duration=joint.tuning_tasks[0].duration,
         index=RootMeanSquareError({"angle": DEGREE}, TUNING_BEGIN), objective=joint.objective,
@@ -79,14 +83,6 @@ def find_gains(
         integrator=None if joint.switching else TUNING_INTEGRATOR,
         progress=lambda done, total: progress(f"tuning {contender.name}", done, total),
     )  # fmt: skip
-
-
-def _cases(joint: BenchmarkJoint, law: Controller) -> Iterator[LoopCase]:
-    """The tuning tasks on all models."""
-    for task in joint.tuning_tasks:
-        loop = task_loop(joint, law, task, joint.model, joint.drivers)
-        for name, plant in joint.family.items():
-            yield LoopCase(f"{task.name}, {name}", plant, loop, joint.start(plant))
 
 
 @dataclasses.dataclass(frozen=True)

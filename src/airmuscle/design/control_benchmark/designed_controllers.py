@@ -2,7 +2,7 @@
 
 import functools
 from collections.abc import Callable, Mapping
-from typing import Any, ClassVar, NamedTuple, TypeVar
+from typing import Any, ClassVar, TypeVar
 
 import numpy as np
 
@@ -192,12 +192,8 @@ class DeviationLaw(EnclosingLaw):
         return command, {"started": 1.0, "speed": speed, **with_prefix("law.", later)}
 
 
-class MotionMemory(NamedTuple):
-    """Memories of the feed-forward, of the deviations and of the designed controller."""
-
-    feed_forward: Any
-    deviation: Any
-    controller: Any
+Memories = tuple[Any, Any, Any]
+"""Memories of the feed-forward, of the deviations and of the designed controller."""
 
 
 @model
@@ -223,20 +219,19 @@ class AlongMotion(Controller):
 
     inputs = forwarded("feed_forward.inputs")
 
-    def init(self) -> MotionMemory:
-        return MotionMemory(self.feed_forward.init(), self.deviation.init(), self.design.predictive.init())
+    def init(self) -> Memories:
+        return self.feed_forward.init(), self.deviation.init(), self.design.predictive.init()
 
-    def step(
-        self, memory: MotionMemory, measurement: Measurement, dt: float
-    ) -> tuple[Mapping[str, float], MotionMemory]:
-        ahead, forward = self.feed_forward.step(memory.feed_forward, measurement, dt)
-        deviations, passed = self.deviation.step(memory.deviation, measurement, dt)
+    def step(self, memory: Memories, measurement: Measurement, dt: float) -> tuple[Mapping[str, float], Memories]:
+        forward, passed, own = memory
+        ahead, forward = self.feed_forward.step(forward, measurement, dt)
+        deviations, passed = self.deviation.step(passed, measurement, dt)
         low, high = measurement.ranges[DIFFERENCE]
         command = float(ahead[DIFFERENCE])
         seen = Measurement(deviations, {READING: 0.0}, {DIFFERENCE: (low - command, high - command)})
-        back, later = self.design.predictive.step(memory.controller, seen, dt)
-        return {DIFFERENCE: command + back[DIFFERENCE]}, MotionMemory(forward, passed, later)
+        back, own = self.design.predictive.step(own, seen, dt)
+        return {DIFFERENCE: command + back[DIFFERENCE]}, (forward, passed, own)
 
-    def notes(self, memory: MotionMemory) -> tuple[str, ...]:
+    def notes(self, memory: Memories) -> tuple[str, ...]:
         """The remarks of the designed controller."""
-        return self.design.predictive.notes(memory.controller)
+        return self.design.predictive.notes(memory[-1])

@@ -109,8 +109,11 @@ class BenchmarkJoint(ShortRepr):
 
 def kinds_of(plant: Plant) -> dict[str, set[str]]:
     """Class names of the characteristics, valves, friction laws and gas in a plant, without wrappers."""
+    laws: list[Any] = [muscle.contractile for muscle in plant.muscles]
+    while any(hasattr(law, "inner") for law in laws):
+        laws = [getattr(law, "inner", law) for law in laws]
     return {
-        "characteristic": {type(_innermost(muscle.contractile)).__name__ for muscle in plant.muscles},
+        "characteristic": {type(law).__name__ for law in laws},
         "valve": {name for circuit in plant.circuits for name in _valves(circuit)},
         "friction": {type(muscle.friction).__name__ for muscle in plant.muscles},
         "gas": {type(plant.gas).__name__},
@@ -126,12 +129,6 @@ def check_truth_differs(plant: Plant, truth: BenchmarkTruth) -> None:
                 f"'{truth.name}' of the benchmark has the same {kind} as a model, {common[0]}; a controller would then "
                 "be judged on the model that it was designed with. Give the truth another one."
             )
-
-
-def _innermost(law: Any) -> Any:
-    while hasattr(law, "inner"):
-        law = law.inner
-    return law
 
 
 def _valves(part: Any) -> set[str]:

@@ -59,7 +59,11 @@ def learn(
     count = round(task.duration / joint.sample_time)
     lead = next((leaf.value for leaf in leaves(law) if leaf.path.endswith("lead_time")), 0.0)
     signal = (signals.feed_forward + lead * signals.feed_forward_rate)[:count]  # before learning
-    learning = _learning(joint, law, task, signals, count, cutoff, change_weight)
+    response = _step_response(joint, law, task, signals, count)
+    learning = IterativeLearning.from_step_response(
+        response, STEP, joint.sample_time, change_weight=change_weight, cutoff=cutoff, minimum=-joint.pressure_span,
+        maximum=joint.pressure_span,
+    )  # fmt: skip
     true, wanted = joint.truths[truth], signals.angle[1 : count + 1]
     start, sensed = joint.start(true.plant), on_truth(law, true.extra_delay)
     judged = signals.time[1 : count + 1] >= task.begin
@@ -80,11 +84,10 @@ def learn(
     return LearningCurve(task, contender.name, np.array(errors), last, float(np.ptp(repeated)))
 
 
-def _learning(
-    joint: BenchmarkJoint, law: WithSensors, task: ControlTask, signals: TaskSignals, count: int, cutoff: float,
-    change_weight: float,
-) -> IterativeLearning:  # fmt: skip
-    """The learning law from the response of the model at rest to a step of the signal."""
+def _step_response(
+    joint: BenchmarkJoint, law: WithSensors, task: ControlTask, signals: TaskSignals, count: int
+) -> Array:
+    """The change (N,) [rad] of the angle of the model at rest by a step of the signal."""
     rest = signals._replace(angle=np.zeros_like(signals.angle))
     known, start = BenchmarkTruth("model", joint.model, joint.drivers), joint.start(joint.model)
     silent = replace(law, sensors=tuple(replace(s, noise=0.0, resolution=0.0) for s in law.sensors))
@@ -92,11 +95,7 @@ def _learning(
     with_step, without = (
         _trial(joint, known, silent, quiet, rest, np.full(count, value), start) for value in (STEP, 0.0)
     )
-    span = joint.pressure_span
-    return IterativeLearning.from_step_response(
-        with_step - without, STEP, joint.sample_time, change_weight=change_weight, cutoff=cutoff, minimum=-span,
-        maximum=span,
-    )  # fmt: skip
+    return with_step - without
 
 
 def _trial(

@@ -67,27 +67,12 @@ def _signals(joint: BenchmarkJoint, task: ControlTask) -> TaskSignals:
     ahead = inverse_dynamics(joint, joint.model, task.motion, time + 0.5 * h, mean)
     behind = inverse_dynamics(joint, joint.model, task.motion, time - 0.5 * h, mean)
     rate = np.where(np.isclose(speed, 0.0), 0.0, (ahead - behind) / h)
-    stiffness = stiffness_of(joint.model, mean + half, mean - half, angle)
+    inverse = AntagonisticInverse(joint.model.muscles, joint.model.mechanism)
+    stiffness = np.asarray(inverse.stiffness(mean + half, mean - half, angle), dtype=float)
     return TaskSignals(time, angle, speed, acceleration, mean, half, rate, stiffness)
 
 
 _kept_signals = functools.lru_cache(maxsize=128)(_signals)
-
-
-def stiffness_of(plant: Plant, first: Array, second: Array, angle: Array) -> Array:
-    """Stiffness of both muscles (N,) [N m/rad] at constant gauge pressures [Pa] and angles [rad] (N,)."""
-    inverse = AntagonisticInverse(plant.muscles, plant.mechanism)
-    return np.asarray(inverse.stiffness(first, second, angle), dtype=float)
-
-
-def disturbance(task: ControlTask, inputs: Sequence[str]) -> SampledSignal:
-    """The external torque of a task as an input signal of the plant; 0 without one."""
-    if TORQUE_INPUT not in inputs:
-        raise ParameterError(
-            f"task '{task.name}': the plant has no input '{TORQUE_INPUT}'; wrap its mechanism in "
-            "JointWithExternalTorque."
-        )
-    return SampledSignal({TORQUE_INPUT: task.torque or ((0.0, 0.0),)})
 
 
 def inverse_dynamics(joint: BenchmarkJoint, plant: Plant, motion: JointMotion, time: Array, mean: Array) -> Array:
@@ -134,13 +119,19 @@ def task_loop(
     signals: TaskSignals | None = None,
 ) -> ControlLoop:  # fmt: skip
     """The control loop of a task at a plant with drivers of its valves; signals other than those of the task."""
+    if TORQUE_INPUT not in plant.inputs:
+        raise ParameterError(
+            f"task '{task.name}': the plant has no input '{TORQUE_INPUT}'; wrap its mechanism in "
+            "JointWithExternalTorque."
+        )
     if task.stuck is not None:
         acting = law.actuation if isinstance(law, SensedController) else law
         assert isinstance(acting, ControlLaw)
         faulty = WithStuckValve(acting, task.stuck.input, task.stuck.time, task.stuck.opening)
         law = dataclasses.replace(law, actuation=faulty) if isinstance(law, SensedController) else faulty
     setpoint = (signals or task_signals(joint, task)).setpoint(law.setpoints)
-    return ControlLoop(law, joint.sample_time, setpoint, disturbance(task, plant.inputs), drivers)
+    torque = SampledSignal({TORQUE_INPUT: task.torque or ((0.0, 0.0),)})
+    return ControlLoop(law, joint.sample_time, setpoint, torque, drivers)
 
 
 BONE2019 = published("bone-2019")
@@ -200,6 +191,9 @@ def track(
     late = time >= task.duration - STEADY_TIME - 1e-9
     magnitude, t = np.abs(error[judged]), time[judged]
     strokes = valve_travel(plant, record, judged)
+    state = (np.asarray(record[name])[late] for name in (*joint.pressures, "angle"))
+    reached = np.asarray(AntagonisticInverse(plant.muscles, plant.mechanism).stiffness(*state), dtype=float)
+    stiff = np.interp(time[late], signals.time, signals.stiffness)
     return TrackingMetrics(
         rmse=math.sqrt(time_mean(t, error[judged] ** 2)),
         max_error=float(magnitude.max()),
@@ -210,7 +204,7 @@ def track(
         air=time_mean(t, _drawn_flow(plant, record)[judged]) / REFERENCE_DENSITY * 1e3,
         strokes=float(strokes.sum()),
         valve_life=2.0 * RATED_STROKES / float(strokes.max()) / 3600.0 if strokes.max() > 0 else math.inf,
-        stiffness_error=_stiffness_error(joint, plant, signals, record, late),
+        stiffness_error=100.0 * math.sqrt(time_mean(time[late], (reached / stiff - 1.0) ** 2)),
     )
 
 
@@ -252,11 +246,3 @@ def valve_travel(plant: Plant, record: Recording, judged: Mask) -> Array:
     """Travel of each valve [full strokes/s] between the samples."""
     commands = [record[f"command.{name}"][judged] for name in plant.inputs if name != TORQUE_INPUT]
     return np.asarray(np.abs(np.diff(commands)).sum(axis=1) / np.ptp(record["time"][judged]))
-
-
-def _stiffness_error(joint: BenchmarkJoint, plant: Plant, signals: TaskSignals, record: Recording, late: Mask) -> float:
-    first, second = (np.asarray(record[name])[late] for name in joint.pressures)
-    reached = stiffness_of(plant, first, second, np.asarray(record["angle"])[late])
-    time = np.asarray(record["time"])[late]
-    wanted = np.interp(time, signals.time, signals.stiffness)
-    return 100.0 * math.sqrt(time_mean(time, (reached / wanted - 1.0) ** 2))

@@ -100,7 +100,8 @@ def _fifth_degree(share: Array) -> Array:
 DEGREE = math.pi / 180.0
 SINES = {0.1: 20.0, 0.5: 20.0, 1.0: 20.0, 2.0: 20.0, 3.0: 20.0, 5.0: 5.0}
 """Amplitudes [degree] of the sines by frequency [Hz] (chosen); at 5 Hz 20 degrees exceed the torque of the pair."""
-SINE_PERIODS, JUDGED_PERIODS = 5, 2
+SINE_PERIODS = {frequency: (2, 1) if frequency < 0.2 else (5, 3) for frequency in SINES}
+"""Periods of each sine, and those of them before it is judged (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -147,28 +148,21 @@ class ControlTask:
                 raise ParameterError(f"task '{self.name}': {name} is {t:g} s; allowed range: 0 to {self.duration:g} s.")
 
 
-def _sine(frequency: float, amplitude: float) -> ControlTask:
-    periods, judged = (SINE_PERIODS, JUDGED_PERIODS) if frequency > 0.2 else (2, 1)
-    motion = SineMotion(amplitude * DEGREE, frequency)
-    return ControlTask(f"sine {frequency:g} Hz", motion, periods / frequency, begin=(periods - judged) / frequency)
-
-
-def _pulse(begin: float, width: float, height: float) -> tuple[tuple[float, float], ...]:
-    """A half sine as nine points."""
-    return ((0.0, 0.0), *((begin + width * i / 8, height * math.sin(math.pi * i / 8)) for i in range(9)))
-
-
 _HOLD = MinimumJerkMotion(10.0 * DEGREE, 0.0, 0.6)
+_HALF_SINE = ((0.0, 0.0), *((1.5 + 0.1 * i / 8, 4.0 * math.sin(math.pi * i / 8)) for i in range(9)))
 STANDARD_TASKS: tuple[ControlTask, ...] = (
     ControlTask("step", StepMotion(15.0 * DEGREE, 0.2), 2.2, begin=0.2, event=0.2),
     ControlTask("ramp", RampMotion(20.0 * DEGREE, 0.2, 1.0), 2.2, begin=0.2, event=1.2),
-    *(_sine(frequency, amplitude) for frequency, amplitude in SINES.items()),
+    *(
+        ControlTask(f"sine {f:g} Hz", SineMotion(SINES[f] * DEGREE, f), periods / f, begin=earlier / f)
+        for f, (periods, earlier) in SINE_PERIODS.items()
+    ),
     ControlTask("minimum jerk", MinimumJerkMotion(25.0 * DEGREE, 0.2, 0.5), 2.0, begin=0.2, event=0.7),
     ControlTask(
         "load change", _HOLD, 3.0, begin=1.5, event=1.5, torque=((0.0, 0.0), (1.5, 0.0), (1.502, -2.0)),
     ),
     ControlTask("hold", _HOLD, 4.0, begin=2.0),
-    ControlTask("torque disturbance", _HOLD, 3.0, begin=1.5, event=1.5, torque=_pulse(1.5, 0.1, 4.0)),
+    ControlTask("torque disturbance", _HOLD, 3.0, begin=1.5, event=1.5, torque=_HALF_SINE),
     ControlTask(
         "stiffness change", _HOLD, 3.0, begin=1.5, event=1.5, stiffening=((0.0, 0.0), (1.5, 0.0), (1.7, 0.75e5)),
     ),

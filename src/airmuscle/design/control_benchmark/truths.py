@@ -14,7 +14,7 @@ from ...files.library.loading import load_law
 from ...physics import FillDischarge, ForceLaw, LinearDamper, Orifice, Plant, SubsonicIndexValve, TonduLopez2000
 from ...physics.mechanism import AntagonisticJoint, JointWithExternalTorque
 from ...physics.muscle.friction import BoucWen, Friction, LuGre, MaxwellSlip
-from ...physics.pneumatics import EnergyBalance, Gas, Isothermal, Supply, Tube, WallHeatTransfer, WithTubes
+from ...physics.pneumatics import EnergyBalance, Isothermal, Supply, Tube, WallHeatTransfer, WithTubes
 from ...physics.pneumatics.gas import HEAT_CAPACITY_RATIO, REFERENCE_DENSITY, REFERENCE_TEMPERATURE
 
 SIDES = ("left", "right")
@@ -97,11 +97,16 @@ def random_truth(seed: int, conductance: float, *, switching: bool = False) -> B
         dead time        0 to 2 samples more than stated; on/off valves 1 to 2 ms in place of 1 ms
     """
     random = np.random.default_rng(seed)
-    friction, gas = _friction(random), _gas(random)
+    friction = _friction(random)
+    kind, heat, coefficient = random.integers(3), _logarithmic(random, 0.3, 3.0), _logarithmic(random, 10.0, 60.0)
+    gas = (EnergyBalance(heat), WallHeatTransfer(coefficient), Isothermal())[kind]
     muscle, law = load_law("dmsp-20-300").muscle, _characteristic(random)
     damper = LinearDamper(random.uniform(150.0, 400.0))
     pair = tuple(replace(muscle, name=n, contractile=law, friction=friction, damper=damper) for n in SIDES)
-    circuit: Any = FillDischarge(Supply(SUPPLY), *[_valve(random, conductance)] * 2)
+    factor, ratio, index = random.uniform(0.55, 1.1), random.uniform(0.2, 0.45), random.uniform(0.45, 0.65)
+    valves = SubsonicIndexValve(factor * conductance, ratio, index), IsentropicNozzle(factor * conductance)
+    valve = valves[0] if random.random() < 0.5 else valves[1]
+    circuit: Any = FillDischarge(Supply(SUPPLY), valve, valve)
     if random.random() < 0.7:
         circuit = WithTubes(circuit, Tube.from_dimensions(_logarithmic(random, 0.2, 1.0), random.uniform(4e-3, 6e-3)))
     factors = {"inertia": (0.8, 1.6), "weight_torque": (0.6, 1.5), "offset": (0.9, 1.1)}
@@ -135,15 +140,3 @@ def _friction(random: np.random.Generator) -> Friction:
         return BoucWen(force / PRESLIDING, force, 1.0 + more, 0.75)
     shares, limits = (0.5, 0.3, 0.2), (0.2 * PRESLIDING, PRESLIDING, 3.0 * PRESLIDING)
     return MaxwellSlip(tuple(s * force / limit for s, limit in zip(shares, limits, strict=True)), limits)
-
-
-def _valve(random: np.random.Generator, conductance: float) -> Orifice:
-    factor, ratio, index = random.uniform(0.55, 1.1), random.uniform(0.2, 0.45), random.uniform(0.45, 0.65)
-    if random.random() < 0.5:
-        return SubsonicIndexValve(factor * conductance, ratio, index)
-    return IsentropicNozzle(factor * conductance)
-
-
-def _gas(random: np.random.Generator) -> Gas:
-    kind, heat, coefficient = random.integers(3), _logarithmic(random, 0.3, 3.0), _logarithmic(random, 10.0, 60.0)
-    return (EnergyBalance(heat), WallHeatTransfer(coefficient), Isothermal())[kind]
