@@ -461,8 +461,8 @@ def test_a_failure_reason_does_not_depend_on_the_path_of_the_study(folder: Path,
     edited(folder, "[design]", '"run.duration" = ["0 s"]\n[design]')
     monkeypatch.chdir(folder)
     here, elsewhere = (chunk.compute_chunk(load_study(path), 0) for path in ("study.toml", folder / "study.toml"))
-    assert list(here.failure_reasons) == list(elsewhere.failure_reasons)
-    assert here.failure_reasons[0].startswith("scenario.toml, [run], duration is 0.0; it must be greater than zero")
+    assert list(here["failure_reasons"]) == list(elsewhere["failure_reasons"])
+    assert here["failure_reasons"][0].startswith("scenario.toml, [run], duration is 0.0; it must be greater than zero")
 
 
 def test_a_worker_ignores_sigint():

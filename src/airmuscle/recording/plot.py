@@ -1,6 +1,7 @@
 """Plot of a recording over time: one panel for each physical quantity, with set point and measurement."""
 
 import dataclasses
+import itertools
 import textwrap
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -154,20 +155,23 @@ def plot_columns(
 
 def _draw(panels: Sequence[Panel], columns: Mapping[str, Array], time: Array | None, axes: Sequence[Any]) -> None:
     """Draw each panel into its axes; the lowest axes of each column have the label of the abscissa."""
-    parts = list(dict.fromkeys(curve.part for panel in panels for curve in panel.curves))
+    parts = dict.fromkeys(curve.part for panel in panels for curve in panel.curves)
+    colours = dict(zip(parts, itertools.cycle(LINES), strict=False))
     for panel, axis in zip(panels, axes, strict=False):
         factor, unit = _scale(panel)
         for curve in panel.curves:
             values = columns[curve.name]
             abscissa = time if time is not None else np.arange(1, len(values) + 1)
-            style = _style(curve, parts, time is not None)
+            style = _style(curve, colours, time is not None)
             if time is not None and is_pulsed(values):
                 abscissa, values, low, high = duty_cycle(time, values)
                 axis.fill_between(abscissa, low * factor, high * factor, color=style["color"], alpha=0.18, linewidth=0)
             axis.plot(abscissa, values * factor, label=curve.label, **style)
         axis.set_ylabel(f"{panel.title}\n[{unit.translate(_SUPERSCRIPTS)}]" if unit else panel.title)
         if len(panel.curves) > 1:
-            handles = axis.get_lines()[-len(panel.curves) :] if len(panel.curves) <= MAX_LEGEND else _key(panel, parts)
+            handles = (
+                axis.get_lines()[-len(panel.curves) :] if len(panel.curves) <= MAX_LEGEND else _key(panel, colours)
+            )
             legend_outside(axis, handles=handles, fontsize=7, handlelength=1.6, labelspacing=0.25)
         subplot = axis.get_subplotspec()
         if subplot is None or subplot.is_last_row() or axis is axes[len(panels) - 1]:
@@ -196,21 +200,17 @@ def duty_cycle(time: Array, values: Array) -> tuple[Array, Array, Array, Array]:
     return middles[filled], means[filled], np.minimum.reduceat(values, rows), np.maximum.reduceat(values, rows)
 
 
-def _key(panel: Panel, parts: Sequence[str]) -> list[Any]:
+def _key(panel: Panel, colours: Mapping[str, str]) -> list[Any]:
     """Handles of a legend of many curves: the colour of each part, and the line style of each kind of curve."""
     from matplotlib.lines import Line2D
 
     labels = {c.part: (c.part or "plant").replace("_", " ") for c in panel.curves}
-    colours = [Line2D([], [], label=label, color=_colour(part, parts)) for part, label in labels.items()]
+    lines = [Line2D([], [], label=label, color=colours[part]) for part, label in labels.items()]
     styles: dict[str, Any] = {}
     for curve in panel.curves:
         name = curve.role or curve.name.rpartition(".")[2].replace("_", " ")
-        styles.setdefault(name, Line2D([], [], label=name, **{**_style(curve, parts, True), "color": BLACK}))
-    return [*colours, *(styles.values() if len(styles) > 1 else ())]
-
-
-def _colour(part: str, parts: Sequence[str]) -> str:
-    return LINES[parts.index(part) % len(LINES)]
+        styles.setdefault(name, Line2D([], [], label=name, **{**_style(curve, colours, True), "color": BLACK}))
+    return [*lines, *(styles.values() if len(styles) > 1 else ())]
 
 
 def _scale(panel: Panel) -> tuple[float, str]:
@@ -222,15 +222,15 @@ def _scale(panel: Panel) -> tuple[float, str]:
     return chosen_scale(panel.unit, *usual.get(panel.unit, (1.0, panel.unit))) if panel.unit != "1" else usual["1"]
 
 
-def _style(curve: Curve, parts: Sequence[str], has_time: bool) -> dict[str, Any]:
+def _style(curve: Curve, colours: Mapping[str, str], has_time: bool) -> dict[str, Any]:
     """Line style: one colour for each part; a set point is dashed, a measurement and a command are thin."""
-    colour = _colour(curve.part, parts)
+    colour = colours[curve.part]
     if not has_time:
         return {"linestyle": "none", "marker": "o", "markersize": 2.5, "color": colour}
     if curve.role == "lagged set point":
         return {"color": colour, "linestyle": ":", "linewidth": 1.0}
     if curve.role == "set point":
-        return {"color": BLACK if len(parts) == 1 else colour, "linestyle": (0, (4, 2)), "linewidth": 1.0}
+        return {"color": BLACK if len(colours) == 1 else colour, "linestyle": (0, (4, 2)), "linewidth": 1.0}
     if curve.role:
         return {"color": colour, "linewidth": 0.7, "alpha": 0.6, "linestyle": DASHES[curve.variant % len(DASHES)]}
     return {"color": colour, "linestyle": DASHES[curve.variant % len(DASHES)], "linewidth": 1.4}

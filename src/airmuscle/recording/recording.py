@@ -47,22 +47,20 @@ class Recording(NotebookDisplay):
 
     def __post_init__(self) -> None:
         check_field_types(self)
-        arrays = {name: self._vector(name, values) for name, values in self.columns.items()}
-        sizes = {name: values.shape for name, values in arrays.items()}
+        arrays: dict[str, Array] = {}
+        for name, values in self.columns.items():
+            try:
+                arrays[name] = np.asarray(values, dtype=float).view()
+            except (TypeError, ValueError, OverflowError):
+                raise ColumnError(
+                    f"{self.origin}: column '{one_line(name)}' is {one_line(values)}; it must be an array of numbers."
+                ) from None
+        sizes = {name: vector.shape for name, vector in arrays.items()}
         if len(set(sizes.values())) > 1 or any(len(shape) != 1 for shape in sizes.values()):
             raise ColumnError(f"{self.origin}: columns must be vectors of equal length; their shapes are {sizes}.")
-        arrays = {name: values.view() for name, values in arrays.items()}
-        for values in arrays.values():
-            values.setflags(write=False)
+        for vector in arrays.values():
+            vector.setflags(write=False)
         object.__setattr__(self, "columns", arrays)
-
-    def _vector(self, name: str, values: Any) -> Array:
-        try:
-            return np.asarray(values, dtype=float)
-        except (TypeError, ValueError, OverflowError):
-            raise ColumnError(
-                f"{self.origin}: column '{one_line(name)}' is {one_line(values)}; it must be an array of numbers."
-            ) from None
 
     @classmethod
     def from_arrays(

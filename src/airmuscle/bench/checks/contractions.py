@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
 
 import numpy as np
 
@@ -127,13 +126,6 @@ MIN_DISTANCE, MAX_SHARE = 0.2, 0.5
 """Minimum distance of a code from other readings, as a fraction of their range; maximum share of its rows (chosen)."""
 
 
-class MissingCode(NamedTuple):
-    """A code in a column: its value in the unit of the file, and the mask of its rows."""
-
-    value: float
-    rows: Array
-
-
 def code_of(value: float) -> float | None:
     """The code for a missing value that a number [SI] is, in some power of ten of its unit; None if it is none."""
     if value == 0.0 or not math.isfinite(value):
@@ -147,12 +139,12 @@ def check_missing_codes(recordings: Sequence[Recording]) -> Iterator[HintedText]
     """A column whose extreme reading is a code for a missing value, far from all other readings."""
     found: dict[tuple[str, float], list[tuple[str, int]]] = {}
     for each in recordings:
-        for name, code in _missing_codes(each).items():
-            found.setdefault((name, code.value), []).append((each.origin, int(np.count_nonzero(code.rows))))
+        for name, value, rows in _missing_codes(each):
+            found.setdefault((name, value), []).append((each.origin, int(np.count_nonzero(rows))))
     for (name, value), places in found.items():
-        rows = counted(sum(count for _, count in places), "row")
+        number = counted(sum(count for _, count in places), "row")
         yield HintedText(
-            f"{file_list([origin for origin, _ in places])}: the {name} is {value:g} in {rows}, far from all "
+            f"{file_list([origin for origin, _ in places])}: the {name} is {value:g} in {number}, far from all "
             "other readings: this is a code for a missing value, which is read as a number.",
             Hint("To leave these rows out", "missing", DropMissing((value,)), "ColumnMapping"),
         )
@@ -160,36 +152,22 @@ def check_missing_codes(recordings: Sequence[Recording]) -> Iterator[HintedText]
 
 def without_missing_codes(recordings: Sequence[Recording]) -> list[Recording]:
     """The recordings without the rows in which a value is missing."""
-    missing = [[code.rows for code in _missing_codes(each).values()] for each in recordings]
+    missing = [[rows for _, _, rows in _missing_codes(each)] for each in recordings]
     return [each.rows(~np.any(own, axis=0)) if own else each for each, own in zip(recordings, missing, strict=True)]
 
 
-def _missing_codes(recording: Recording) -> dict[str, MissingCode]:
-    """The codes for missing values by column."""
-    codes = {name: find_missing_code(recording, name) for name in recording.columns}
-    return {name: code for name, code in codes.items() if code is not None}
-
-
-def find_missing_code(recording: Recording, name: str) -> MissingCode | None:
-    """The code for a missing value in a known column; None without one."""
-    values = recording.columns[name]
-    if quantity_of(name) is None or name.rpartition(".")[2] == "time" or values.size < 3:
-        return None
-    for extreme in (float(np.min(values)), float(np.max(values))):
-        written = _as_written(recording, name, extreme)
-        rows = values == extreme
-        if np.mean(rows) <= MAX_SHARE and any(abs(abs(written) - code) <= 1e-6 * code for code in CODES):
-            others = values[~rows]
-            distance = float(np.min(np.abs(others - extreme)))
-            if distance > max(MIN_DISTANCE * float(np.ptp(others)), 0.0):
-                return MissingCode(written, rows)
-    return None
-
-
-def _as_written(recording: Recording, name: str, value: float) -> float:
-    """A value [SI] in the unit of the file."""
-    unit, quantity = recording.units.get(name), quantity_of(name)
-    if unit is None or quantity is None:
-        return value
-    change = file_conversion(unit, quantity.unit)
-    return float((value - change.offset) / change.factor)
+def _missing_codes(recording: Recording) -> Iterator[tuple[str, float, Array]]:
+    """The known columns with a code for a missing value, the code in the unit of the file, and the mask of its rows."""
+    for name, values in recording.columns.items():
+        quantity, unit = quantity_of(name), recording.units.get(name)
+        if quantity is None or name.rpartition(".")[2] == "time" or values.size < 3:
+            continue
+        change = None if unit is None else file_conversion(unit, quantity.unit)
+        for extreme in (float(np.min(values)), float(np.max(values))):
+            written = extreme if change is None else float((extreme - change.offset) / change.factor)
+            rows = values == extreme
+            if np.mean(rows) <= MAX_SHARE and any(abs(abs(written) - code) <= 1e-6 * code for code in CODES):
+                others = values[~rows]
+                if float(np.min(np.abs(others - extreme))) > max(MIN_DISTANCE * float(np.ptp(others)), 0.0):
+                    yield name, written, rows
+                    break

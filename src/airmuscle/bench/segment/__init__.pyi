@@ -3,10 +3,10 @@ from .branches import branch_column_agreement as branch_column_agreement
 from .branches import branch_directions as branch_directions
 from .branches import find_branches as find_branches
 from .branches import motion_direction as motion_direction
-from .findings import Finding as Finding
-from .findings import check_swept as check_swept
+from .inspection import Finding as Finding
 from .inspection import Inspection as Inspection
 from .inspection import check_contents as check_contents
+from .inspection import check_swept as check_swept
 from .inspection import inspect as inspect
 from .inspection import inspect_all as inspect_all
 from .interval import Interval as Interval

@@ -63,56 +63,37 @@ def find_branches(
     """
     if "pressure" not in recording or len(recording) < 3:
         return ()
-    runs = find_runs(recording) if runs is None else runs
-    column = moved_column(recording)
-    isobaric = [run.interval for run in runs if run.kind == ISOBARIC and column in run.swept_columns]
-    if column and 2 * sum(len(interval) for interval in isobaric) > len(recording):
-        return tuple(b for each in isobaric for b in _motion_branches(recording, column, each, reversal))
-    if sensor is None and any(run.kind == AT_REST for run in runs):
-        sensor = Sensor("pressure", 0.0, estimate_noise(recording["pressure"]))
-    return tuple(_pressure_branches(recording, _split_at_runs(recording, runs), sensor, reversal))
+    runs, time = find_runs(recording) if runs is None else runs, recording.columns.get("time")
+    moved = moved_column(recording)
+    isobaric = [run.interval for run in runs if run.kind == ISOBARIC and moved in run.swept_columns]
+    is_moved = moved is not None and 2 * sum(map(len, isobaric)) > len(recording)
+    column, parts = (moved or "", isobaric) if is_moved else ("pressure", _split_at_runs(recording, runs))
+    smooth = [_remove_spikes(recording[column][p.rows], None if time is None else time[p.rows]) for p in parts]
+    if is_moved:
+        noise = [0.0 if time is None else estimate_noise(values) for values in smooth]
+        thresholds = [max(reversal * float(np.ptp(v)), 10.0 * std) for v, std in zip(smooth, noise, strict=True)]
+    else:
+        if sensor is None and any(run.kind == AT_REST for run in runs):
+            sensor = Sensor("pressure", 0.0, estimate_noise(recording["pressure"]))
+        deviation = 10.0 * (sensor.std if sensor else 0.0)
+        thresholds = [max(reversal * float(np.ptp(np.concatenate(smooth))), deviation)] * len(parts)
+    branches = []
+    for part, values, threshold in zip(parts, smooth, thresholds, strict=True):
+        pressure = recording["pressure"][part.rows] if is_moved else values
+        for each, direction in _monotonic_intervals(values, threshold):
+            ends = float(pressure[each.start]), float(pressure[each.stop - 1])
+            interval = Interval(part.start + each.start, part.start + each.stop)
+            branches.append(Branch(interval, -direction if column == "length" else direction, *ends, column))
+    return tuple(branches)
 
 
 def _split_at_runs(recording: Recording, runs: tuple[Run, ...]) -> list[Interval]:
-    """The intervals that no branch of the pressure leaves: runs at other lengths or loads, and the rows between them.
-
-    The whole recording if it is one run, or if most of its rows belong to no such run.
-    """
+    """Runs at other lengths or loads and the rows between them; the whole recording if most rows are in no such run."""
     separate = [run.interval for run in runs if run.kind in (ISOMETRIC, ISOTONIC)]
     if 2 * sum(len(interval) for interval in separate) <= len(recording):
         separate = []
     inner = {row for a, b in itertools.pairwise(separate) for row in (a.stop, b.start)}
     return [Interval(a, b) for a, b in itertools.pairwise(sorted({0, *inner, len(recording)}))]
-
-
-def _pressure_branches(
-    recording: Recording, parts: list[Interval], sensor: Sensor | None, reversal: float
-) -> Iterator[Branch]:
-    smooth = [_smooth(recording, "pressure", part) for part in parts]
-    threshold = max(reversal * float(np.ptp(np.concatenate(smooth))), 10.0 * (sensor.std if sensor else 0.0))
-    for part, values in zip(parts, smooth, strict=True):
-        yield from _branches("pressure", part, values, threshold, values)
-
-
-def _motion_branches(recording: Recording, column: str, run: Interval, reversal: float) -> Iterator[Branch]:
-    """The branches of the motion in one isobaric run."""
-    smooth = _smooth(recording, column, run)
-    noise = estimate_noise(smooth) if "time" in recording.columns else 0.0
-    threshold = max(reversal * float(np.ptp(smooth)), 10.0 * noise)
-    return _branches(column, run, smooth, threshold, recording["pressure"][run.rows])
-
-
-def _branches(column: str, part: Interval, smooth: Array, threshold: float, pressure: Array) -> Iterator[Branch]:
-    """The branches of a column in a part of the recording, with the pressures at their ends."""
-    shortening = -1 if column == "length" else 1
-    for each, direction in _monotonic_intervals(smooth, threshold):
-        ends = float(pressure[each.start]), float(pressure[each.stop - 1])
-        yield Branch(Interval(part.start + each.start, part.start + each.stop), shortening * direction, *ends, column)
-
-
-def _smooth(recording: Recording, column: str, part: Interval) -> Array:
-    time = recording.columns.get("time")
-    return _remove_spikes(recording[column][part.rows], None if time is None else time[part.rows])
 
 
 def motion_direction(values: Array, time: Array | None = None, *, reversal: float = REVERSAL_FRACTION) -> Array:
@@ -156,17 +137,10 @@ def _find_reversals(pressure: Array, threshold: float) -> Iterator[tuple[int, in
         elif direction * (value - values[extreme]) >= 0.0:
             extreme = i
         elif direction * (values[extreme] - value) >= threshold:
-            yield _end_of_dwell(values, extreme, i, direction, threshold), -direction
+            level, band = values[extreme], EXIT_FRACTION * threshold  # of a dwell at the extreme
+            dwell = (j for j in range(extreme, i) if direction * (level - values[j]) < band)
+            yield max(dwell, default=extreme) + 1, -direction
             direction, extreme = -direction, i
-
-
-def _end_of_dwell(values: list[float], extreme: int, current: int, direction: int, threshold: float) -> int:
-    """The first row that has left the level of the extreme, between the extreme and the current row."""
-    last = max(
-        (j for j in range(extreme, current) if direction * (values[extreme] - values[j]) < EXIT_FRACTION * threshold),
-        default=extreme,
-    )
-    return last + 1
 
 
 def branch_directions(recording: Recording, branches: tuple[Branch, ...]) -> Array:

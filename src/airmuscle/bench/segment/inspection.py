@@ -1,21 +1,43 @@
-"""Inspection: sampling, sensors, runs, branches, plateaus and data quality of a recording, before any fit."""
+"""Inspection of a recording before any fit: sampling, sensors, runs, branches, plateaus, and data-quality findings."""
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from ...core import BLUE, GREEN, ORANGE, PURPLE, RED, Array, ShortRepr, legend_below, new_figure
-from ...recording.columns import display_scale
+from ...core import BLUE, GREEN, ORANGE, PURPLE, RED, Array, ShortRepr, counted, legend_below, new_figure
+from ...core.errors import ColumnError, Hint, HintedText
+from ...recording.columns import ZERO_NOT_STATED, display_scale, quantity_of
 from ...recording.recording import Recording
+from ..readers.time_base import UNIFORM, WITHOUT_TIME
 from .branches import Branch, branch_column_agreement, find_branches
-from .findings import Finding, check_swept, collect_findings
 from .interval import StaticPoints, find_static_points
 from .outliers import Outlier, find_outliers
 from .plateaus import Plateau, find_plateaus, quasi_static_rows
-from .runs import AT_REST, Run, find_runs
+from .runs import AT_REST, FREE, KINDS, Run, find_runs, moved_column
 from .sensor import Sampling, Sensor, analyse_sampling, estimate_sensors
+
+MAX_SATURATED_FRACTION = 0.5
+"""Fraction of saturated rows above which too few rows remain for a fit (chosen)."""
+MAX_FINAL_CHANGE = 0.02
+"""A record is too short if its last tenth changes by more than this fraction of the range (chosen)."""
+RAMP_TOLERANCE = 0.1
+"""Relative difference of the rate at the end from the usual one up to which the pressure is swept (chosen)."""
+NOISE_FACTOR = 10.0
+"""A pressure with a range below this multiple of the sensor's standard deviation is constant (chosen)."""
+MIN_ROWS_PER_STEP = 5
+"""A step sampled by fewer rows than this is undersampled (chosen)."""
+_PLOTTED = ("pressure", "force", "contraction", "length", "shortening", "position", "temperature")
+_COLOURS = {1: BLUE, -1: RED}
+
+
+@dataclasses.dataclass(frozen=True)
+class Finding:
+    """A data-quality finding. If it is `serious`, a fit of the recording would fail or mislead."""
+
+    text: str
+    serious: bool = False
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -57,18 +79,27 @@ class Inspection(ShortRepr):
 
     def _draw(self, axis: Any, name: str, abscissa: Array, factor: float) -> None:
         """One column: readings coloured by branch, plateaus as bars, outliers as crosses, limits of the sensor."""
-        values = self.recording[name] * factor
-        _draw_readings(axis, self.branches, abscissa, values)
+        values, dots = self.recording[name] * factor, {"linestyle": "none", "marker": ".", "markersize": 2.5}
+        if not self.branches:
+            axis.plot(abscissa, values, color=BLUE, label="measured", **dots)
+        for branch in self.branches:
+            rows, labels = branch.interval.rows, axis.get_legend_handles_labels()[1]
+            label = None if branch.name in labels else branch.name
+            axis.plot(abscissa[rows], values[rows], color=_COLOURS[branch.direction], label=label, **dots)
         for i, plateau in enumerate(self.plateaus):
             ends = abscissa[[plateau.interval.start, plateau.interval.stop - 1]]
             level = [plateau.values.get(name, np.nan) * factor] * 2
             axis.plot(ends, level, color=GREEN, linewidth=1.2, label="plateau" if i == 0 else None)
         if self.outliers:  # also in axes without outliers, because the legend is that of the first axis
-            rows = [outlier.row for outlier in self.outliers if outlier.column == name]
+            found = [outlier.row for outlier in self.outliers if outlier.column == name]
             style = {"linestyle": "none", "marker": "x", "markersize": 6, "color": PURPLE}
-            axis.plot(abscissa[rows], values[rows], label="suspected outlier", **style)
-        if name in self.sensors and values.size:
-            _draw_limits(axis, self.sensors[name], factor)
+            axis.plot(abscissa[found], values[found], label="suspected outlier", **style)
+        sensor = self.sensors.get(name) if values.size else None
+        for limit in (sensor.lower_limit * factor, sensor.upper_limit * factor) if sensor else ():
+            if np.isfinite(limit):
+                axis.axhline(limit, color=ORANGE, linestyle="--", linewidth=1.0)
+                axis.annotate("sensor limit", (0.995, limit), xycoords=("axes fraction", "data"), ha="right",
+                              va="bottom", fontsize=7, color=ORANGE)  # fmt: skip
 
 
 def inspect(recording: Recording, shared_sensors: Mapping[str, Sensor] | None = None) -> Inspection:
@@ -80,6 +111,13 @@ def inspect(recording: Recording, shared_sensors: Mapping[str, Sensor] | None = 
     ordered = sampling is None or not (sampling.repeated_rows or sampling.backward_rows)
     points = find_static_points(recording)
     branches = () if points else find_branches(recording, sensors.get("pressure"), runs=runs)
+    findings = [
+        *_time_findings(recording, sampling),
+        *_sensor_findings(recording, sensors),
+        *_run_findings(recording, runs),
+        *_motion_findings(recording),
+        *_duration_findings(recording, sampling, sensors),
+    ]
     return Inspection(
         recording,
         sampling,
@@ -90,7 +128,7 @@ def inspect(recording: Recording, shared_sensors: Mapping[str, Sensor] | None = 
         find_outliers(recording, sensors),
         float(quasi_static_rows(recording, sensors).mean()) if len(recording) else 0.0,
         branch_column_agreement(recording, branches) if branches else None,
-        collect_findings(recording, sampling, sensors, runs),
+        tuple(sorted(findings, key=lambda finding: not finding.serious)),
         points,
     )
 
@@ -110,24 +148,127 @@ def check_contents(recordings: Sequence[Recording]) -> None:
             check_swept(recording, runs)
 
 
-_PLOTTED = ("pressure", "force", "contraction", "length", "shortening", "position", "temperature")
-_COLOURS = {1: BLUE, -1: RED}
+def check_swept(recording: Recording, runs: tuple[Run, ...]) -> None:
+    """Raise ColumnError if no quantity of a recording varies, or if the run is not of the stated kind."""
+    for finding in _run_findings(recording, runs):
+        if finding.serious:
+            raise ColumnError(f"{recording.origin}: {finding.text}")
 
 
-def _draw_readings(axis: Any, branches: Sequence[Branch], abscissa: Array, values: Array) -> None:
-    dots = {"linestyle": "none", "marker": ".", "markersize": 2.5}
-    if not branches:
-        axis.plot(abscissa, values, color=BLUE, label="measured", **dots)
-    for branch in branches:
-        rows = branch.interval.rows
-        colour, label = _COLOURS[branch.direction], branch.name
-        labels = axis.get_legend_handles_labels()[1]
-        axis.plot(abscissa[rows], values[rows], color=colour, label=None if label in labels else label, **dots)
+def _time_findings(recording: Recording, sampling: Sampling | None) -> Iterator[Finding]:
+    points = find_static_points(recording)
+    if points is not None:
+        slack = int(np.count_nonzero(recording["force"] <= 0)) if "force" in recording else 0
+        at_zero = f", {slack} of them without tension" if slack else ""
+        yield Finding(
+            f"no time column: {points.description}{at_zero}. The order of the rows has no meaning, so that noise, "
+            "saturation, branches and outliers are not assessed."
+        )
+        return
+    if sampling is None:
+        yield Finding("no time column: rows are taken as steady states; sampling and outliers cannot be assessed.")
+        return
+    for rows, verb in ((sampling.repeated_rows, "repeats"), (sampling.backward_rows, "decreases")):
+        if rows:
+            hints = (UNIFORM, WITHOUT_TIME) if sampling.rounded else (WITHOUT_TIME,)
+            text = f"time {verb} in {counted(len(rows), 'row')}, first in row {rows[0] + 1}. Sort the rows, delete "
+            yield Finding(HintedText(f"{text}duplicates, or write two runs to two files.", *hints), serious=True)
+    if sampling.gaps:
+        longest = max(sampling.gaps, key=lambda gap: gap.duration)
+        yield Finding(
+            f"{counted(len(sampling.gaps), 'gap')} in time, the longest of {longest.duration:.4g} s after row "
+            f"{longest.row + 1} (sample time {sampling.sample_time:.4g} s). Do not fit dynamics across gaps."
+        )
 
 
-def _draw_limits(axis: Any, sensor: Sensor, factor: float) -> None:
-    for limit in (sensor.lower_limit, sensor.upper_limit):
-        if np.isfinite(limit):
-            axis.axhline(limit * factor, color=ORANGE, linestyle="--", linewidth=1.0)
-            axis.annotate("sensor limit", (0.995, limit * factor), xycoords=("axes fraction", "data"), ha="right",
-                          va="bottom", fontsize=7, color=ORANGE)  # fmt: skip
+def _sensor_findings(recording: Recording, sensors: Mapping[str, Sensor]) -> Iterator[Finding]:
+    for name, sensor in sensors.items():
+        for limit, adjective in ((sensor.lower_limit, "lower"), (sensor.upper_limit, "upper")):
+            if name not in recording.columns or not np.isfinite(limit):
+                continue
+            count = int(np.count_nonzero(np.abs(recording[name] - limit) <= 0.25 * sensor.resolution))
+            fraction = count / len(recording)
+            quantity = quantity_of(name)
+            unit = f" {quantity.unit}" if quantity and quantity.unit != "1" else ""
+            if count:
+                yield Finding(
+                    f"the {name} sensor saturates at its {adjective} limit, {limit:.4g}{unit}, in "
+                    f"{counted(count, 'row')} ({100 * fraction:.0f} %). These rows are bounds (censored), not values.",
+                    serious=fraction >= MAX_SATURATED_FRACTION,
+                )
+
+
+def _run_findings(recording: Recording, runs: tuple[Run, ...]) -> Iterator[Finding]:
+    stated = recording.constants.get("run")
+    if any(run.kind == AT_REST for run in runs):
+        subject = "no measured quantity varies" if len(recording.columns) > 2 else "the only quantity does not vary"
+        yield Finding(
+            f"{subject}{_pressure_range(recording)}: no characteristic can be identified. Vary the pressure of an "
+            "isometric run or the length of an isobaric run, and check that the sensors were connected.",
+            serious=True,
+        )
+    elif isinstance(stated, str) and runs:
+        kinds = {run.kind.name for run in runs}
+        open_kind = moved_column(recording) is None and kinds == {FREE.name}
+        if stated not in kinds and stated in {kind.name for kind in KINDS} and not open_kind:
+            yield Finding(
+                f"the run is stated to be {stated}, but the data are {' and '.join(sorted(kinds))}"
+                f"{_pressure_range(recording)}. Correct the statement, or use another file.",
+                serious=True,
+            )
+
+
+def _motion_findings(recording: Recording) -> Iterator[Finding]:
+    """A recording of pressure and force without a length: the kind of the run and the contraction remain open."""
+    moved = moved_column(recording)
+    if "pressure" not in recording or "force" not in recording:
+        return
+    if moved is None:
+        held = {"length": "73.2 mm"}
+        text = "no length or contraction was recorded, so the kind of the run is open and no characteristic can be "
+        hints = (
+            Hint("To state the held length of an isometric run", "constants", held, "ColumnMapping"),
+            Hint("To state its place in the names of the files", "file_name", "held{length [mm]}", "ColumnMapping"),
+        )
+        yield Finding(HintedText(f"{text}identified.", *hints))
+    elif "contraction" not in recording:
+        converted = Hint(f"To convert the {moved}", "resting_length", "300 mm", "ColumnMapping")
+        remedy = (" ", ZERO_NOT_STATED) if moved == "position" else (converted,)
+        yield Finding(HintedText("a static fit needs the contraction and will refuse this recording.", *remedy))
+
+
+def _pressure_range(recording: Recording) -> str:
+    """The pressure range as ` (pressure 298.8 to 301.2 kPa)`, to show which pressure was taken as constant."""
+    if "pressure" not in recording:
+        return ""
+    low, high = np.quantile(recording["pressure"], [0.01, 0.99])
+    return f" (pressure {low / 1e3:.4g} to {high / 1e3:.4g} kPa)"
+
+
+def _duration_findings(
+    recording: Recording, sampling: Sampling | None, sensors: Mapping[str, Sensor]
+) -> Iterator[Finding]:
+    """Records that end before the pressure has settled, and steps faster than the sampling."""
+    if sampling is None or "pressure" not in recording or sampling.rows < 2 * MIN_ROWS_PER_STEP:
+        return
+    pressure = recording["pressure"]
+    span = float(np.ptp(pressure))
+    if span <= NOISE_FACTOR * (sensors["pressure"].std if "pressure" in sensors else 0.0):
+        return
+    last = pressure[-max(len(pressure) // 10, 3) :]
+    quasi_static = quasi_static_rows(recording, sensors)
+    if span > 0 and not quasi_static[-1] and abs(last[-1] - last[0]) > MAX_FINAL_CHANGE * span:
+        changes = np.abs(np.diff(pressure[:: -len(last)]))
+        usual = np.median(changes)
+        yield Finding(
+            "the record ends before the pressure has settled (it changes by "
+            f"{abs(last[-1] - last[0]) / 1e3:.4g} kPa in the last tenth) and may be shorter than the dynamics. Record "
+            "until the pressure has settled.",
+            serious=not abs(changes[0] - usual) <= RAMP_TOLERANCE * usual,  # in a sweep, it changes as it usually does
+        )
+    max_step = float(np.max(np.abs(np.diff(pressure)))) if len(pressure) > 1 else 0.0
+    if max_step > 0.5 * span > 0:
+        yield Finding(
+            f"the pressure changes by {max_step / 1e3:.4g} kPa between two rows, more than half of its range: the step "
+            f"is undersampled at {sampling.rate:.4g} rows per second."
+        )

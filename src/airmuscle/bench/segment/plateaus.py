@@ -34,19 +34,13 @@ def quasi_static_rows(
     width = count_rows(settling_time, recording["time"], 1)
     sensors = sensors or estimate_sensors(recording)
     for name in recording:
-        if name.rpartition(".")[2] in _MONITORED and name in sensors:
-            quasi_static &= ~_is_changing(recording[name], width, max_change, sensors[name])
+        if name.rpartition(".")[2] in _MONITORED and name in sensors and width < len(recording):
+            values = recording[name]
+            allowed = max(max_change * float(np.ptp(values)), NOISE_FACTOR * sensors[name].std)
+            changes = np.abs(values[width:] - values[:-width]) > allowed
+            quasi_static[:-width] &= ~changes
+            quasi_static[width:] &= ~changes
     return quasi_static
-
-
-def _is_changing(values: Array, width: int, max_change: float, sensor: Sensor) -> Mask:
-    """Whether a value changes by too much from `width` rows before, or to `width` rows after."""
-    allowed = max(max_change * float(np.ptp(values)), NOISE_FACTOR * sensor.std)
-    step = np.abs(values[width:] - values[:-width]) if width < len(values) else np.empty(0)
-    changing = np.zeros(len(values), dtype=bool)
-    changing[: len(step)] |= step > allowed
-    changing[width:] |= step > allowed
-    return changing
 
 
 RATE_LEVEL = 0.95
@@ -118,22 +112,23 @@ def find_plateaus(
     for name, band in bands.items():
         values = running_median(recording[name], MEDIAN_ROWS)  # so that an outlier does not end a plateau
         intervals = [part for each in intervals for part in _steady_parts(values, band, each, min_rows)]
-    return tuple(_make_plateau(recording, interval) for interval in intervals)
+    plateaus = []
+    for interval in intervals:
+        rows = {name: recording[name][interval.rows] for name in recording}
+        medians = {name: float(np.median(values)) for name, values in rows.items()}
+        errors = {name: float(np.std(values, ddof=1) / np.sqrt(len(interval))) for name, values in rows.items()}
+        plateaus.append(Plateau(interval, medians, errors))
+    return tuple(plateaus)
 
 
 def _steady_parts(values: Array, band: float, within: Interval, min_rows: int) -> Iterator[Interval]:
     """The parts of an interval in which a quantity stays within its band without drift."""
     for level in level_intervals(values, band, within=within):
-        part = _trim_to_level(values, level, band)
+        inside = values[level.rows]  # without the start and the end of a ramp from or to the level
+        near = np.flatnonzero(np.abs(inside - np.median(inside)) <= 0.25 * band)
+        part = Interval(level.start + int(near[0]), level.start + int(near[-1]) + 1) if near.size else Interval(0, 0)
         if len(part) >= min_rows and not _drifts(values[part.rows], band):
             yield part
-
-
-def _trim_to_level(values: Array, level: Interval, band: float) -> Interval:
-    """The interval without the start and the end of a ramp from or to its level."""
-    inside = values[level.rows]
-    near = np.flatnonzero(np.abs(inside - np.median(inside)) <= 0.25 * band)
-    return Interval(level.start + int(near[0]), level.start + int(near[-1]) + 1) if near.size else Interval(0, 0)
 
 
 def _band(values: Array, sensor: Sensor) -> float:
@@ -146,13 +141,6 @@ def _drifts(values: Array, band: float) -> bool:
     count = DRIFT_PARTS if len(values) >= 5 * DRIFT_PARTS else 3
     parts = [float(np.median(part)) for part in np.array_split(values, count) if part.size]
     return max(parts) - min(parts) > MAX_DRIFT * band
-
-
-def _make_plateau(recording: Recording, interval: Interval) -> Plateau:
-    rows = {name: recording[name][interval.rows] for name in recording}
-    medians = {name: float(np.median(values)) for name, values in rows.items()}
-    errors = {name: float(np.std(values, ddof=1) / np.sqrt(len(interval))) for name, values in rows.items()}
-    return Plateau(interval, medians, errors)
 
 
 def plateau_points(recording: Recording, plateaus: tuple[Plateau, ...]) -> Recording:

@@ -10,7 +10,7 @@ that only oscillates within `RIPPLE_BAND` while the muscle is moved, the ripple 
 import dataclasses
 import itertools
 from collections import deque
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
@@ -68,11 +68,17 @@ def find_runs(recording: Recording, sensors: Mapping[str, Sensor] | None = None)
     points = find_static_points(recording)
     if points is not None:
         return _runs_of_points(recording, points)
-    columns = _columns(recording)
-    bands = _constant_bands(recording, columns.values(), sensors or estimate_sensors(recording))
+    present = {kind: [name for name in kind.constant_columns if name in recording] for kind in KINDS}
+    columns, bands = {kind: names[0] for kind, names in present.items() if names}, dict[str, float]()
+    sensors = sensors or estimate_sensors(recording)
+    for name in columns.values():
+        maximum = 1.0 if name == "contraction" else float(np.max(np.abs(recording[name])))
+        least = maximum * (CONTRACTION_BAND if name in ("contraction", "length") else RELATIVE_BAND)
+        bands[name] = max(least, 8.0 * sensors[name].std if name in sensors else 0.0)
     whole = _classify(recording, Interval(0, len(recording)), columns, bands)
     if whole.kind != FREE:
         return (whole,)
+    # without a measured motion, a constant force does not tell the kind: a slack muscle at a held length has it as well
     told = [kind for kind in columns if kind != ISOTONIC or ISOMETRIC in columns]
     candidates = [runs for kind in told if (runs := _runs_at_levels(recording, kind, columns[kind], bands))]
     return max(candidates, key=lambda runs: sum(len(run.interval) for run in runs), default=(whole,))
@@ -89,23 +95,6 @@ def _runs_of_points(recording: Recording, points: StaticPoints) -> tuple[Run, ..
             intervals = [Interval(a, b) for a, b in itertools.pairwise(edges)]
             return tuple(_constant_run(recording, each, kind, name, (swept, "force")) for each in intervals)
     return (Run(Interval(0, levels.size), FREE, None, None, ("pressure", points.moved)),)
-
-
-def _columns(recording: Recording) -> dict[RunKind, str]:
-    """The measured column of each kind of run. Without a measured motion, a constant force does not tell the kind: it
-    is that of a slack muscle at a held length as well as an isotonic one."""
-    present = {kind: [name for name in kind.constant_columns if name in recording] for kind in KINDS}
-    return {kind: names[0] for kind, names in present.items() if names}
-
-
-def _constant_bands(recording: Recording, columns: Iterable[str], sensors: Mapping[str, Sensor]) -> dict[str, float]:
-    """The width of the band within which each measured quantity counts as constant [SI]."""
-    bands = {}
-    for name in columns:
-        maximum = 1.0 if name == "contraction" else float(np.max(np.abs(recording[name])))
-        least = maximum * (CONTRACTION_BAND if name in ("contraction", "length") else RELATIVE_BAND)
-        bands[name] = max(least, 8.0 * sensors[name].std if name in sensors else 0.0)
-    return bands
 
 
 def _classify(recording: Recording, interval: Interval, names: dict[RunKind, str], bands: dict[str, float]) -> Run:

@@ -173,21 +173,16 @@ def estimate_resolution(values: Array) -> float:
     for candidate in sorted({float(q) for q in np.quantile(gaps, [0.02, 0.1, 0.25, 0.5])}, reverse=True):
         # One reading may be written in two ways, 71.70 and 71.71; both count as one.
         steps = np.diff(distinct[np.concatenate(([True], gaps > SAME_READING * candidate))])
-        step = _refine_step(candidate, steps[steps < 8.5 * candidate])
+        step, differences = candidate, steps[steps < 8.5 * candidate]
+        for _ in range(3):  # the least-squares step of differences of a few steps
+            counts = np.round(differences / step)
+            total = float(counts @ counts)
+            step = float(counts @ differences) / total if total else 0.0
+            if not total:
+                break
         if step > 0.0 and _are_multiples(steps, step):
             return step
     return 0.0
-
-
-def _refine_step(step: float, differences: Array) -> float:
-    """The least-squares step for differences of a few steps; 0 if no difference is as large as a step."""
-    for _ in range(3):
-        counts = np.round(differences / step)
-        total = float(counts @ counts)
-        if total == 0.0:
-            return 0.0
-        step = float(counts @ differences) / total
-    return step
 
 
 def _are_multiples(steps: Array, step: float) -> bool:
@@ -201,10 +196,7 @@ def _are_multiples(steps: Array, step: float) -> bool:
 
 
 def _upper_limit(runs: list[Array], resolution: float) -> float:
-    """The upper limit at which readings saturate; infinite without saturation.
-
-    Readings stay constant at a limit for many more consecutive rows than elsewhere, where the sensor has noise.
-    """
+    """The upper limit at which readings stay for many more rows than elsewhere; infinite without saturation."""
     combined = np.concatenate(runs)
     top, tolerance = float(combined.max()), 0.25 * resolution
     at_top = [values >= top - tolerance for values in runs]

@@ -42,10 +42,7 @@ def _feed_forward() -> WithFeedForward:
 def _beside_feed_forward(
     joint: BenchmarkJoint, name: str, feedback: ControlLaw, bounds: Bounds, commissioned: Bounds | None = None
 ) -> Contender:
-    """A feedback of the angle beside the feed-forward; its set points have the dead time of the encoder.
-
-    commissioned  gains of the feedback that are also sought on a truth
-    """
+    """A feedback beside the feed-forward, with set points as late as the encoder, and its gains sought on a truth."""
     law = WithFeedForward(_feed_forward(), WithSetpointDelay(feedback, _delay(joint)))
     known = {**with_prefix("feed_forward.", FEED_FORWARD), **with_prefix("feedback.law.", bounds)}
     sought = {**with_prefix("feed_forward.", COMMISSIONED), **with_prefix("feedback.law.", commissioned or {})}

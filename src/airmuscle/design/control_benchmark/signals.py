@@ -223,10 +223,7 @@ def _overshoot(task: ControlTask, wanted: Array, angle: Array, judged: Mask) -> 
 
 
 def _drawn_flow(plant: Plant, record: Recording) -> Array:
-    """The mass flow (N,) [kg/s] from the supplies: also of air that a stuck valve loses.
-
-    Of a circuit without a fill valve it is the flow into the muscle.
-    """
+    """The mass flow (N,) [kg/s] from the supplies, also what a stuck valve loses; else that into the muscle."""
     flow = np.zeros(len(record["time"]))
     for muscle, circuit in zip(plant.muscles, plant.circuits, strict=True):
         inner = circuit.circuit if isinstance(circuit, WithTubes) else circuit

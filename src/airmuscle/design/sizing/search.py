@@ -55,10 +55,7 @@ class SizingResult(ShortRepr):
         )
 
     def _greatest(self, what: str, entries: list[Entry]) -> str:
-        """The largest fraction of a load or travel that one of the entries reaches, as text; empty if there is none.
-
-        Bisection: it is assumed that every smaller fraction is reachable, too.
-        """
+        """The largest fraction of a load or travel that an entry reaches, by bisection, as text; empty if none."""
         best: MuscleChoice | None = None
         low, high = 0.0, 1.0
         for _ in range(BISECTIONS):
@@ -126,10 +123,7 @@ def size_muscles(
 def _choices_of(
     entry: Entry, requirement: Requirement, conditions: SizingConditions
 ) -> tuple[list[MuscleChoice], UnsuitableMuscle]:
-    """The choices of an entry, and the reason of the maximum number that does not suffice.
-
-    A number is left out if fewer muscles are as short and take as little air.
-    """
+    """The choices of an entry, each better than those with fewer muscles, and why the greatest number does not do."""
     choices: list[MuscleChoice] = []
     failed = UnsuitableMuscle(entry.name, 0, "")
     for count in range(conditions.min_count, conditions.max_count + 1):

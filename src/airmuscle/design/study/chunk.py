@@ -10,11 +10,13 @@ import zipfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from ...core import AirmuscleError, Array, FileError, SimulationError, atomic_file, check_writable, program_fingerprint
+from ...core.system import with_prefix
 from ...core.tree import fingerprint
 from ...engine.distribution import DistributedCalls
 from ...engine.processes import check_running
@@ -55,18 +57,14 @@ def failure_reason(error: Exception) -> str:
 _loaded: dict[tuple[str, str], Study] = {}
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class Chunk:
-    """Results of n runs.
+Chunk = Mapping[str, npt.NDArray[Any]]
+"""Results of n runs, by the name of the array in its file.
 
-    scalars          scalar metrics (n, k); NaN if a run failed or does not have the metric
-    time_series      time series by name (n, T)
-    failure_reasons  reason of each failed run (n,); empty for other runs
-    """
-
-    scalars: Array
-    time_series: Mapping[str, Array]
-    failure_reasons: npt.NDArray[np.str_]
+scalars          scalar metrics (n, k); NaN if a run failed or does not have the metric
+failure_reasons  reason of each failed run (n,); empty for other runs
+series:NAME      each time series (n, T)
+"""
+SERIES = "series:"
 
 
 def study_fingerprint(study: Study) -> str:
@@ -100,11 +98,8 @@ def run_chunk(study_file: tuple[str, str], index: int) -> Chunk:
 def compute_chunk(study: Study, index: int) -> Chunk:
     """The results of one chunk; a failed run is recorded as NaN with its reason."""
     runs = study.chunks[index]
-    chunk = Chunk(
-        np.full((len(runs), len(study.scalars)), np.nan),
-        {name: np.full((len(runs), series.times.size), np.nan) for name, series in study.time_series.items()},
-        np.array([""] * len(runs), dtype=object),
-    )
+    scalars, reasons = np.full((len(runs), len(study.scalars)), np.nan), [""] * len(runs)
+    series = {name: np.full((len(runs), each.times.size), np.nan) for name, each in study.time_series.items()}
     states = study.template.initial_states(*study.varying(runs))
     scenarios: dict[int, Scenario] = {}
     for row, (run, initial_state) in enumerate(zip(runs, states, strict=True)):
@@ -112,32 +107,30 @@ def compute_chunk(study: Study, index: int) -> Chunk:
         try:
             scenarios[row] = study.scenario(run, initial_state)
         except RUN_ERRORS as error:
-            chunk.failure_reasons[row] = failure_reason(error)
+            reasons[row] = failure_reason(error)
     outcomes = simulate_all(list(scenarios.values()), study.metric_times)
     for row, outcome in zip(scenarios, outcomes, strict=True):
         check_running()
         if isinstance(outcome, str):
-            chunk.failure_reasons[row] = outcome
+            reasons[row] = outcome
         else:
-            chunk.scalars[row] = list(study.scalar_values(outcome).values())
-            for name, series in study.time_series.items():
-                chunk.time_series[name][row] = series.sample(outcome["time"], outcome[series.column])
-    return dataclasses.replace(chunk, failure_reasons=chunk.failure_reasons.astype(str))
+            scalars[row] = list(study.scalar_values(outcome).values())
+            for name, each in study.time_series.items():
+                series[name][row] = each.sample(outcome["time"], outcome[each.column])
+    return {"scalars": scalars, "failure_reasons": np.array(reasons), **with_prefix(SERIES, series)}
 
 
 def write_chunk(chunk: Chunk, path: Path) -> None:
     """Write a chunk to its file atomically."""
-    series = {f"series:{name}": rows for name, rows in chunk.time_series.items()}
     with atomic_file(path) as unfinished, unfinished.open("wb") as file:
-        np.savez(file, scalars=chunk.scalars, failure_reasons=chunk.failure_reasons, **series)  # type: ignore[arg-type]
+        np.savez(file, **chunk)  # type: ignore[arg-type]
 
 
 def read_chunk(path: Path) -> Chunk | None:
     """The chunk in a file; None if the file is missing or damaged."""
     try:
         with np.load(path, allow_pickle=False) as file:
-            series = {n.removeprefix("series:"): file[n] for n in file.files if n.startswith("series:")}
-            return Chunk(file["scalars"], series, file["failure_reasons"])
+            return dict(file)
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
         return None
 
@@ -176,12 +169,12 @@ def run_study(
             write_chunk(chunk, files[index])
         done += len(study.chunks[index])
         report(done, len(study))
-    parts = [chunks[index] for index in range(len(study.chunks))]
+    joined = {name: np.concatenate([chunks[i][name] for i in range(len(chunks))]) for name in chunks[0]}
     return StudyResult(
         study,
-        np.concatenate([part.scalars for part in parts]),
-        {name: np.concatenate([part.time_series[name] for part in parts]) for name in study.time_series},
-        tuple(str(reason) for part in parts for reason in part.failure_reasons),
+        joined["scalars"],
+        {name: joined[f"{SERIES}{name}"] for name in study.time_series},
+        tuple(map(str, joined["failure_reasons"])),
         dict.fromkeys(study.scalars, np.nan) if isinstance(nominal, str) else study.scalar_values(nominal),
     )
 

@@ -2,7 +2,7 @@
 
 import math
 from collections import Counter
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
 from typing import Any
 
@@ -210,9 +210,12 @@ class _Search:
 
         first = qmc.Sobol(d=len(self.ranges), scramble=True, seed=np.random.default_rng(seed)).random(self.population)
         first[: len(given)] = given if given else first[:0]
-        random, ends = np.random.default_rng([seed, 1]), list[float]()
+        random, ends, used = np.random.default_rng([seed, 1]), list[float](), list[Array]()
         try:
-            for start in _starts(first, self._energies(first)):
+            for start in first[np.argsort(self._energies(first), kind="stable")]:
+                if any(float(np.linalg.norm(start - other)) < APART * math.sqrt(start.size) for other in used):
+                    continue
+                used.append(start)
                 strategy = EvolutionStrategy(start, random)
                 if self.converged or not self._has_budget(strategy.size):
                     break
@@ -257,12 +260,3 @@ class _Search:
         self.progress(sum(map(len, self.values)) * len(self.evaluator.cases), self.budget)
         failed = 1.0 - metrics.completed.mean(axis=1)
         return np.where(np.isfinite(values), values, 1e30 * (1.0 + failed))
-
-
-def _starts(points: Array, energies: Array) -> Iterator[Array]:
-    """The points (S, D) by their energies, the smallest first, that are apart from those before."""
-    used: list[Array] = []
-    for point in points[np.argsort(energies, kind="stable")]:
-        if all(float(np.linalg.norm(point - other)) >= APART * math.sqrt(point.size) for other in used):
-            used.append(point)
-            yield point

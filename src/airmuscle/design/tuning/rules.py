@@ -162,25 +162,19 @@ def step_experiment(
     )  # fmt: skip
     time, first = np.unique(run["time"], return_index=True)
     output = run[pid.measured][first]
-    model = _best_model(time, output, size)
-    delayed = dataclasses.replace(model, dead_time=model.dead_time + case.loop.sample_time / 2)
-    return StepExperiment(time, output, size, delayed)
-
-
-def _best_model(time: Array, output: Array, step: float) -> ProcessModel:
-    """The model with the smaller sum of squared residuals; the other one if one of them does not exist."""
-    models: list[tuple[float, ProcessModel]] = []
-    reasons = []
+    models, reasons = list[tuple[float, ProcessModel]](), list[str]()
     for identify in (first_order_of_step, integrator_of_step):
         try:
-            model = identify(time, output, step)
+            model = identify(time, output, size)
         except AirmuscleError as error:
             reasons.append(str(error))
         else:
-            models.append((float(np.sum((output[0] + step * model.step_response(time) - output) ** 2)), model))
+            models.append((float(np.sum((output[0] + size * model.step_response(time) - output) ** 2)), model))
     if not models:
         raise ParameterError(f"step_experiment: {' '.join(reasons)}")
-    return min(models, key=lambda pair: pair[0])[1]
+    best = min(models, key=lambda pair: pair[0])[1]  # with the smaller sum of squared residuals
+    delayed = dataclasses.replace(best, dead_time=best.dead_time + case.loop.sample_time / 2)
+    return StepExperiment(time, output, size, delayed)
 
 
 def rule_settings(model: ProcessModel) -> tuple[RuleSettings, ...]:
