@@ -31,7 +31,7 @@ from airmuscle.bench.identify.campaign.campaign_chapters import _validation_tabl
 from airmuscle.bench.identify.dynamic.dynamic_chapter import dynamic_chapters
 from airmuscle.bench.identify.experiment_design import run_table
 from airmuscle.bench.identify.hysteresis.hysteresis_chapter import joint_friction_chapter, loop_chapter
-from airmuscle.bench.identify.prediction.prediction_chapter import prediction_chapters
+from airmuscle.bench.identify.prediction import prediction_chapters
 from airmuscle.bench.identify.static_fit_chapter import _rows
 from airmuscle.bench.identify.uncertainty_chapter import uncertainty_chapter
 from airmuscle.design import LiftRequirement, SizingConditions, size_muscles

@@ -118,4 +118,4 @@ from .dynamic.fit import OF_RECORD as OF_RECORD
 from .group_refits import LEVEL as LEVEL
 from .group_refits import root_mean_square as root_mean_square
 from .group_refits import widening as widening
-from .prediction.result import length_notes as length_notes
+from .prediction.predict import length_notes as length_notes

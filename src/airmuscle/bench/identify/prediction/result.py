@@ -1,187 +1,24 @@
-"""Predicted quantities of a record beside the measured ones, with errors and 95 % bands, and where the record leaves
-the ranges of those of the fit: pressure, contraction, resting length and rates."""
+"""Predicted quantities of a record beside the measured ones, with errors and 95 % bands, and their report chapters."""
 
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from functools import partial
+from typing import Any
 
 import numpy as np
 
-from ....core import Array, ColumnError, Hint, ShortRepr
-from ....physics import Characteristic, CreepElements, ForceLaw, Friction, NoFriction, ValidityRange
+from ....core import RED, Array, ShortRepr, cite, counted, legend_below
 from ....recording import Recording
-from ....recording.columns import displayed
-from ...segment import Mask, rate_of_change
-from ..campaign.friction_and_release import predicted_force
-from ..compared_points import FORCE_MARGIN
-from ..problem import FORCE, evaluate, fitted_quantity_of
+from ....recording.columns import display_scale, displayed
+from ....report.chapter import BY_ROW, Chapter, Plot, Table, TableColumn
+from ...baselines import ARX, PERSISTENCE, TimedRecord, baseline_errors, skill
+from ...reported import unit_column
+from ...segment import CONTRACTION_BAND, Mask
+from ..dynamic.dynamic_chapter import draw_residuals, residual_panels, running_extreme
 
-COLUMNS = ("pressure", "contraction", "force")
-"""Columns that a static law relates."""
-USUAL = "another specimen, a resting length or a zero of a sensor that differs, a muscle that has changed, and outliers"
-"""Usual causes of a band that does not hold, where nothing recorded shows one."""
-
-
-def predict_static(
-    law: Characteristic, recording: Recording, *, friction: Friction | None = None, creep: CreepElements | None = None,
-    half_width: float | None = None, validity_range: ValidityRange | None = None,
-    rates: Mapping[str, float | None] | None = None, band: str = "", notes: Sequence[str] = (),
-    differences: Sequence[str] = (),
-) -> "RecordPrediction":  # fmt: skip
-    """Predict the quantity that a law gives at the rows of a recording with pressure, contraction and force.
-
-    law             the static law of the muscle of this recording
-    friction, creep subtracted from the force along the recorded motion, relaxed at the first row; they need time and
-                    the constant `resting_length`
-    half_width      half width of the stated 95 % band of the quantity [SI]
-    validity_range  range of the measurements of the law; rows outside it are counted in a note
-    rates           maximum rates of contraction [1/s] and pressure [Pa/s] of these measurements, by quantity; a record
-                    that is faster is named in a note
-    band            where the band comes from, or why there is none
-    notes           further notes on the record
-    differences     what differs from the muscle of the fit, such as "another specimen": named as likely reason where
-                    far fewer than 95 % of the rows are within the band
-
-    Rows without tension are compared where the predicted force exceeds the half width, or 0 without one. Raises
-    ColumnError for a recording without these columns or without tension.
-    """
-    complete, tension = _rows_with_tension(recording)
-    quantity, remarks = fitted_quantity_of(law), list[str]()
-    moving = [part for part in (friction, creep) if part not in (None, NoFriction(), CreepElements())]
-    if moving and quantity == FORCE and recording.constants.get("resting_length") is None:
-        remarks = ["friction and creep of the muscle are left out, because the record states no resting length"]
-    limits, faster = dict[str, tuple[float, float]](), rate_notes(recording, rates or {})
-    if validity_range is not None:
-        limits = {"pressure": validity_range.pressure, "contraction": validity_range.contraction}
-    remarks += [*range_notes(recording, limits), *faster]
-    pulling = np.zeros(len(recording), dtype=bool)
-    if isinstance(law, ForceLaw):
-        limit = FORCE_MARGIN * float(np.nanmax(recording["force"]))
-        force = predicted_force(law, recording, friction or NoFriction(), creep or CreepElements(), limit)
-        predicted, slack = np.maximum(force, 0.0), complete & ~tension
-        pulling = slack & (predicted > (half_width or 0.0))
-        if pulling.any():
-            remarks.append(
-                f"the law pulls at {int(pulling.sum())} of {int(slack.sum())} rows without tension, up to "
-                f"{float(np.max(predicted[pulling])):.4g} N; these rows count as errors outside the band"
-            )
-    else:
-        predicted = evaluate(law, quantity.method, quantity.arguments, recording)
-    known = np.isfinite(predicted)
-    if (tension & ~known).any():
-        remarks.append(f"the law gives no {quantity.name} at {int((tension & ~known).sum())} rows with tension")
-    widths = None if half_width is None else np.full(len(recording), float(half_width))
-    measured = recording[quantity.name]
-    result = QuantityPrediction(quantity.name, measured, predicted, widths, (tension | pulling) & known, band)
-    driving = np.column_stack([recording[name] for name in COLUMNS if name != quantity.name])
-    prediction = RecordPrediction(recording, (result,), (*remarks, *notes), rows_outside(recording, limits), driving)
-    return with_band_notes(prediction, [*differences, *(["a faster motion"] if faster else [])], USUAL)
-
-
-def _rows_with_tension(recording: Recording) -> tuple[Mask, Mask]:
-    """Masks (N,) of the complete rows, and of those with tension. Raises ColumnError without columns or tension."""
-    missing = [name for name in COLUMNS if name not in recording]
-    if missing:
-        by_length = Hint("To compute it from the length", "resting_length", "300 mm")
-        raise ColumnError(
-            f"{recording.origin}: the prediction of a static law is compared with pressure, contraction and force; "
-            f"missing is {', '.join(missing)}.", hint=by_length if missing == ["contraction"] else None,
-        )  # fmt: skip
-    complete = np.isfinite(sum(recording[name] for name in COLUMNS))
-    tension = (recording["force"] > 0.0) & complete
-    if not tension.any():
-        raise ColumnError(
-            f"{recording.origin}: no row has a positive force, so that no prediction can be compared; a force of "
-            "tension is positive."
-        )
-    return complete, tension
-
-
-LIMIT_MARGIN, NOISY_MARGIN = 1e-3, 0.05
-"""Noise of the sensors at the limits of the range of a law, relative to the range, and of a noisy quantity (chosen)."""
-RATE_MARGIN = 1.25
-"""Ratio of the rate of a record to that of the fit from which it is outside (chosen)."""
-LENGTH_MARGIN = 1e-3
-"""Relative difference of two resting lengths that are the same (chosen)."""
-Ends = Mapping[str, tuple[float, float]]
-"""Lower and upper end of quantities [SI], by name."""
-NOT_THERE = "the stated band does not apply there"
 MIN_SHARE, MIN_ROWS = 0.8, 5
 """Share of the rows within a 95 % band below which the band does not hold for a record, and minimum number of compared
 rows for that statement (chosen)."""
-
-
-def rows_outside(recording: Recording, ends: Ends, margin: float = LIMIT_MARGIN) -> Mask | None:
-    """The mask (N,) of the rows with a quantity outside its ends; None without ends."""
-    masks = [_beyond(recording[name], *each, margin) for name, each in ends.items() if name in recording]
-    return np.asarray(np.logical_or.reduce(masks)) if masks else None
-
-
-def range_notes(recording: Recording, ends: Ends, margin: float = LIMIT_MARGIN) -> list[str]:
-    """The number of rows outside the range of the fit, with both ranges of each quantity that leaves it."""
-    outside = rows_outside(recording, ends, margin)
-    if outside is None or not outside.any():
-        return []
-    parts = [
-        f"{name} {_span(name, np.nanmin(recording[name]), np.nanmax(recording[name]))}, fitted {_span(name, *each)}"
-        for name, each in ends.items()
-        if name in recording and _beyond(recording[name], *each, margin).any()
-    ]
-    rows = f"{int(outside.sum())} of {len(recording)} rows are outside the range of the measurements of the fit"
-    return [f"{rows} ({'; '.join(parts)}); {NOT_THERE}"]
-
-
-def rate_notes(recording: Recording, fitted: Mapping[str, float | None]) -> list[str]:
-    """The rates of change that exceed those of the fit [SI per s], by quantity; None where the fit has none."""
-    parts = []
-    for name, rate in fitted.items():
-        own = rate_of_change(recording, name)
-        if rate is not None and own > RATE_MARGIN * rate:
-            parts.append(f"{name} changes by up to {displayed(name, own)}/s, in the fit by {displayed(name, rate)}/s")
-    return [f"the record is faster than those of the fit: {'; '.join(parts)}; {NOT_THERE}"] if parts else []
-
-
-def length_notes(length: float | None, fitted: Sequence[float]) -> list[str]:
-    """A resting length [m] outside the range of those of the fit [m]."""
-    if length is None or not fitted:
-        return []
-    low, high = min(fitted), max(fitted)
-    if low * (1 - LENGTH_MARGIN) <= length <= high * (1 + LENGTH_MARGIN):
-        return []
-    span = displayed("length", low) if low == high else f"{displayed('length', low)} to {displayed('length', high)}"
-    return [f"the resting length, {displayed('length', length)}, is outside that of the fit, {span}; {NOT_THERE}"]
-
-
-def with_band_notes(prediction: "RecordPrediction", differences: Sequence[str], usual: str) -> "RecordPrediction":
-    """The prediction with a note for each quantity whose band does not hold: by how much, and the likely reason.
-
-    `differences` name what of the record lies outside the fit; where there are none, `usual` names the usual causes.
-    """
-    notes = []
-    for each in prediction.quantities:
-        if each.share is None or each.share >= MIN_SHARE or each.compared.sum() < MIN_ROWS:
-            continue
-        mean, known = float(np.mean(each.errors[each.compared])), [*differences]
-        if prediction.outside is not None and (each.compared & prediction.outside).any():
-            inside = each.share_of(each.compared & ~prediction.outside)
-            text = "" if inside is None else f" (inside it {100 * inside:.3g} % are within the band)"
-            known.insert(0, f"rows outside the range of the fit{text}")
-        reason = f"likely because of {', '.join(known)}"
-        reason = reason if known else f"nothing recorded explains it; usual are {usual}"
-        notes.append(
-            f"the 95 % band of the {each.name} does not hold for this record: {100 * each.share:.3g} % of the rows are "
-            f"within it, and the predicted {each.name} is {displayed(each.name, abs(mean))} too "
-            f"{'high' if mean > 0 else 'low'} on average; {reason}"
-        )
-    return dataclasses.replace(prediction, notes=(*prediction.notes, *notes))
-
-
-def _beyond(values: Array, low: float, high: float, margin: float) -> Mask:
-    allowed = margin * (high - low)
-    return np.asarray((values < low - allowed) | (values > high + allowed))
-
-
-def _span(name: str, low: float, high: float) -> str:
-    return f"{displayed(name, float(low))} to {displayed(name, float(high))}"
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -248,3 +85,170 @@ class RecordPrediction(ShortRepr):
     def origin(self) -> str:
         """Name of the record."""
         return self.recording.origin
+
+
+def with_band_notes(prediction: RecordPrediction, differences: Sequence[str], usual: str) -> RecordPrediction:
+    """The prediction with a note for each quantity whose band does not hold: by how much, and the likely reason, which
+    is what lies outside the fit, `differences`, or one of the usual causes."""
+    notes = []
+    for each in prediction.quantities:
+        if each.share is None or each.share >= MIN_SHARE or each.compared.sum() < MIN_ROWS:
+            continue
+        mean, known = float(np.mean(each.errors[each.compared])), [*differences]
+        if prediction.outside is not None and (each.compared & prediction.outside).any():
+            inside = each.share_of(each.compared & ~prediction.outside)
+            text = "" if inside is None else f" (inside it {100 * inside:.3g} % are within the band)"
+            known.insert(0, f"rows outside the range of the fit{text}")
+        reason = f"likely because of {', '.join(known)}"
+        reason = reason if known else f"nothing recorded explains it; usual are {usual}"
+        notes.append(
+            f"the 95 % band of the {each.name} does not hold for this record: {100 * each.share:.3g} % of the rows are "
+            f"within it, and the predicted {each.name} is {displayed(each.name, abs(mean))} too "
+            f"{'high' if mean > 0 else 'low'} on average; {reason}"
+        )
+    return dataclasses.replace(prediction, notes=(*prediction.notes, *notes))
+
+
+BASELINES = (
+    "Skill: 1 - error/error of the better baseline. Persistence keeps the first value; the ARX model is fitted to the "
+    "other records, or to the other half of a single one, and runs freely from the first rows."
+)
+NO_BAND = "the model states no band"
+MAX_BRIEF = 15
+"""Maximum number of predicted quantities in the brief view (chosen)."""
+STEADY_PRESSURE = 0.03
+"""Variation of a constant pressure relative to its maximum, without the extreme 4 % of the rows (chosen)."""
+
+
+def prediction_chapters(model: str, thing: Any, predictions: Sequence[RecordPrediction]) -> list[Chapter]:
+    """Return the chapters of predicted records, the errors of all and one for each; `model` names the file of the
+    muscle or plant `thing`, whose references are cited."""
+    return [_overview(model, thing, predictions), *(_record(i, each) for i, each in enumerate(predictions, 1))]
+
+
+def _overview(model: str, thing: Any, predictions: Sequence[RecordPrediction]) -> Chapter:
+    quantities = [quantity for each in predictions for quantity in each.quantities]
+    records = [each for each in predictions for _ in each.quantities]
+    names = [quantity.name for quantity in quantities]
+    half_widths = [None if q.half_width is None else float(np.median(q.half_width[q.compared])) for q in quantities]
+    columns: dict[str, Any] = {
+        "record": [each.origin for each in records],
+        "quantity": names,
+        "rows": [int(quantity.compared.sum()) for quantity in quantities],
+        "rms error": TableColumn([quantity.rms for quantity in quantities], BY_ROW),
+        "maximum error": TableColumn([quantity.max_error for quantity in quantities], BY_ROW),
+        "in row": TableColumn([quantity.worst_row + 1 for quantity in quantities], brief=False),
+        "half width of the 95 % band": TableColumn(half_widths, BY_ROW, short="95 % band ±"),
+        "unit": unit_column(names),
+        **_baseline_columns(predictions),
+        "rows within the band": TableColumn([q.share for q in quantities], "1", "%", digits=3, short="within"),
+        "band": TableColumn([quantity.band or NO_BAND for quantity in quantities], brief=False),
+        "notes": TableColumn(["; ".join(each.notes) for each in records], brief=False),
+    }
+    number = counted(len(predictions), "record")
+    sentences = [f"{number} that {model} was not fitted to, predicted and compared with the measured values."]
+    sources = list(filter(None, dict.fromkeys(q.band for q in quantities if q.half_width is not None)))
+    sentences += [f"Band: {source.rstrip('.')}." for source in sources]
+    if not sources and all(quantity.share is None for quantity in quantities):
+        reasons = dict.fromkeys(quantity.band or NO_BAND for quantity in quantities)
+        sentences.append(f"No share of rows within a band is given: {'; '.join(reasons)}.")
+    caption = "Errors: predicted minus measured." + (f" {BASELINES}" if "skill" in columns else "")
+    table = Table("predictions", "Errors of the predicted values", columns, caption, brief=MAX_BRIEF)
+    notes = tuple(f"{each.origin}: {note}" for each in predictions for note in each.notes)
+    title, references = f"Prediction by {model}", tuple(cite(thing))
+    return Chapter("prediction", title, " ".join(sentences), tables=(table,), notes=notes, references=references)
+
+
+def _baseline_columns(predictions: Sequence[RecordPrediction]) -> dict[str, Any]:
+    """The rms errors of the baselines of all quantities, and the skill of the model; empty without records in time."""
+    timed = {each: record for each in predictions if (record := _timed(each)) is not None}
+    names = {each: tuple(quantity.name for quantity in each.quantities) for each in predictions}
+    errors: dict[QuantityPrediction, dict[str, float]] = {q: {} for each in predictions for q in each.quantities}
+    for kind in dict.fromkeys(names.values()):  # the ARX model is fitted to the records with the same quantities
+        alike = [each for each in timed if names[each] == kind]
+        for each, found in zip(alike, baseline_errors([timed[other] for other in alike]), strict=True):
+            for k, quantity in enumerate(each.quantities):
+                errors[quantity] = {name: float(values[k]) for name, values in found.items()}
+    if not any(errors.values()):
+        return {}
+    persistence, arx = ([each.get(name) for each in errors.values()] for name in (PERSISTENCE, ARX))
+    skills = [skill(quantity.rms, each) for quantity, each in errors.items()]
+    return {
+        f"rms error of {PERSISTENCE}": TableColumn(persistence, BY_ROW, short=PERSISTENCE),
+        f"rms error of an {ARX}": TableColumn(arx, BY_ROW, short="ARX"),
+        "skill": TableColumn(skills, "1", digits=2),
+    }
+
+
+def _timed(prediction: RecordPrediction) -> TimedRecord | None:
+    """The record of a prediction for the baselines; None without inputs or without times that rise."""
+    time = prediction.recording["time"] if "time" in prediction.recording else np.zeros(0)
+    if prediction.inputs is None or time.size < 2 or not np.all(np.diff(time) > 0.0):
+        return None
+    quantities = prediction.quantities
+    measured, compared = (np.column_stack([getattr(q, name) for q in quantities]) for name in ("measured", "compared"))
+    return TimedRecord(time, measured, prediction.inputs, compared)
+
+
+def _record(number: int, prediction: RecordPrediction) -> Chapter:
+    stem = f"prediction-{number}"
+    columns: dict[str, Any] = {}
+    if "time" in prediction.recording:
+        columns["time"] = TableColumn(prediction.recording["time"], "s")
+    for quantity in prediction.quantities:
+        name, unit = quantity.name, unit_column([quantity.name]).values[0]
+        columns[f"measured {name}"] = TableColumn(quantity.measured, unit)
+        columns[f"predicted {name}"] = TableColumn(quantity.predicted, unit)
+        if quantity.half_width is not None:
+            columns[f"half width of the band of {name}"] = TableColumn(quantity.half_width, unit)
+        columns[f"compared {name}"] = quantity.compared
+    if prediction.outside is not None:
+        columns["outside the range of the fit"] = prediction.outside
+    errors = "; ".join(
+        f"{quantity.name}: rms error {displayed(quantity.name, quantity.rms)}, maximum error "
+        f"{displayed(quantity.name, quantity.max_error)} in row {quantity.worst_row + 1}"
+        for quantity in prediction.quantities
+    )
+    caption = f"{prediction.origin}: measured and predicted values with the 95 % band, and errors."
+    title, summary = f"Record {number}: {prediction.origin}", f"{errors[:1].upper()}{errors[1:]}."
+    tables = (Table(stem, "Measured and predicted values", columns, series=True),)
+    plots = (Plot(stem, caption, partial(_figure, prediction)),)
+    return Chapter(stem, title, summary, tables=tables, plots=plots, notes=prediction.notes, brief=False)
+
+
+def _figure(prediction: RecordPrediction) -> Any:
+    """Return a figure with measured and predicted values above the errors, for every quantity."""
+    figure, axes = residual_panels(len(prediction.quantities))
+    for (upper, lower), quantity in zip(axes.T, prediction.quantities, strict=True):
+        (x, label), (factor, unit) = _abscissa(prediction, quantity), display_scale(quantity.name)
+        predicted = factor * quantity.predicted
+        draw_residuals((upper, lower), x, factor * quantity.measured, predicted, "predicted", quantity.compared)
+        if quantity.half_width is not None:
+            order = np.argsort(x, kind="stable")
+            half = factor * quantity.half_width[order]
+            low, high = predicted[order] - half, predicted[order] + half
+            if np.any(np.diff(x) < 0.0):  # two branches over one abscissa
+                low, high = running_extreme(low, np.minimum), running_extreme(high, np.maximum)
+            style = {"color": RED, "alpha": 0.18, "linewidth": 0}
+            upper.fill_between(x[order], low, high, label="95 % band", **style)
+            lower.fill_between(x[order], -half, half, **style)
+        upper.set_ylabel(f"{quantity.name} [{unit}]")
+        lower.set(xlabel=label, ylabel=f"error [{unit}]")
+    legend_below(figure, axes[0, 0], columns=3)
+    return figure
+
+
+def _abscissa(prediction: RecordPrediction, quantity: QuantityPrediction) -> tuple[Array, str]:
+    """Return the contraction or the pressure of a slow run in which the other is constant, else the time or the row."""
+    recording = prediction.recording
+    if quantity.name == "force" and "contraction" in recording and "pressure" in recording:
+        pressure, contraction = recording["pressure"], recording["contraction"]
+        moved = float(np.nanmax(contraction) - np.nanmin(contraction))
+        steady = float(np.nanquantile(pressure, 0.98) - np.nanquantile(pressure, 0.02))
+        if moved <= CONTRACTION_BAND:
+            return 1e-3 * pressure, "pressure [kPa]"
+        if steady <= STEADY_PRESSURE * float(np.nanmax(np.abs(pressure))):
+            return 100.0 * contraction, "contraction [%]"
+    if "time" in recording:
+        return recording["time"], "time [s]"
+    return np.arange(1.0, len(recording) + 1.0), "row"
