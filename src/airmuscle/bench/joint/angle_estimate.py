@@ -86,10 +86,8 @@ def estimate_angles(fit: ArmFit, episodes: Episodes, *, any_pose: bool = False, 
     before, _ = _runs(fit.arm, known.runs, known.sample_time, fit.inspection.delay, poses)
     seen, errors = _seen(before, known.runs), before - _padded(known.runs, "angle")
     block = np.arange(len(known)) * BLOCKS // len(known)  # in time, so that a drift of the arm widens the band
-    left = [
-        errors[block == b] - _predicted_errors(seen[block != b], errors[block != b], seen[block == b])
-        for b in range(BLOCKS)
-    ]
+    parts = [(block == b, block != b) for b in range(BLOCKS)]
+    left = [errors[out] - _predicted_errors(seen[rest], errors[rest], seen[out]) for out, rest in parts]
     level = min(1.0, COVERAGE * (1 + 1 / len(known)))  # so that it holds for one further episode, too
     limits = np.nanquantile(np.abs(np.concatenate(left)), level, axis=0, method="higher")
     angle, spread = _runs(fit.arm, own.runs, own.sample_time, fit.inspection.delay, poses)
@@ -102,11 +100,8 @@ def estimate_angles(fit: ArmFit, episodes: Episodes, *, any_pose: bool = False, 
 
 
 def _predicted_errors(seen: Array, errors: Array, further: Array) -> Array:
-    """Errors (N', R', J) of further episodes by ridge regressions, one for each row, on what is `seen` (N, R, F) there.
-
-    errors (N, R, J) are NaN after the end of an episode; rows that fewer than FEWEST episodes reach have the regression
-    of the row before.
-    """
+    """Errors (N', R', J) of further episodes by ridge regressions of errors (N, R, J), one for each row, on what is
+    `seen` (N, R, F) there; rows that fewer than FEWEST episodes reach have the regression of the row before."""
     enough = np.isfinite(errors).all(axis=2).sum(axis=0) >= FEWEST
     last = max(int(np.count_nonzero(enough)) - 1, 0)
     found = np.zeros((len(further), further.shape[1], errors.shape[2]))

@@ -9,7 +9,7 @@ from typing import TypeVar, cast
 import numpy as np
 
 from ...core import Array, StateVariable, System, Value, Values, model, tree
-from ...engine import BatchSolution, RungeKutta4, WithSensitivities, sensitivity, simulate_batch
+from ...engine import RungeKutta4, WithSensitivities, sensitivity, simulate_batch
 from ...physics import PressureDriven, SerialArm, WithStickSlip, friction_load
 from .episodes import HISTORY, Windows, WindowSignal, start_of
 
@@ -77,10 +77,8 @@ class Descent:
         self.spread = 0.1
 
     def run(self, schedule: SearchStage) -> float:
-        """Descend; afterwards `arm` is the mean of CHECKED iterates in turn with the smallest cost, which is returned.
-
-        A search that has lost its way goes on from that mean with half the step.
-        """
+        """Descend; afterwards `arm` is the mean of CHECKED iterates in turn with the smallest cost, which is returned;
+        a search that has lost its way goes on from that mean with half the step."""
         count, rate = len(self.names), RATE
         normal, slope, tail = np.zeros((count, count)), np.zeros(count), []
         rows = min(schedule.rows, self.windows.rows)
@@ -89,9 +87,12 @@ class Descent:
             if self.stopped:
                 break
             which = self.rng.permutation(len(self.windows))[: schedule.batch]
-            batch = self.windows.part(np.sort(which), rows)
-            new_normal, new_slope = self._equations(batch)
-            normal, slope = MEMORY * normal + (1 - MEMORY) * new_normal, MEMORY * slope + (1 - MEMORY) * new_slope
+            error, gradient = gradients(self.arm, self.joint, self.names, self.windows.part(np.sort(which), rows))
+            self.spread = 0.9 * self.spread + 0.1 * max(float(np.sqrt(np.mean(error**2))), 1e-3)
+            weighted = gradient / np.sqrt(1.0 + (error / CLIP) ** 2)[..., None]
+            flat = weighted.reshape(-1, count).T
+            normal = MEMORY * normal + (1 - MEMORY) * (flat @ gradient.reshape(-1, count) / self.spread**2)
+            slope = MEMORY * slope + (1 - MEMORY) * (flat @ error.ravel() / self.spread**2)
             late = step / schedule.iterations
             damping = DAMPING if late <= 0.5 else LATE_DAMPING
             self._step(normal, slope, 0.4 * rate if late > 0.7 else rate, damping)
@@ -115,14 +116,6 @@ class Descent:
         errors = errors[some.counts[:, HISTORY + 1 :]]
         return float(np.mean(2 * CLIP**2 * (np.sqrt(1 + (errors / CLIP) ** 2) - 1)))
 
-    def _equations(self, batch: Windows) -> tuple[Array, Array]:
-        """Normal matrix and slope over some windows, relative to the running mean square error."""
-        error, gradient = gradients(self.arm, self.joint, self.names, batch)
-        self.spread = 0.9 * self.spread + 0.1 * max(float(np.sqrt(np.mean(error**2))), 1e-3)
-        weighted, count = gradient / np.sqrt(1.0 + (error / CLIP) ** 2)[..., None], gradient.shape[-1]
-        flat = weighted.reshape(-1, count).T
-        return flat @ gradient.reshape(-1, count) / self.spread**2, flat @ error.ravel() / self.spread**2
-
     def _step(self, normal: Array, slope: Array, rate: float, damping: float) -> None:
         pull = np.array([self.ridge * (name in self.prior) for name in self.names]) / self.sizes**2
         slope = slope + pull * (self.values - [self.prior.get(name, 0.0) for name in self.names])
@@ -135,37 +128,30 @@ class Descent:
         self.arm = with_values(self.arm, self.names, self.values)
 
 
-def over(system: System, inputs: Array, step: float, state: Mapping[str, Array], keep: list[str]) -> BatchSolution:
-    """Columns (N, R) of a system from states (N,) under inputs (N, R, m) at rows of `step` [s], linear between them."""
-    times = step * np.arange(inputs.shape[1])
-    return simulate_batch(
-        system, {}, [WindowSignal(np.ascontiguousarray(each), step) for each in inputs], duration=float(times[-1]),
-        initial_states=state, keep=keep, output_times=times, integrator=RungeKutta4(step / SUBSTEPS),
-    )  # fmt: skip
-
-
 def with_slopes(
     system: System, paths: Sequence[str], inputs: Array, step: float, state: Mapping[str, Array], names: Sequence[str]
 ) -> tuple[Array, Array]:
-    """Columns (N, R, J) as of `over`, and their derivatives (N, R, J, P) by the parameters of these paths; `state` may
-    have derivatives of the initial state, which are 0 otherwise."""
+    """Columns (N, R, J) of a system from states (N,) under inputs (N, R, m) at rows of `step` [s], linear between them,
+    and their derivatives (N, R, J, P) by the parameters of these paths; `state` may have those of the initial state."""
     observed, keep, own = system, list(names), [[sensitivity(n, k) for k in range(len(paths))] for n in names]
     if paths:
         zeros = np.zeros(len(inputs))
         state = {sensitivity(s.name, k): zeros for s in system.states for k in range(len(paths))} | dict(state)
         observed = WithSensitivities(system, tuple((p,) for p in paths), (1.0,) * len(paths), observed=tuple(names))
         keep += itertools.chain(*own)
-    run = over(observed, inputs, step, state, keep)
+    times, signals = step * np.arange(inputs.shape[1]), [WindowSignal(np.ascontiguousarray(u), step) for u in inputs]
+    run = simulate_batch(
+        observed, {}, signals, duration=float(times[-1]), initial_states=state, keep=keep, output_times=times,
+        integrator=RungeKutta4(step / SUBSTEPS),
+    )  # fmt: skip
     columns = np.stack([run[name] for name in names], axis=-1)
     slopes = [np.stack([run[name] for name in row], axis=-1) for row in own if row]
     return columns, np.stack(slopes, axis=2) if slopes else np.zeros((*columns.shape, 0))
 
 
 def gradients(arm: PressureDriven, joint: int, paths: Sequence[str], windows: Windows) -> tuple[Array, Array]:
-    """Errors of the free run of one joint (N, rows) [rad] and their derivatives (N, rows, P) by the parameters.
-
-    The other joints move as measured; both are 0 in rows of outliers.
-    """
+    """Errors (N, rows) [rad] of the free run of one joint and their derivatives (N, rows, P) by the parameters, both 0
+    in rows of outliers; the other joints move as measured."""
     error, gradient = _run_of_joint(arm, joint, paths, windows)
     lost = ~np.isfinite(error) | (np.abs(error) > OUTLIER) | ~np.isfinite(gradient).all(axis=-1)
     lost |= np.logical_not(windows.counts[:, HISTORY + 1 :])
@@ -185,10 +171,8 @@ def _run_of_joint(arm: PressureDriven, joint: int, paths: Sequence[str], windows
             state |= {sensitivity(name, k): (moved[name] - known[name]) / step for name in names}
     measured = (windows.angle, windows.rate, windows.acceleration)
     motion = [column[:, HISTORY:, i, None] for i in system.others for column in measured]
-    inputs, of_arm = (
-        np.concatenate([windows.pressure[:, HISTORY:], *motion], axis=-1),
-        [f"arm.{path}" for path in paths],
-    )
+    inputs = np.concatenate([windows.pressure[:, HISTORY:], *motion], axis=-1)
+    of_arm = [f"arm.{path}" for path in paths]
     found, slopes = with_slopes(system, of_arm, inputs, windows.sample_time, state, names[:1])
     return np.asarray(found[:, 1:, 0] - windows.angle[:, HISTORY + 1 :, joint]), slopes[:, 1:, 0]
 

@@ -40,10 +40,8 @@ from .episodes import Episode, Episodes, join, speed_of
 TABLES = ("angles", "speeds", "pressures", "commands", "arm")
 KEYS = ("sample_time", "time", "starts", *TABLES)
 TABLE_KEYS = ("columns", "unit", "scale", "divisors")
-AXES = {
-    sign + name: axis for name, axis in zip("xyz", ((1, 0, 0), (0, 1, 0), (0, 0, 1)), strict=True) for sign in ("", "+")
-}
-AXES |= {f"-{name}": (-AXES[name][0], -AXES[name][1], -AXES[name][2]) for name in "xyz"}
+AXES = {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1)}
+AXES |= {f"+{name}": axis for name, axis in AXES.items()} | {f"-{n}": (-x, -y, -z) for n, (x, y, z) in AXES.items()}
 TIMES = ("t", "time", "stamp", "timestamp")
 """Names of columns of times, in seconds or a thousandth, millionth or billionth of them."""
 SAME_TIME = 0.02
@@ -124,15 +122,13 @@ def _channels(path: Path, name: str, table: Any) -> Channels:
     columns = (columns,) if isinstance(columns, str) else columns
     if not isinstance(columns, list | tuple) or not columns or not all(isinstance(column, str) for column in columns):
         raise FileError(f'{path}: {name}.columns must be a name or a list of names, columns = ["q1", "q2"].')
-    factor, allowed = 1.0, UNITS.get(name, {})
-    if "unit" in table:
-        if table["unit"] not in tuple(allowed):
-            raise FileError(
-                f"{path}: {name}.unit is '{table['unit']}'; allowed: {', '.join(allowed) or 'none'}. State other units "
-                "as a number, scale."
-            )
-        factor = allowed[table["unit"]]
-    target = "Pa" if name == "pressures" else "1"
+    allowed = UNITS.get(name, {})
+    if "unit" in table and table["unit"] not in tuple(allowed):
+        raise FileError(
+            f"{path}: {name}.unit is '{table['unit']}'; allowed: {', '.join(allowed) or 'none'}. State other units as "
+            "a number, scale."
+        )
+    target, factor = "Pa" if name == "pressures" else "1", allowed[table["unit"]] if "unit" in table else 1.0
     scale = quantity(table.get("scale", 1.0), target, where=f"{path}: {name}.scale")
     return Channels(tuple(columns), factor * scale, table.get("divisors"))
 
@@ -214,7 +210,14 @@ def _episode(name: str, arrays: Arrays, mapping: EpisodeMapping) -> tuple[Episod
             )
     else:
         step = mapping.sample_time or 0.0
-        _check_times(name, arrays, step)
+        for column in _times(arrays):  # in whatever unit it is
+            ratio = float(np.median(np.diff(arrays[column].ravel()))) / step
+            if ratio > 0.0 and abs(np.log10(ratio) / 3 - round(np.log10(ratio) / 3)) > SAME_TIME:
+                raise ColumnError(
+                    f"{name}: column '{column}' advances by {ratio * step:.4g} in a row, the mapping file states a "
+                    f'sample time of {1e3 * step:.4g} ms. Correct sample_time, or state time = "{column}" [s] in its '
+                    "place."
+                )
     speed = _columns(name, arrays, mapping.speeds) if mapping.speeds else speed_of(angle, step)
     command = _columns(name, arrays, mapping.commands) if mapping.commands else None
     for what, given in (("pressures", pressure), ("speeds", speed), ("commands", command)):
@@ -225,17 +228,6 @@ def _episode(name: str, arrays: Arrays, mapping: EpisodeMapping) -> tuple[Episod
 
 def _times(arrays: Arrays) -> list[str]:
     return [each for each in arrays if each.lower() in TIMES and arrays[each].size > 1]
-
-
-def _check_times(name: str, arrays: Arrays, step: float) -> None:
-    """Raise ColumnError for a column of times that contradicts a sample time [s], in whatever unit it is."""
-    for column in _times(arrays):
-        ratio = float(np.median(np.diff(arrays[column].ravel()))) / step
-        if ratio > 0.0 and abs(np.log10(ratio) / 3 - round(np.log10(ratio) / 3)) > SAME_TIME:
-            raise ColumnError(
-                f"{name}: column '{column}' advances by {ratio * step:.4g} in a row, the mapping file states a sample "
-                f'time of {1e3 * step:.4g} ms. Correct sample_time, or state time = "{column}" [s] in its place.'
-            )
 
 
 def _columns(name: str, arrays: Arrays, channels: Channels) -> Array:

@@ -47,10 +47,8 @@ def _is_bag(path: Path) -> bool:
 
 
 def read_arrays(path: Path, sample_time: float | None = None) -> tuple[list[Arrays], tuple[str, ...]]:
-    """The arrays of every episode in a file or a bag, and notes on their reading. Raises FileError or ColumnError.
-
-    A bag is interpolated to multiples of the sample time [s], or of the median interval of its messages.
-    """
+    """The arrays of every episode in a file or a bag, which is interpolated to multiples of the sample time [s] or its
+    median interval, and notes on their reading. Raises FileError or ColumnError."""
     if _is_bag(path) or path.suffix == ".bag":
         return _read_bag(path, sample_time)
     if ".tfrecord" in path.name:

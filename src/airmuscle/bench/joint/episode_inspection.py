@@ -45,8 +45,7 @@ class PressureAction:
         return self.t_value > CERTAIN and self.t_value > CLEAR * self.next_t_value
 
     def __str__(self) -> str:
-        way = "raises" if self.sign > 0 else "lowers"
-        doubt = "" if self.certain else ", uncertain"
+        way, doubt = "raises" if self.sign > 0 else "lowers", "" if self.certain else ", uncertain"
         t = f"t = {self.t_value:.0f}, next joint {self.next_t_value:.0f}{doubt}"
         return f"pressure {self.muscle} {way} angle {self.joint} ({t})"
 
@@ -63,10 +62,8 @@ class EpisodeInspection:
 
     @property
     def pairs(self) -> tuple[tuple[int, int], ...]:
-        """For each joint the muscle that raises its angle and the one that lowers it, from 1.
-
-        Raises IdentificationError where the pressures do not show it with certainty.
-        """
+        """For each joint the muscle, from 1, that raises its angle and the one that lowers it. Raises
+        IdentificationError where the pressures do not show it with certainty."""
         found = []
         for joint in range(1, self.episodes.joints + 1):
             own = [a for a in self.actions if a.joint == joint and a.certain]
@@ -127,13 +124,10 @@ def _range_line(name: str, values: Array, unit: str) -> str:
 
 def _units(episodes: Episodes) -> list[str]:
     """Readings beyond what an arm has, whose unit is another one."""
-    kinds = (
-        ("angle", "rad", TURN, "further than a joint turns"),
-        ("pressure", "Pa", BURST, "more than a muscle bears"),
-    )
+    turn, burst = ("rad", TURN, "further than a joint turns"), ("Pa", BURST, "more than a muscle bears")
     return [
         f"{name} {i} reaches {high:.4g} {unit}, {why}: state its unit or scale in the mapping file, [{name}s]."
-        for name, unit, limit, why in kinds
+        for name, (unit, limit, why) in (("angle", turn), ("pressure", burst))
         for i, high in enumerate(np.quantile(np.abs(episodes.rows(name)), 0.99, axis=0), start=1) if high > limit
     ]  # fmt: skip
 
@@ -152,14 +146,12 @@ def _jumps(episodes: Episodes) -> list[str]:
 
 def _doubtful(episodes: Episodes) -> list[str]:
     """Remarks on what may have another unit or scale: ranges of angles, sizes of pressures, and the sample time."""
-    spans = np.ptp(np.quantile(episodes.rows("angle"), (0.01, 0.99), axis=0), axis=0)
-    kinds = [
-        (i, x, "degrees read as radians" if x > WIDE else "radians read as degrees") for i, x in enumerate(spans, 1)
-    ]
-    found = [
-        f"angle {i} spans {np.degrees(x):.3g} deg, as {kind} do: check its unit in the mapping file, [angles]"
-        for i, x, kind in kinds if not NARROW < x < WIDE
-    ]  # fmt: skip
+    spans, found = np.ptp(np.quantile(episodes.rows("angle"), (0.01, 0.99), axis=0), axis=0), list[str]()
+    for i, x in enumerate(spans, 1):
+        if not NARROW < x < WIDE:
+            kind = "degrees read as radians" if x > WIDE else "radians read as degrees"
+            text = f"angle {i} spans {np.degrees(x):.3g} deg, as {kind} do"
+            found.append(f"{text}: check its unit in the mapping file, [angles]")
     pressure = episodes.rows("pressure")
     high, whole = float(np.quantile(np.abs(pressure), 0.99)), bool(np.all(pressure == np.round(pressure)))
     if high < 1e4 or whole:

@@ -31,11 +31,8 @@ class Episode(ShortRepr):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Episodes:
-    """Episodes of one arm with a common sample time [s]; `notes` state what the reader has found or corrected,
-    `confirmed` whether times or speeds of the record confirm the sample time.
-
-    A slice of it is again an Episodes: `episodes[:2400]`.
-    """
+    """Episodes of one arm with a common sample time [s], also a slice of others: `episodes[:2400]`; `notes` state what
+    the reader has found or corrected, `confirmed` whether times or speeds of the record confirm the sample time."""
 
     runs: tuple[Episode, ...]
     sample_time: float
@@ -44,15 +41,11 @@ class Episodes:
 
     def __post_init__(self) -> None:
         if not self.runs or not self.sample_time > 0.0:
-            raise ParameterError(
-                f"Episodes: {len(self.runs)} runs at a sample time of {self.sample_time:g} s are given; give one run "
-                "at least and a sample time above 0."
-            )
-        shapes = {(each.angle.shape[1], each.pressure.shape[1]) for each in self.runs}
-        if len(shapes) > 1:
-            raise ParameterError(
-                f"Episodes: runs have different numbers of joints and muscles, {sorted(shapes)}; fit each arm alone."
-            )
+            given = f"{len(self.runs)} runs at a sample time of {self.sample_time:g} s are given"
+            raise ParameterError(f"Episodes: {given}; give one run at least and a sample time above 0.")
+        if len(shapes := {(each.angle.shape[1], each.pressure.shape[1]) for each in self.runs}) > 1:
+            different = f"runs have different numbers of joints and muscles, {sorted(shapes)}"
+            raise ParameterError(f"Episodes: {different}; fit each arm alone.")
 
     def __len__(self) -> int:
         return len(self.runs)
@@ -80,10 +73,8 @@ ENOUGH = 19
 
 
 def count_fitted(episodes: Episodes, left_out: float | None) -> int:
-    """Number of the episodes, the first ones, that are fitted while a share of them is left out.
-
-    Without a share a tenth is left out, or ENOUGH if that is more, but a third at most. Raises ParameterError.
-    """
+    """Number of the episodes, the first ones, that are fitted while a share of them is left out: by default a tenth, or
+    ENOUGH if that is more, but a third at most. Raises ParameterError."""
     count = len(episodes)
     share = min(max(0.1, ENOUGH / count), 1 / 3) if left_out is None else left_out
     if not 0.0 < share < 1.0 or count < 4:
@@ -196,12 +187,10 @@ def long_enough(episodes: Episodes, rows: int) -> tuple[Episodes, list[str]]:
 def cut(episodes: Episodes, delay: int = 0, rows: int = ROWS, stride: int = ROWS) -> Windows:
     """The windows that begin at rows HISTORY, HISTORY + stride, ... of every episode while `rows` further rows follow.
 
-    Pressures are read `delay` rows later, because their sensors lag; the last reading of a window is then held. Raises
+    Pressures are read `delay` rows later, because their sensors lag; the last reading is held. Raises
     IdentificationError if no episode is long enough.
     """
-    found = [
-        (number, k) for number, run in enumerate(episodes.runs) for k in range(HISTORY, len(run) - rows - 1, stride)
-    ]
+    found = [(n, k) for n, run in enumerate(episodes.runs) for k in range(HISTORY, len(run) - rows - 1, stride)]
     if not found:
         long_enough(episodes, rows)  # raises
     runs, at, step = episodes.runs, np.arange(-HISTORY, rows + 1), episodes.sample_time

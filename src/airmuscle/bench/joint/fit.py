@@ -99,7 +99,9 @@ def _search(
     shared = shared_parameters(axes) if axes else []
     prior = {leaf.path: float(leaf.value) for leaf in tree.leaves(arm) if leaf.path in shared}
     paths: dict[int, list[str]] = {}
-    for joint in _by_coupling(axes, episodes.joints):
+    # first the joint with the most joints beyond it about a parallel axis, whose inertia acts on it
+    coupling = [sum(abs(np.dot(a, b)) for b in axes[j + 1 :]) for j, a in enumerate(axes)] or [0.0] * episodes.joints
+    for joint in sorted(range(episodes.joints), key=lambda joint: -coupling[joint]):
         paths[joint] = [*own_parameters(arm, joint), *(shared if not paths else [])]
         judge = free_errors if len(paths) == episodes.joints else joint_errors  # all others are identified
         starts = [stronger(arm, joint, factor) for factor in STRENGTHS]
@@ -119,12 +121,6 @@ def _best(searches: Sequence[Descent]) -> tuple[float, PressureDriven]:
         pool.shutdown()
     best = int(np.argmin(costs))
     return costs[best], searches[best].arm
-
-
-def _by_coupling(axes: tuple[tuple[int, int, int], ...], joints: int) -> list[int]:
-    """The joints, first the one with the most joints beyond it about a parallel axis, whose inertia acts on it."""
-    parallel = [[abs(np.dot(a, b)) for b in axes[j + 1 :]] for j, a in enumerate(axes)] or [[]] * joints
-    return sorted(range(joints), key=lambda joint: -sum(parallel[joint]))
 
 
 def _contacts(episodes: Episodes, errors: np.ndarray, windows: Windows, split: int) -> list[str]:
@@ -208,20 +204,14 @@ RADIUS, LENGTH, INERTIA, AREA, FIBRE_ANGLE = 0.03, 0.3, 0.1, 6.7e-4, 0.65
 """Moment arm [m], resting length and distance of joints [m], inertia [kg m^2] and area [m2] of every joint, chosen: a
 record of pressures and angles contains none of the first three, and each multiplies coefficients that are fitted. The
 fibre angle [rad] of the volume permits 2.5 rad to both sides."""
-
-
 LEVEL = 3e5
 """Gauge pressure [Pa] at which a muscle pulls with this area (chosen), as far as the readings are Pa and not counts."""
 
 
 def reduced_arm(middle: Array, axes: Sequence[tuple[int, int, int]] = (), level: float = LEVEL) -> PressureDriven:
-    """Arm of J joints with a pair of muscles each, from which a fit starts.
-
-    middle  middle of the range of each joint [rad], about which forces are polynomials
-    axes    axes of the joints, if the coupling of the links is to be found; without them every joint has an inertia of
-            its own
-    level   reading of a high pressure, at which every muscle has the same force
-    """
+    """Arm of J joints with a pair of muscles each, from which a fit starts: forces are polynomials about the middle of
+    the range of each joint [rad], `level` is the reading of a high pressure, at which every muscle has the same force;
+    without the axes, by which the coupling of the links is found, every joint has an inertia of its own."""
     count, full = len(middle), LEVEL * AREA
     sides = [(j, sign) for j in range(count) for sign in (1.0, -1.0)]
     routes = tuple(MuscleRoute((j + 1,), (sign * RADIUS,)) for j, sign in sides)
@@ -260,10 +250,7 @@ def own_parameters(arm: PressureDriven, joint: int) -> list[str]:
 
 
 def shared_parameters(axes: Sequence[tuple[int, int, int]]) -> list[str]:
-    """Paths of what couples the joints of an arm whose axes are known.
-
-    The place of a mass along the axis of its joint has no effect on that joint, and is not among them.
-    """
+    """Paths of what couples the joints of an arm of these axes, along which the place of a mass has no effect."""
     links = [f"mechanism.inner.links[{j}]." for j in range(len(axes))]
     paths = [f"{links[1]}zero_angle", *(f"{link}rotor_inertia" for link in links[1:])]
     for link, axis in zip(links[1:], axes[1:], strict=True):

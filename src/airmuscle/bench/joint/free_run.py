@@ -15,10 +15,7 @@ from .pressures import without_saturated
 
 
 def free_run(arm: PressureDriven, windows: Windows) -> Array:
-    """Angles (N, rows, J) [rad] from the start of every window and the pressures alone, all joints at once.
-
-    A run that fails keeps the angles of its start.
-    """
+    """Angles (N, rows, J) [rad] from the start of every window, which a run that fails keeps, and pressures alone."""
     found = angles(arm, windows.pressure[:, HISTORY:], start_of(arm, windows), windows.sample_time)[:, 1:]
     kept = windows.angle[:, HISTORY : HISTORY + 1]
     return np.where(np.isfinite(found) & (np.abs(found - kept) < 2 * np.pi), found, kept)
@@ -46,8 +43,7 @@ LIMIT = 9.0
 
 
 def baseline_errors(train: Episodes, judge: Episodes, rows: int) -> Mapping[str, Array]:
-    """Errors (N, rows, J) [rad] of the free run of each baseline over the windows of `judge`, by its name: the angles
-    at the start, and an ARX model of the angles of all joints, driven by all pressures."""
+    """Errors (N, rows, J) [rad] of the free run of each baseline over the windows of `judge`, by its name."""
     windows, begin = cut(judge, 0, rows), HISTORY - DEPTH + 1
     arx = fit_arx([(run.angle, run.pressure) for run in train.runs if len(run) > DEPTH + 1], -LIMIT, LIMIT)
     predicted = arx.free_run(windows.angle[:, begin : HISTORY + 1], windows.pressure[:, begin:])

@@ -104,10 +104,8 @@ class ArmFit(Reported):
         return Plant(self.arm.muscle, regulators, self.arm.mechanism)
 
     def uncertainty(self) -> PlantUncertainty:
-        """That of `plant()`: rms errors of its angles, and the covariance of its parameters, for randomisation.
-
-        A parameter at a bound of its range has no variance.
-        """
+        """That of `plant()`, for randomisation: rms errors of its angles, and the covariance of its parameters, where a
+        parameter at a bound of its range has no variance."""
         paths, slopes = [], []
         bounds = {leaf.path: leaf.declared.bounds for leaf in tree.leaves(self.arm)}
         for each in self.estimates:
@@ -136,7 +134,18 @@ class ArmFit(Reported):
             NamedValue("windows", len(self.errors), brief=False),
             NamedValue("delay in rows", self.inspection.delay, brief=False),
         )
-        tables = (self._error_table(), self._joint_table(), self._band_table(), self._parameter_table())
+        bands: dict[str, Any] = {"horizon": TableColumn(self.horizon, "s")}
+        bands |= {f"joint {j}": TableColumn(each, "rad", "deg") for j, each in enumerate(self.band.T, start=1)}
+        parameters = {
+            "parameter": [each.path for each in self.estimates],
+            "value [SI]": [each.value for each in self.estimates],
+            "standard error [SI]": [each.standard_error for each in self.estimates],
+        }
+        tables = (
+            self._error_table(), self._joint_table(),
+            Table("joint-band", "Half width of the 95 % band", bands, shown=False),
+            Table("joint-parameters", "Identified parameters", parameters, key="parameters"),
+        )  # fmt: skip
         plots, notes = (Plot("horizon", caption, self._horizon_figure),), (*self._doubt(count), *self.remarks)
         return Chapter("joint", "Identified arm", summary, values=values, tables=tables, plots=plots, notes=notes)
 
@@ -175,19 +184,6 @@ class ArmFit(Reported):
             "share inside the band": TableColumn(known * self.coverage, "1", "%", 3, short="inside"),
         }
         return Table("joints", "Joints", columns, brief=len(self.pairs))
-
-    def _band_table(self) -> Table:
-        columns: dict[str, Any] = {"horizon": TableColumn(self.horizon, "s")}
-        columns |= {f"joint {j}": TableColumn(band, "rad", "deg") for j, band in enumerate(self.band.T, start=1)}
-        return Table("joint-band", "Half width of the 95 % band", columns, shown=False)
-
-    def _parameter_table(self) -> Table:
-        columns: dict[str, Any] = {
-            "parameter": [each.path for each in self.estimates],
-            "value [SI]": [each.value for each in self.estimates],
-            "standard error [SI]": [each.standard_error for each in self.estimates],
-        }
-        return Table("joint-parameters", "Identified parameters", columns, key="parameters")
 
     def _horizon_figure(self) -> Any:
         """Error of every joint against the horizon, one panel each."""
