@@ -15,7 +15,7 @@ from ....report.chapter import BY_ROW, Chapter, NamedValue, Plot, Table, TableCo
 from ....report.formatting import P_VALUE
 from ...segment import motion_direction
 from . import HysteresisFit, HysteresisLoop, JointFit, LoopFit, loops_not_joined, preferred_fit
-from .limits import MILLIMETRES, Axis
+from .loop_data import MILLIMETRES, Axis
 from .result import FrictionFit
 
 SEPARATE_LOOPS = 2

@@ -15,7 +15,7 @@ from ....report.chapter import Chapter, Plot
 from ....report.shown import parameter_table
 from ...segment.runs import RELATIVE_BAND
 from ..model_evidence import effective_sample_size, format_p_value
-from .limits import MILLIMETRES, DataLimits, combine_limits, limit_reservations
+from .loop_data import MILLIMETRES, DataLimits, combine_limits, limit_reservations
 from .loops import LoopFit, preferred_fit
 from .result import SIGNIFICANCE_LEVEL, FrictionFit, HysteresisFit, Misfit, evidence
 from .search import LoopSeries, search_parameters

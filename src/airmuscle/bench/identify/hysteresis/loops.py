@@ -1,22 +1,23 @@
 """Hysteresis loops in recordings: kind, fitted rows and repeated runs, and the fit of all friction laws to a loop."""
 
 import dataclasses
+import inspect
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from typing import TypeVar
 
 import numpy as np
 
-from ....core import AirmuscleWarning, Hint, HintedText, IdentificationError, ShortRepr, leaves
-from ....physics.muscle.characteristic.base import Characteristic
+from ....core import AirmuscleWarning, Array, Hint, HintedText, IdentificationError, ShortRepr, check_whole, leaves
+from ....physics import Characteristic, Friction, LoopScales
+from ....physics.muscle import friction as laws
 from ....recording import Recording
 from ... import segment
 from ...segment.runs import CONTRACTION_BAND, RELATIVE_BAND
 from ..data_checks import level_text
-from . import fit as loop_fit
-from .limits import speed_reservation
-from .result import FrictionFit, HysteresisFit
-from .search import LoopSeries, free_parameters
+from . import loop_data as data
+from .result import FrictionFit, HysteresisFit, assess_fit
+from .search import LoopSeries, free_parameters, search_parameters
 
 CURVE_DEGREE = 5
 """Degree of the polynomial static curve of a loop, in `hysteresis` as in `campaign` (chosen)."""
@@ -31,8 +32,8 @@ class HysteresisLoop(ShortRepr):
 
     recording: Recording
     run: segment.Run
-    friction_path: loop_fit.FrictionPath
-    static_curve: loop_fit.StaticCurve
+    friction_path: data.FrictionPath
+    static_curve: data.StaticCurve
     fitted_rows: segment.Mask
     transient_rows: int = 0
     """Number of fitted rows in which the pressure changes quickly."""
@@ -46,7 +47,7 @@ class HysteresisLoop(ShortRepr):
 
     def series(self, recording: Recording, fitted_rows: segment.Mask) -> LoopSeries:
         """The arrays of a run of this loop for a fit of friction."""
-        return loop_fit.make_loop_series(recording, self.static_curve, self.friction_path, fitted_rows)
+        return make_loop_series(recording, self.static_curve, self.friction_path, fitted_rows)
 
 
 def describe_run(run: segment.Run) -> str:
@@ -88,7 +89,7 @@ class LoopFit(ShortRepr):
     @property
     def usable_in_plant(self) -> bool:
         """Whether the friction acts along the contraction; friction along pressure describes isometric loops only."""
-        return isinstance(self.loop.friction_path, loop_fit.ContractionPath)
+        return isinstance(self.loop.friction_path, data.ContractionPath)
 
 
 def find_loops(
@@ -149,11 +150,11 @@ def rows_of(recording: Recording, interval: segment.Interval) -> Recording:
     return dataclasses.replace(recording.rows(interval.rows), origin=origin)
 
 
-def _path_of(run: segment.Run) -> loop_fit.FrictionPath:
-    return loop_fit.PressurePath() if run.kind == segment.ISOMETRIC else loop_fit.ContractionPath()
+def _path_of(run: segment.Run) -> data.FrictionPath:
+    return data.PressurePath() if run.kind == segment.ISOMETRIC else data.ContractionPath()
 
 
-def _directions(recording: Recording, friction_path: loop_fit.FrictionPath) -> np.ndarray:
+def _directions(recording: Recording, friction_path: data.FrictionPath) -> Array:
     return segment.motion_direction(friction_path.displacement(recording), recording.columns.get("time"))
 
 
@@ -163,9 +164,9 @@ def _make_loop(
 ) -> HysteresisLoop:  # fmt: skip
     friction_path = _path_of(run)
     if law is not None:
-        static_curve: loop_fit.StaticCurve = loop_fit.FixedCharacteristic(law)
+        static_curve: data.StaticCurve = data.FixedCharacteristic(law)
     elif run.kind in (segment.ISOBARIC, segment.ISOMETRIC):
-        static_curve = loop_fit.PolynomialCurve("contraction" if run.kind == segment.ISOBARIC else "pressure", degree)
+        static_curve = data.PolynomialCurve("contraction" if run.kind == segment.ISOBARIC else "pressure", degree)
     else:
         raise IdentificationError(
             f"{recording.origin}: the run is {run.kind.name}, so pressure and contraction change together and the "
@@ -205,6 +206,72 @@ def _is_same_level(one: segment.Run, other: segment.Run) -> bool:
     return abs(one.constant_value - other.constant_value) <= band
 
 
+def initial_friction_laws(path: Array, force: Array, elements: int = 8) -> tuple[Friction, ...]:
+    """Every law of `friction` with a `guess`, its initial parameters scaled by a path [m] and the forces [N] along it.
+
+    `elements` is the number of elements of MaxwellSlip and PrandtlIshlinskii. Raises IdentificationError for a constant
+    path.
+    """
+    check_whole("initial_friction_laws", "elements", elements, 1)
+    scales = LoopScales.of(path, force, elements)
+    classes = (getattr(laws, name) for name in dir(laws))
+    started = (cls.guess(scales) for cls in classes if inspect.isclass(cls) and issubclass(cls, Friction))
+    return tuple(law for law in started if law is not None)
+
+
+def fit_hysteresis(
+    friction: Friction, recording: Recording, *, static_curve: data.StaticCurve,
+    friction_path: data.FrictionPath = data.ContractionPath(), fitted_rows: segment.Mask | None = None,
+    repeat: tuple[Recording, segment.Mask | None] | None = None,
+) -> HysteresisFit:  # fmt: skip
+    """Fit a friction law to the difference between a loop and its static curve, and test whether the data justify it.
+
+    friction       the law with its initial parameters, see `initial_friction_laws`
+    static_curve   the force without friction; its coefficients are fitted with the friction, and once more without it
+                   for a fair comparison
+    friction_path  the displacement along which the friction slides
+    fitted_rows    mask of the rows whose residuals are minimised: quasi-static rows with a positive force. The path
+                   includes all rows from the first, where the bristles are relaxed
+    repeat         a second run of the same loop with its mask, for the repeatability and the error on other data
+
+    Raises IdentificationError where there are too few rows or the path is constant.
+    """
+    run = make_loop_series(recording, static_curve, friction_path, fitted_rows)
+    second_run = make_loop_series(repeat[0], static_curve, friction_path, repeat[1]) if repeat else None
+    return fit_series(friction, run, second_run)
+
+
+def fit_series(friction: Friction, run: LoopSeries, second_run: LoopSeries | None) -> HysteresisFit:
+    """The fit of `fit_hysteresis` to the series of a run, and of a second run of the same loop."""
+    free = free_parameters(friction)
+    if run.fitted_rows.sum() <= free + run.design_matrix.shape[1] + 2 or not np.ptp(run.path) > 0:
+        raise IdentificationError(
+            f"{run.origin}: {int(run.fitted_rows.sum())} fitted rows along a path of {np.ptp(run.path):.3g} m "
+            f"cannot determine {free} parameters of {type(friction).__name__} and {run.design_matrix.shape[1]} of "
+            "the static curve. Give a run with a rising and a falling branch, or include more rows."
+        )
+    fitted, undetermined = search_parameters(friction, (run,))
+    return assess_fit(fitted, undetermined, run, second_run)
+
+
+def make_loop_series(
+    recording: Recording, static_curve: data.StaticCurve, friction_path: data.FrictionPath,
+    fitted_rows: segment.Mask | None,
+) -> LoopSeries:  # fmt: skip
+    """The arrays of a run for a fit of friction."""
+    target = recording["force"] - static_curve.known_force(recording)
+    finite = np.isfinite(target)
+    rows = finite if fitted_rows is None else np.asarray(fitted_rows, dtype=bool) & finite
+    path, time = friction_path.displacement(recording), recording.columns.get("time")
+    matrix, limits = static_curve.design_matrix(recording), data.data_limits(recording["force"], path, time, rows)
+    series = LoopSeries(
+        recording.origin, path, time, target, matrix, rows, segment.motion_direction(path, time), limits,
+        recording.columns.get("pressure"), friction_path.axis,
+    )  # fmt: skip
+    stiffness = data.resolved_stiffness(path[rows], series.fitted_residuals(None))
+    return dataclasses.replace(series, limits=dataclasses.replace(series.limits, stiffness=stiffness))
+
+
 def fit_loop(loop: HysteresisLoop, *, elements: int = 8, progress: Callable[[str], None] | None = None) -> LoopFit:
     """Fit every friction law to a loop and sort the fits by AICc.
 
@@ -216,16 +283,16 @@ def fit_loop(loop: HysteresisLoop, *, elements: int = 8, progress: Callable[[str
     run = dataclasses.replace(loop.series(loop.recording, loop.fitted_rows), transient_rows=loop.transient_rows)
     second_run = None if loop.repeat is None else loop.series(*loop.repeat)
     fits, failed = list[HysteresisFit](), dict[str, HintedText]()
-    for initial in loop_fit.initial_friction_laws(run.path[loop.fitted_rows], run.fitted_residuals(None), elements):
+    for initial in initial_friction_laws(run.path[loop.fitted_rows], run.fitted_residuals(None), elements):
         name = type(initial).__name__
-        too_uniform = "" if initial.rate_independent else speed_reservation(run.limits, run.axis)
+        too_uniform = "" if initial.rate_independent else data.speed_reservation(run.limits, run.axis)
         if too_uniform:
             failed[name] = HintedText(too_uniform)
             continue
         if progress is not None:
             progress(name)
         try:
-            fits.append(loop_fit.fit_series(initial, run, second_run))
+            fits.append(fit_series(initial, run, second_run))
         except IdentificationError as error:
             failed[name] = error.message
     return LoopFit(loop, tuple(sorted(fits, key=lambda fit: -fit.aicc_reduction)), failed)

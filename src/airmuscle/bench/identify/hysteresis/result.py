@@ -13,7 +13,7 @@ from ....report.chapter import BY_ROW, Chapter, Plot, Table, TableColumn
 from ...reported import Reported
 from .. import model_evidence
 from ..identifiability import UndeterminedCombination
-from .limits import DataLimits, limit_reservations, undetermined_parameters
+from .loop_data import DataLimits, limit_reservations, undetermined_parameters
 from .search import LoopSeries, branch_gap, free_parameters, repeat_difference
 
 SIGNIFICANCE_LEVEL = 0.01

@@ -12,7 +12,7 @@ from ....physics.muscle.friction import Friction, PressureScaledFriction
 from ...segment import Mask
 from ..identifiability import UndeterminedCombination, analyse_identifiability
 from ..model_evidence import effective_sample_size
-from .limits import MILLIMETRES, Axis, DataLimits, combine_limits
+from .loop_data import MILLIMETRES, Axis, DataLimits, combine_limits
 
 BIN_COUNT = 24
 """Bins along the path in which branches are compared (chosen)."""

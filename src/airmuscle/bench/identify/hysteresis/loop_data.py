@@ -1,28 +1,19 @@
-"""Limits of friction parameters that follow from the data: maximum force, and lowest and highest speed."""
+"""Data of a loop: path of the friction and static curve, and limits of friction parameters that follow from the data,
+the maximum force, the lowest and the highest speed, and the stiffness."""
 
+import abc
 import dataclasses
 import math
 from collections.abc import Sequence
 
 import numpy as np
 
-from ....core import Array, Leaf, leaves
+from ....core import Array, Hint, IdentificationError, Leaf, leaves, model, parameter
+from ....physics import Characteristic
 from ....physics.muscle.friction import Friction
+from ....recording import Recording
 from ...segment import Mask, estimate_noise
 from ..identifiability import UndeterminedCombination
-
-SPEED_INTERVALS, SPEED_QUANTILES = 40, (0.05, 0.95)
-"""Intervals of the path over each of which a speed is measured, so that noise of the path has no effect, and quantiles
-of their speeds that count as the lowest and the highest speed of the data (chosen)."""
-MIN_SPEED_RATIO = 3.0
-"""Minimum ratio of the highest to the lowest speed for the terms of speed to be determined (chosen)."""
-STEP_SHARE = 0.1
-"""Resolution of a path without noise, as a fraction of its median step between two rows (chosen): a transition within
-this part of a step is complete at the next row."""
-MAX_REPEATED = 0.1
-"""Share of the rows that repeat a reading during the motion, above which a step is that of a reading (chosen)."""
-AMPLITUDE_QUANTILE = 0.95
-"""Quantile of the forces without the static curve that counts as the amplitude of the hysteresis (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -52,6 +43,105 @@ class Axis:
 
 
 MILLIMETRES = Axis("displacement [mm]", 1e3)
+
+
+class FrictionPath(abc.ABC):
+    """The displacement along which the friction slides, as a function of the recorded columns."""
+
+    @abc.abstractmethod
+    def displacement(self, recording: Recording) -> Array:
+        """Displacement [m] at every row, shape (N,)."""
+
+    @property
+    def axis(self) -> Axis:
+        """The axis of figures."""
+        return MILLIMETRES
+
+
+@model
+class ContractionPath(FrictionPath):
+    """x = eps L0: friction against shortening, visible in loops at constant pressure or load."""
+
+    def displacement(self, recording: Recording) -> Array:
+        length = recording.constants.get("resting_length")
+        if not isinstance(length, float | int):
+            raise IdentificationError(
+                f"{recording.origin}: friction against shortening needs the resting length.",
+                hint=Hint("To state it", "resting_length", function="ColumnMapping"),
+            )
+        return np.asarray(recording["contraction"] * float(length))
+
+
+@model
+class PressurePath(FrictionPath):
+    """x = c p: friction of braid threads that shift with pressure, visible in a muscle at constant length.
+
+    Only k_i c, a force by pressure, is determined; c is chosen as 1 mm for each 100 kPa, so that the friction laws keep
+    their units. Such a friction describes isometric loops only and cannot be part of a plant.
+    """
+
+    displacement_per_pressure: float = parameter(
+        "m/Pa", "c", "displacement of the threads by pressure", bounds=(1e-12, 1e-3), fitted=False, default=1e-8
+    )
+
+    def displacement(self, recording: Recording) -> Array:
+        return self.displacement_per_pressure * recording["pressure"]
+
+    @property
+    def axis(self) -> Axis:
+        by_displacement = 1.0 / self.displacement_per_pressure
+        return Axis("gauge pressure [kPa]", 1e-3 / self.displacement_per_pressure, "Pa", by_displacement)
+
+
+class StaticCurve(abc.ABC):
+    """The force without friction: a known part, and columns whose coefficients are fitted with the friction."""
+
+    def known_force(self, recording: Recording) -> Array:
+        """The known part of the force [N] at every row, shape (N,); 0 unless overridden."""
+        return np.zeros(len(recording))
+
+    @abc.abstractmethod
+    def design_matrix(self, recording: Recording) -> Array:
+        """The columns whose coefficients are fitted, shape (N, coefficients)."""
+
+
+@dataclasses.dataclass(frozen=True)
+class FixedCharacteristic(StaticCurve):
+    """A known characteristic with a fitted constant offset of the force."""
+
+    characteristic: Characteristic
+
+    def known_force(self, recording: Recording) -> Array:
+        return np.asarray(self.characteristic.force(recording["pressure"], recording["contraction"]), dtype=float)
+
+    def design_matrix(self, recording: Recording) -> Array:
+        return np.ones((len(recording), 1))
+
+
+@dataclasses.dataclass(frozen=True)
+class PolynomialCurve(StaticCurve):
+    """A fitted polynomial in one column: `pressure` in isometric runs, `contraction` in isobaric runs."""
+
+    column: str
+    degree: int
+
+    def design_matrix(self, recording: Recording) -> Array:
+        scale = 1e5 if self.column == "pressure" else 0.1  # so that the coefficients have similar magnitudes
+        return np.vander(recording[self.column] / scale, self.degree + 1)
+
+
+SPEED_INTERVALS, SPEED_QUANTILES = 40, (0.05, 0.95)
+"""Intervals of the path over each of which a speed is measured, so that noise of the path has no effect, and quantiles
+of their speeds that count as the lowest and the highest speed of the data (chosen)."""
+MIN_SPEED_RATIO = 3.0
+"""Minimum ratio of the highest to the lowest speed for the terms of speed to be determined (chosen)."""
+STEP_SHARE = 0.1
+"""Resolution of a path without noise, as a fraction of its median step between two rows (chosen): a transition within
+this part of a step is complete at the next row."""
+MAX_REPEATED = 0.1
+"""Share of the rows that repeat a reading during the motion, above which a step is that of a reading (chosen)."""
+AMPLITUDE_QUANTILE = 0.95
+"""Quantile of the forces without the static curve that counts as the amplitude of the hysteresis (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True)
