@@ -52,7 +52,7 @@ def traced(plant):
 def c_values(plant, states, inputs, folder, kind=np.float64):
     """Rates and Jacobian at every point by printed C, compiled with all warnings as errors."""
     number = "double" if kind is np.float64 else "float"
-    text, sizes = functions.implicit_module(traced(plant), CLanguage(number, public=None))
+    text, sizes = functions.system_module(traced(plant), CLanguage(number, public=None))
     library = printed.shared_library("#include <math.h>\n" + text, folder, number, "-O0")
     c, rows = np.zeros(sizes.held + 1, kind), []
     printed.call(library.prepare, compile_system(plant).parameters, c, kind=kind)
@@ -98,7 +98,7 @@ def test_javascript_gives_the_rates_and_slopes_of_the_library(names, tmp_path):
     modules, data, expected = [], {}, {}
     for i, name in enumerate(names):
         plant = plants.EXAMPLES[name]
-        text, sizes = functions.implicit_module(traced(plant), JavaScriptLanguage(f"m{i}_"))
+        text, sizes = functions.system_module(traced(plant), JavaScriptLanguage(f"m{i}_"))
         states, inputs = printed.points_of(plant)
         modules.append(text)
         expected[name] = printed.library_values(plant, states, inputs)
@@ -132,7 +132,7 @@ def column(values):
 def test_octave_gives_the_rates_and_slopes_of_the_library(name, tmp_path):
     plant = plants.EXAMPLES[name]
     states, inputs = printed.points_of(plant, 3)
-    text, _ = functions.implicit_module(traced(plant), MatlabLanguage())
+    text, _ = functions.system_module(traced(plant), MatlabLanguage())
     calls = [
         f"[f, J] = jac({column(x)}, {column([*u, 0.0])}, c); printf('%.17g ', f, J); printf('\\n');"
         for x, u in zip(states, inputs, strict=True)
@@ -232,7 +232,7 @@ def test_an_operation_without_a_form_is_refused(language):
 
 def test_the_text_is_the_same_every_time():
     texts = {
-        functions.implicit_module(functions.trace_system(plants.EXAMPLES["dmsp-20-300"]), CLanguage())[0]
+        functions.system_module(functions.trace_system(plants.EXAMPLES["dmsp-20-300"]), CLanguage())[0]
         for _ in range(2)
     }
     assert len(texts) == 1

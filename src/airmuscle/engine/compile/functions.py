@@ -109,15 +109,11 @@ class Printer:
             block.store(outputs[output], index, value)
         self.end(name, inputs, outputs, block)
 
-    def compute(
-        self, block: FunctionBlock, code: Code, names: Sequence[str], given: Mapping[Operand, str] | None = None
-    ) -> dict[tuple[int, int], str]:
-        """Append code to a function: `names` are its arguments, `given` inputs whose values are there already.
-
-        Returns the names of the results by output and index; nothing is stored.
-        """
+    def compute(self, block: FunctionBlock, code: Code, names: Sequence[str]) -> dict[tuple[int, int], str]:
+        """Append code to a function with arguments `names`; the names of its results, which are not stored, by output
+        and index."""
         code, held = self.set_apart(code, names)
-        return emission.computed(block, code, names, held, given or {})
+        return emission.computed(block, code, names, held)
 
     def end(self, name: str, inputs: Sequence[str], outputs: Sequence[str], block: FunctionBlock) -> None:
         """Close a function; the argument that holds parameters becomes `c`."""
@@ -159,7 +155,15 @@ class Printer:
         if PARAMETERS not in names:
             return code, {}
         code, once, handed = hoisted(code, names.index(PARAMETERS))
-        return code, emission.hand_over(self._prepare, once, handed, names, self._places)
+        prepared, held = emission.Emission(self._prepare, names, {}, {}), {}
+        prepared.run(once)
+        for operand in handed:
+            value = prepared.value_of(operand)
+            if value not in self._places:  # functions share equal values
+                self._places[value] = len(self._places)
+                self._prepare.store("c", self._places[value], value)
+            held[operand] = self._places[value]
+        return code, held
 
     def module(self) -> str:
         """`prepare` and all functions, as one text."""
@@ -172,10 +176,10 @@ Extension = Callable[[Printer], None]
 """What adds further functions to a module; they share its `prepare`."""
 
 
-def implicit_module(
-    t: TracedSystem, language: TargetLanguage = LLVM, extend: Extension | None = None
+def system_module(
+    t: TracedSystem, language: TargetLanguage = LLVM, extend: Extension | None = None, *, implicit: bool = True
 ) -> tuple[str, ArraySizes]:
-    """What an implicit method needs: rhs, jac, factor, solve, stage, df_dt and outputs.
+    """The functions of a system: rhs and outputs, and what an implicit method needs unless the caller has another.
 
     rhs(x, u, c, f)              f = rates
     jac(x, u, c, f, J)           rates, and the non-zeros of df/dx, equal ones once
@@ -185,52 +189,36 @@ def implicit_module(
     df_dt(x, u, c, w, f)         (df/du) w, the rates' own slope in time while inputs move at w
     outputs(x, u, c, o)
     """
+    printer, code = Printer(language), recorded([t.x, t.u, t.p], [t.f])
+    printer.quantities = t.point, t.o
+    printer.add_code("rhs", POINT, finished(code), ["f"])
+    jacobian, factors = _add_implicit(printer, t, code) if implicit else (0, 0)
+    printer.add("outputs", t.point, {"o": t.o})
+    if extend is not None:
+        extend(printer)
+    sizes = t.x.numel(), t.u.numel(), t.p.numel(), printer.held, jacobian, factors, t.o.numel()
+    return printer.module(), ArraySizes(*sizes)
+
+
+def _add_implicit(printer: Printer, t: TracedSystem, code: Code) -> tuple[int, int]:
+    """Print jac to df_dt for recorded rates; how many numbers J and A have."""
     import casadi
 
-    size = t.x.shape[0]
-    code = recorded([t.x, t.u, t.p], [t.f])
-    slopes, places, slots = _rates_and_slopes(t, code)
-    lu = Factors(places, slots, size)
+    size, tape, point = t.x.numel(), Tape(code.body), t.point
+    rates = code.results(0, size)
+    slopes = nonzeros(tape, rates, [("in", 0, j) for j in range(size)])
+    distinct = list(dict.fromkeys(slopes.values()))
+    outputs = [(k, i, operand) for k, operands in enumerate((rates, distinct)) for i, operand in enumerate(operands)]
+    lu = Factors(tuple(slopes), tuple(distinct.index(operand) for operand in slopes.values()), size)
     a, g, b = (casadi.SX.sym(n, k) for n, k in (("A", lu.values.numel()), ("g", size), ("b", size)))
     stage, solve = lu.solved(a, [t.f[i] + g[i] for i in range(size)]), lu.solved(a, [b[i] for i in range(size)])
-    printer, point = Printer(language), t.point
-    printer.quantities = point, t.o
-    printer.add_code("rhs", list(point), finished(code), ["f"])
-    printer.add_code("jac", list(point), slopes, ["f", "J"])
+    printer.add_code("jac", POINT, finished(Code(tuple(tape.body), tuple(outputs))), ["f", "J"])
     printer.add("factor", {"J": lu.j, "d": lu.d}, {"A": lu.values}, ["d"])
     printer.add("solve", {"A": a, "b": b}, {"y": casadi.vertcat(*solve)})
     printer.add("stage", {**point, "A": a, "g": g}, {"k": casadi.vertcat(*stage)})
     df_dt = casadi.densify(casadi.jtimes(t.f, t.u, t.w) if t.u.numel() else casadi.SX(size, 1))
     printer.add("df_dt", {**point, "w": t.w}, {"f": df_dt})
-    printer.add("outputs", point, {"o": t.o})
-    if extend is not None:
-        extend(printer)
-    sizes = ArraySizes(size, t.u.shape[0], t.p.shape[0], printer.held, lu.j.numel(), lu.values.numel(), t.o.shape[0])
-    return printer.module(), sizes
-
-
-def rates_module(
-    t: TracedSystem, language: TargetLanguage = LLVM, extend: Extension | None = None
-) -> tuple[str, ArraySizes]:
-    """What a caller with an integrator of its own needs: rhs and outputs, as in `implicit_module`."""
-    printer, point = Printer(language), t.point
-    printer.quantities = point, t.o
-    printer.add("rhs", point, {"f": t.f})
-    printer.add("outputs", point, {"o": t.o})
-    if extend is not None:
-        extend(printer)
-    sizes = ArraySizes(t.x.numel(), t.u.numel(), t.p.numel(), printer.held, 0, 0, t.o.numel())
-    return printer.module(), sizes
-
-
-def _rates_and_slopes(t: TracedSystem, code: Code) -> tuple[Code, tuple[tuple[int, int], ...], tuple[int, ...]]:
-    """The rates and the distinct non-zeros of their Jacobian; its places, and which non-zero stands in each."""
-    tape, rates = Tape(code.body), code.results(0, t.x.numel())
-    slopes = nonzeros(tape, rates, [("in", 0, j) for j in range(len(rates))])
-    distinct = list(dict.fromkeys(slopes.values()))
-    outputs = [(k, i, operand) for k, operands in enumerate((rates, distinct)) for i, operand in enumerate(operands)]
-    slots = tuple(distinct.index(operand) for operand in slopes.values())
-    return finished(Code(tuple(tape.body), tuple(outputs))), tuple(slopes), slots
+    return lu.j.numel(), lu.values.numel()
 
 
 def explicit_module(t: TracedSystem, a: Sequence[Sequence[float]], b: Sequence[float]) -> tuple[str, int]:

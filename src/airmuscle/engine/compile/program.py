@@ -118,7 +118,7 @@ class Program:
             self._form = functions.trace_system(system)
             rows = rows_at_once(self._form)
             extend = row_outputs(self._form) if rows > 1 else None
-            text, self.sizes = functions.implicit_module(self._form, extend=extend)
+            text, self.sizes = functions.system_module(self._form, extend=extend)
         self.output_names = self._form.output_names
         self._module = Module(text, self.sizes.held)
         self.address = {name: self._module.address(name) for name in _FUNCTIONS}
@@ -141,14 +141,13 @@ class Program:
         """The address of an explicit step with this tableau, and the values that it needs of the parameters."""
         with self._compiling:
             if tableau not in self._steps:
-                self._steps[tableau] = Module(*self._step_module(tableau))
+                if isinstance(self._form, TracedSystem):
+                    printed = functions.explicit_module(self._form, *tableau)
+                else:
+                    printed = sensitivities_explicit.explicit_module(self._form, *tableau)
+                self._steps[tableau] = Module(*printed)
         module = self._steps[tableau]
         return module.address("step"), module.prepare(parameters)
-
-    def _step_module(self, tableau: Tableau) -> tuple[str, int]:
-        if isinstance(self._form, sensitivities.TangentSystem):
-            return sensitivities_explicit.explicit_module(self._form, *tableau)
-        return functions.explicit_module(self._form, *tableau)
 
     def lanes(self, tableau: Tableau, number: LlvmType) -> tuple[tuple[int, int, int], int]:
         """The addresses of `prepare`, the explicit step and `outputs` in lanes, and the length of `c`."""
@@ -213,7 +212,8 @@ class Description:
 
 
 _programs: dict[tree.Structure, Program] = {}
-_descriptions: dict[int, tuple[weakref.ref[System], Description]] = {}
+_descriptions: dict[int, Description] = {}
+"""Descriptions by the identities of their systems."""
 
 
 def _program(system: System) -> Program:
@@ -226,17 +226,11 @@ def _program(system: System) -> Program:
 def describe(system: System) -> Description:
     """The description of a system, stored for the lifetime of the system."""
     key = id(system)
-    stored = _descriptions.get(key)
-    if stored is not None and stored[0]() is system:
-        return stored[1]
-    description = Description(system)
-    _descriptions[key] = weakref.ref(system, functools.partial(_forget, _descriptions, key)), description
-    return description
-
-
-def _forget(descriptions: dict[int, Any], key: int, _: object) -> None:
-    """Remove a description; its dictionary is an argument, because module names are gone while Python exits."""
-    descriptions.pop(key, None)
+    if key not in _descriptions:
+        description = Description(system)
+        weakref.finalize(system, _descriptions.pop, key, None).atexit = False
+        _descriptions[key] = description
+    return _descriptions[key]
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

@@ -7,8 +7,10 @@ derivatives V = du/dtheta, further inputs (M, K), row by row; all of the above t
 """
 
 import dataclasses
+import functools
+import operator
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 from ...core import SensitivitySystem
 from .functions import PARAMETERS, POINT, ArraySizes, Printer, TracedSystem, trace_system
@@ -75,47 +77,51 @@ class Values:
         states = [("in", POINT.index("x"), i) for i in range(self.t.size)]
         inputs = [("in", POINT.index("u"), i) for i in self.t.inputs]
         leaves = {place: ("in", POINT.index(PARAMETERS), place) for group in self.t.groups for place in group}
-        by_state, by_input, by_column = [], [], []
+        changes = []
         for row in derivatives(self.tape, results, [*states, *inputs, *leaves.values()]):
-            by_state.append({j: row[x] for j, x in enumerate(states) if row.get(x, ZERO) != ZERO})
-            by_input.append({j: row[u] for j, u in enumerate(inputs) if row.get(u, ZERO) != ZERO})
-            sums = dict.fromkeys(range(self.t.lanes), ZERO)
+            sums = [ZERO] * self.t.lanes
             for k, group in enumerate(self.t.groups):
                 for place in group:
                     sums[k] = self.tape.add(sums[k], row.get(leaves[place], ZERO))
-            by_column.append({k: part for k, part in sums.items() if part != ZERO})
-        return DirectionalDerivative(tuple(by_state), tuple(by_input), tuple(by_column))
+            all_parts = [row.get(x, ZERO) for x in states], [row.get(u, ZERO) for u in inputs], sums
+            changes.append(Change(*({j: p for j, p in enumerate(parts) if p != ZERO} for parts in all_parts)))
+        return DirectionalDerivative(tuple(changes))
 
     def compute(
-        self, printer: Printer, block: FunctionBody, wanted: Sequence[Operand], names: Sequence[str] = POINT,
-        given: Mapping[Operand, str] | None = None,
-    ) -> dict[Operand, LlvmValue]:  # fmt: skip
+        self, printer: Printer, block: FunctionBody, wanted: Sequence[Operand], names: Sequence[str] = POINT
+    ) -> dict[Operand, LlvmValue]:
         """Append the instructions that some operands need to a function; the values of the operands."""
         distinct = tuple(dict.fromkeys(wanted))
         code = finished(Code(tuple(self.tape.body), tuple((0, i, operand) for i, operand in enumerate(distinct))))
-        results = printer.compute(block, code, names, given)
+        results = printer.compute(block, code, names)
         return {operand: LlvmValue(block, results[0, i]) for i, operand in enumerate(distinct)}
+
+
+class Change(NamedTuple):
+    """The non-zero derivatives of an operand, by state, by input with derivatives, and by column."""
+
+    states: dict[int, Operand]
+    inputs: dict[int, Operand]
+    columns: dict[int, Operand]
 
 
 @dataclasses.dataclass(frozen=True)
 class DirectionalDerivative:
-    """The non-zero derivatives of each of some operands, by state, by input with derivatives, and by column."""
+    """The changes of some operands."""
 
-    by_state: tuple[dict[int, Operand], ...]
-    by_input: tuple[dict[int, Operand], ...]
-    by_column: tuple[dict[int, Operand], ...]
+    changes: tuple[Change, ...]
 
     @property
     def parts(self) -> list[Operand]:
-        """All of them."""
-        return [part for row in (*self.by_state, *self.by_input, *self.by_column) for part in row.values()]
+        """All derivatives: those by states, then those by inputs, then those by columns."""
+        return [part for kind in zip(*self.changes, strict=True) for row in kind for part in row.values()]
 
     def rows(
         self, values: Mapping[Operand, LlvmValue], s: Sequence[LlvmValue], v: Sequence[LlvmValue]
     ) -> list[LlvmValue]:
         """The change of each operand, a column, from the values of the parts and the rows of S and V."""
         rows_along = []
-        for states, inputs, columns in zip(self.by_state, self.by_input, self.by_column, strict=True):
+        for states, inputs, columns in self.changes:
             direct = {k: values[part].name for k, part in columns.items()}
             row = packed(s[0].block, direct, s[0].lanes)
             for j, part in states.items():
@@ -124,17 +130,6 @@ class DirectionalDerivative:
                 row = row + v[j] * values[part]
             rows_along.append(row)
         return rows_along
-
-    def along_inputs(self, values: Mapping[Operand, LlvmValue], v: Sequence[LlvmValue]) -> list[LlvmValue | None]:
-        """The part of each change that is due to the inputs alone; None without one."""
-        totals: list[LlvmValue | None] = []
-        for inputs in self.by_input:
-            total: LlvmValue | None = None
-            for j, part in inputs.items():
-                term = v[j] * values[part]
-                total = term if total is None else total + term
-            totals.append(total)
-        return totals
 
 
 def stored(values: Sequence[LlvmValue], array: str) -> None:
@@ -146,7 +141,7 @@ def stored(values: Sequence[LlvmValue], array: str) -> None:
 
 
 def implicit_module(t: TangentSystem) -> tuple[str, ArraySizes]:
-    """The functions of `functions.implicit_module` for the states and their derivatives.
+    """The functions of `functions.system_module` for the states and their derivatives.
 
     J holds the distinct non-zeros of the inner df/dx, then dJ of those that change, K numbers each; A the factors of
     the inner d I - J, then the same dJ, because `solve` and `stage` need it: (d I - J) dk = db + dJ k.
@@ -188,9 +183,12 @@ def _print_along(
     columns = along.rows(computed, t.rows(block, "x"), t.input_rows(block))
     if moving is not None and t.inputs:
         further = moving.along(moving.results)
-        parts = moving.compute(printer, block, [part for row in further.by_input for part in row.values()], arguments)
-        added = further.along_inputs(parts, t.input_rows(block, "w"))
-        columns = [row if more is None else row + more for row, more in zip(columns, added, strict=True)]
+        parts = moving.compute(printer, block, [p for each in further.changes for p in each.inputs.values()], arguments)
+        w = t.input_rows(block, "w")
+        moved = [(i, change.inputs) for i, change in enumerate(further.changes) if change.inputs]
+        terms = {i: (w[j] * parts[part] for j, part in inputs.items()) for i, inputs in moved}
+        added = {i: functools.reduce(operator.add, each) for i, each in terms.items()}
+        columns = [row + added[i] if i in added else row for i, row in enumerate(columns)]
     rows = [computed[v] for v in values.results] + columns
     if last is not None:
         final = last.compute(printer, block, last.results)
@@ -205,18 +203,14 @@ class _Step:
     def __init__(self, t: TangentSystem) -> None:
         self.t, self.rates = t, Values(t, t.inner.f)
         self.slopes = self.rates.along(self.rates.results)
-        places = [((i, j), part) for i, row in enumerate(self.slopes.by_state) for j, part in row.items()]
+        places = [((i, j), part) for i, row in enumerate(self.slopes.changes) for j, part in row.states.items()]
         self.places = tuple(place for place, _ in places)
         self.jacobian = list(dict.fromkeys(part for _, part in places))
         self.slots = tuple(self.jacobian.index(part) for _, part in places)
         self.bends = self.rates.along(self.jacobian)
-        self.lu = Factors(self.places, self.slots, t.size)
-
-    @property
-    def moving(self) -> list[int]:
+        self.moving = [q for q, change in enumerate(self.bends.changes) if any(change)]
         """Which of the distinct non-zeros of J change along a column."""
-        all_rows = zip(self.bends.by_state, self.bends.by_input, self.bends.by_column, strict=True)
-        return [q for q, rows in enumerate(all_rows) if any(rows)]
+        self.lu = Factors(self.places, self.slots, t.size)
 
     def _bends(self, block: FunctionBody, array: str, first: int) -> dict[int, LlvmValue]:
         """dJ by number of the distinct non-zero, from an array where they stand from `first` on."""

@@ -79,7 +79,7 @@ class _Graph(GraphBody):
     def append(self, inputs: Mapping[str, Any], result: Any, rows: Mapping[str, dict[int, str]], output: str) -> None:
         """Append a function of arrays, of which `rows` has the tensors of single elements."""
         self.results |= {array: dict(elements) for array, elements in rows.items()}
-        values = emission.computed(self, instructions(list(inputs.values()), [result]), list(inputs), {}, {})
+        values = emission.computed(self, instructions(list(inputs.values()), [result]), list(inputs))
         self.results[output] = {index: value for (_, index), value in values.items()}
 
 

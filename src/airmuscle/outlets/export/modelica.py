@@ -93,7 +93,7 @@ def write_modelica(
     code = instructions([traced.x, traced.u, traced.p], [traced.f, traced.o])
     names = {array: list(group) for array, group in declared.items()}
     body = ModelicaBody({**names, "f": names["x"]})
-    results = computed(body, code, ["x", "u", "p"], {}, {})
+    results = computed(body, code, ["x", "u", "p"])
     for (output, index), value in sorted(results.items()):
         body.store("fo"[output], index, value)
     values = textwrap.wrap(f"Real {', '.join(body.values)};", 116, initial_indent="    ", subsequent_indent="      ")

@@ -166,7 +166,7 @@ class PrintedController:
         for measurement, setpoint in zip(measured.tolist(), setpoints.tolist(), strict=True):
             given = {"measurement": measurement, "setpoint": setpoint, "memory": memory, "parameters": parameters}
             body = InterpretedBody(given, single)
-            values = emission.computed(body, code, names, {}, {})
+            values = emission.computed(body, code, names)
             for (output, index), value in values.items():
                 body.store(list(self.outputs)[output], index, value)
             rows.append([body.stored["command", i] for i in range(len(self.law.inputs))])

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...core import Array, Leaf, ParameterError, alternatives, leaves, printable
-from ...engine.compile.functions import ArraySizes, Extension, TracedSystem, implicit_module, rates_module
+from ...engine.compile.functions import ArraySizes, Extension, TracedSystem, system_module
 from ...engine.compile.ir.emission import TargetLanguage
 from ...engine.compile.program import CompiledSystem, Description
 from ...engine.compile.text.body import Label, Labels
@@ -49,9 +49,8 @@ class ExportedSystem:
         self, language: TargetLanguage, *, implicit: bool = True, extend: Extension | None = None
     ) -> tuple[str, ArraySizes]:
         """The functions `prepare`, `rhs` and `outputs` of arrays; with `implicit` also those of a Rosenbrock step."""
-        module = implicit_module if implicit else rates_module
         language = dataclasses.replace(language, labels=self._labels)  # type: ignore[type-var]
-        return module(self.traced, language, extend)
+        return system_module(self.traced, language, extend, implicit=implicit)
 
     @property
     def _labels(self) -> Labels:

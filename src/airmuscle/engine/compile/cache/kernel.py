@@ -52,13 +52,6 @@ def _kind(argument: Any) -> str:
     return _KINDS[argument.dtype, argument.ndim]
 
 
-def _array_at(address: int, shape: tuple[int, ...]) -> Any:
-    """The array of float64 at an address."""
-    count = math.prod(shape)
-    numbers = np.ctypeslib.as_array((ctypes.c_double * count).from_address(address)) if count else np.empty(0)
-    return numbers.reshape(shape)
-
-
 class Kernel:
     """A kernel that returns a status, by its name and that of its module in `compile.kernels`."""
 
@@ -164,7 +157,10 @@ class BoundKernel:
             arguments[index : index + len(addresses)] = addresses
             return
         for i, address in enumerate(addresses, index):
-            arguments[i] = _array_at(address, (length, *arguments[i].shape[1:]))
+            shape = length, *arguments[i].shape[1:]
+            count = math.prod(shape)
+            numbers = np.ctypeslib.as_array((ctypes.c_double * count).from_address(address)) if count else np.empty(0)
+            arguments[i] = numbers.reshape(shape)
 
     @property
     def entry_address(self) -> int | None:

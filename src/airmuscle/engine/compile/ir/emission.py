@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ....core import TraceError
-from .instructions import CALLED, Code, Instruction, Operand, Operation
+from .instructions import CALLED, Code, Operand, Operation
 from .scheduling import ConditionalBlock, Item
 from .skipped_blocks import COMMANDED, STEADY, VARYING, skipping
 
@@ -168,15 +168,11 @@ class TargetLanguage(abc.ABC):
 
 
 def computed(
-    block: FunctionBlock, code: Code, inputs: Sequence[str], held: Mapping[Operand, int], given: Mapping[Operand, str]
+    block: FunctionBlock, code: Code, inputs: Sequence[str], held: Mapping[Operand, int] | None = None
 ) -> dict[tuple[int, int], str]:
-    """Append code to a block and return the names of its results by output and index.
-
-    `inputs` are the names of the arrays, `held` the indices of precomputed operands in `c`, `given` the names of known
-    values.
-    """
-    emission = Emission(block, inputs, held, given)
-    emission.run(with_gates(code, inputs, held))
+    """Append code to a block; the names of its results by output and index. Other arguments as of `Emission`."""
+    emission = Emission(block, inputs, held or {}, {})
+    emission.run(with_gates(code, inputs, held or {}))
     return {(o, i): emission.value_of(operand) for o, i, operand in code.outputs}
 
 
@@ -192,7 +188,11 @@ def with_gates(
 
 
 class Emission:
-    """Instructions appended to a block, and the names of their results, `values`; arguments as of `computed`."""
+    """Instructions appended to a block, and the names of their results, `values`.
+
+    `inputs` are the names of the arrays, `held` the indices of precomputed operands in `c`, `given` the names of known
+    values.
+    """
 
     def __init__(
         self, block: FunctionBlock, inputs: Sequence[str], held: Mapping[Operand, int], given: Mapping[Operand, str]
@@ -220,22 +220,3 @@ class Emission:
         if operand[0] == "c":
             return self.block.constant(float(operand[1]))
         return self.block.load(self.inputs[operand[1]], operand[2])
-
-
-def hand_over(
-    block: FunctionBlock, once: Sequence[Instruction], handed: Sequence[Operand], inputs: Sequence[str],
-    places: dict[str, int],
-) -> dict[Operand, int]:  # fmt: skip
-    """Append the part of a function that depends on parameters only; return the indices of its results in `c`.
-
-    `places` contains the indices of values that are stored already, so that functions share equal values.
-    """
-    emission, held = Emission(block, inputs, {}, {}), {}
-    emission.run(once)
-    for operand in handed:
-        value = emission.value_of(operand)
-        if value not in places:
-            places[value] = len(places)
-            block.store("c", places[value], value)
-        held[operand] = places[value]
-    return held

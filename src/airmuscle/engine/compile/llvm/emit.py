@@ -48,14 +48,9 @@ class LlvmType:
         return self._of(f"i{self.bits}")
 
     @property
-    def size(self) -> int:
-        """Bytes of a value."""
-        return self.lanes * self.bits // 8
-
-    @property
     def alignment(self) -> int:
         """Alignment of a value in bytes: its size, at most a cache line."""
-        return min(self.size, 64)
+        return min(self.lanes * self.bits // 8, 64)
 
     def intrinsic(self, name: str) -> str:
         """Name of an LLVM intrinsic for this type: llvm.sqrt.f64, llvm.sqrt.v32f64."""

@@ -17,17 +17,7 @@ class ExactBody(FunctionBody):
         self.rounder = 1.5 * 2.0**self.mantissa
         """Added to an integer of moderate size, this leaves the integer in the last bits of the sum."""
 
-    def add(self, a: str, b: str) -> str:
-        return self.put(f"fadd {self.number.text} {a}, {b}")
-
-    def subtract(self, a: str, b: str) -> str:
-        return self.put(f"fsub {self.number.text} {a}, {b}")
-
-    def times(self, a: str, b: str) -> str:
-        return self.put(f"fmul {self.number.text} {a}, {b}")
-
-    def over(self, a: str, b: str) -> str:
-        return self.put(f"fdiv {self.number.text} {a}, {b}")
+    add, subtract, times, over = (functools.partialmethod(FunctionBody.logical, operator) for operator in "+-*/")
 
     def fused(self, a: str, b: str, c: str) -> str:
         """a b + c, rounded once."""
