@@ -77,6 +77,11 @@ def conforms(value: Any, hint: Any, *, lists: bool = False) -> bool:
     return hint is Any or not isinstance(hint, type) or getattr(hint, "_is_protocol", False) or isinstance(value, hint)
 
 
+def is_model(obj: Any) -> bool:
+    """Whether an object is a dataclass, as all models are."""
+    return dataclasses.is_dataclass(obj) and not isinstance(obj, type)
+
+
 def is_numeric(value: Any) -> bool:
     """Whether a value is a number or an array of numbers, or becomes one."""
     try:

@@ -9,7 +9,7 @@ import ctypes
 import functools
 import math
 import os
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -86,60 +86,44 @@ class ArrayProgram(NamedTuple):
         return result.T
 
 
-def make_program(function: Any, output: int, columns: Sequence[int]) -> ArrayProgram | None:
-    """The instructions for these columns of one output (a row) of a CasADi function; None where NumPy lacks one.
-
-    Column number k of the program is the k-th of `columns`.
-    """
-    nonzeros = function.sparsity_out(output).get_col()
-    wanted = {k: columns.index(column) for k, column in enumerate(nonzeros) if column in columns}
-    program = _read(function, output, wanted)
-    return None if program is None else _without_unused(program)
-
-
 def instructions_of(function: Any) -> Iterator[tuple[int, list[int], list[int]]]:
     """Operation, places of the results and places of the arguments of each instruction of a CasADi function."""
     for k in range(function.n_instructions()):
         yield function.instruction_id(k), function.instruction_output(k), function.instruction_input(k)
 
 
-def _read(function: Any, output: int, wanted: dict[int, int]) -> ArrayProgram | None:
-    """All instructions, with a new register for every result."""
+def make_program(function: Any, output: int, columns: Sequence[int]) -> ArrayProgram | None:
+    """The instructions for these columns of one output (a row) of a CasADi function; None where NumPy lacks one.
+
+    Column number k of the program is the k-th of `columns`. Every result has a register of its own.
+    """
     import casadi
 
     operations, current = _operations(), dict[int, int]()
-    constants, inputs, steps, outputs = [], [], [], []
+    nonzeros = function.sparsity_out(output).get_col()
+    constants, inputs, results, outputs = [], [], [], []
     for k, (code, target, source) in enumerate(instructions_of(function)):
         if code == casadi.OP_OUTPUT:
-            if target[0] == output and target[1] in wanted:
-                outputs.append((wanted[target[1]], current[source[0]]))
+            if target[0] == output and nonzeros[target[1]] in columns:
+                outputs.append((columns.index(nonzeros[target[1]]), current[source[0]]))
             continue
         if code == casadi.OP_CONST:
             constants.append((k, float(function.instruction_constant(k))))
         elif code == casadi.OP_INPUT:
             inputs.append((k, int(source[0]), int(source[1])))
         elif code in operations:
-            steps.append(_Step(operations[code], k, tuple(current[i] for i in source)))
+            results.append((operations[code], k, tuple(current[i] for i in source)))
         else:
             return None
         current[target[0]] = k
-    return ArrayProgram(function.n_instructions(), tuple(constants), tuple(inputs), tuple(steps), tuple(outputs))
-
-
-def _without_unused(program: ArrayProgram) -> ArrayProgram:
-    used = {register for _, register in program.outputs}
-    steps = []
-    for step in reversed(program.steps):
-        if step.target in used:
-            steps.append(step._replace(released=tuple(set(step.sources) - used)))
-            used.update(step.sources)
-    return program._replace(
-        constants=_of(used, program.constants), inputs=_of(used, program.inputs), steps=tuple(reversed(steps))
-    )
-
-
-def _of(used: Collection[int], entries: tuple[Any, ...]) -> tuple[Any, ...]:
-    return tuple(entry for entry in entries if entry[0] in used)
+    used, steps = {register for _, register in outputs}, list[_Step]()
+    for operation, register, sources in reversed(results):
+        if register in used:
+            steps.append(_Step(operation, register, sources, tuple(set(sources) - used)))
+            used.update(sources)
+    constants = [each for each in constants if each[0] in used]
+    inputs = [each for each in inputs if each[0] in used]
+    return ArrayProgram(function.n_instructions(), tuple(constants), tuple(inputs), tuple(steps[::-1]), tuple(outputs))
 
 
 def _if_else_zero(condition: Any, x: Any) -> Any:
@@ -159,8 +143,7 @@ def _operations() -> dict[int, Callable[..., Any]]:
         "ASSIGN": lambda x: x, "ADD": np.add, "SUB": np.subtract, "MUL": np.multiply, "DIV": np.divide,
         "NEG": np.negative, "SQ": lambda x: x * x, "TWICE": lambda x: x + x, "INV": lambda x: np.divide(1.0, x),
         "SQRT": np.sqrt, "FABS": np.abs, "SIGN": np.sign, "FLOOR": np.floor, "POW": np.power, "CONSTPOW": np.power,
-        "EXP": np.exp,
-        "LOG": np.log, "LOG1P": np.log1p, "EXPM1": np.expm1, "SIN": np.sin, "COS": np.cos, "TAN": np.tan,
+        "EXP": np.exp, "LOG": np.log, "LOG1P": np.log1p, "EXPM1": np.expm1, "SIN": np.sin, "COS": np.cos, "TAN": np.tan,
         "ASIN": np.arcsin, "ACOS": np.arccos, "ATAN": np.arctan, "SINH": np.sinh, "COSH": np.cosh, "TANH": np.tanh,
         "ASINH": np.arcsinh, "FMIN": np.fmin, "FMAX": np.fmax,
         "LT": lambda a, b: np.less(a, b) * 1.0, "LE": lambda a, b: np.less_equal(a, b) * 1.0,

@@ -61,11 +61,10 @@ def _traced(obj: Any, method: str, count: int, wrt: int | None = None) -> Any:
     return _traced_functions[key]
 
 
-def _evaluate_traced(obj: Any, method: str, arguments: tuple[Any, ...]) -> tuple[list[Any], tuple[int, ...], int]:
-    """Return the outputs of the traced function at the arguments, their shape and the number of points."""
+def _evaluate_traced(obj: Any, method: str, arguments: tuple[Any, ...]) -> tuple[list[Any], tuple[int, ...]]:
+    """The outputs of the traced function at the arguments, and their shape."""
     function = _traced(obj, method, len(arguments))
-    results, shape = _call_traced(function, [leaf.value for leaf in tree.leaves(obj)], arguments)
-    return results, shape, math.prod(shape)
+    return _call_traced(function, [leaf.value for leaf in tree.leaves(obj)], arguments)
 
 
 def _call_traced(
@@ -101,35 +100,26 @@ def derivative(obj: Any, method: str, *arguments: Any, wrt: int = 0) -> Any:
 
     It is NaN where an argument is NaN. Raises TraceError if the method cannot be traced.
     """
+
+    def partial(x: Any) -> Any:
+        return getattr(obj, method)(*(x if i == wrt else a for i, a in enumerate(arguments)))
+
     if ops.is_symbol(*arguments):
-        return _symbolic_derivative(obj, method, arguments, wrt)
+        import casadi
+
+        symbol = casadi.SX.sym("x")
+        return casadi.substitute(casadi.jacobian(casadi.SX(partial(symbol)), symbol), symbol, arguments[wrt])
     if _is_jax(*arguments):
-        return _jax_derivative(obj, method, arguments, wrt)
-    results, shape, _ = _evaluate_traced(obj, method, arguments)
+        import jax  # type: ignore[import-not-found, unused-ignore]
+
+        point = jax.numpy.asarray(arguments[wrt], dtype=float)
+        return jax.jvp(partial, (point,), (jax.numpy.ones_like(point),))[1]
+    results, shape = _evaluate_traced(obj, method, arguments)
     value = results[1 + wrt].reshape(shape)
     missing = functools.reduce(np.logical_or, (np.isnan(np.asarray(x, dtype=float)) for x in arguments))
     if missing.any():  # a traced comparison with NaN takes one of its branches
         value = np.where(missing, np.nan, value)
     return float(value) if value.ndim == 0 else value
-
-
-def _symbolic_derivative(obj: Any, method: str, arguments: tuple[Any, ...], wrt: int) -> Any:
-    import casadi
-
-    symbol = casadi.SX.sym("x")
-    inner = [symbol if i == wrt else x for i, x in enumerate(arguments)]
-    derivative = casadi.jacobian(casadi.SX(getattr(obj, method)(*inner)), symbol)
-    return casadi.substitute(derivative, symbol, arguments[wrt])
-
-
-def _jax_derivative(obj: Any, method: str, arguments: tuple[Any, ...], wrt: int) -> Any:
-    import jax  # type: ignore[import-not-found, unused-ignore]
-
-    def partial(x: Any) -> Any:
-        return getattr(obj, method)(*(x if i == wrt else a for i, a in enumerate(arguments)))
-
-    point = jax.numpy.asarray(arguments[wrt], dtype=float)
-    return jax.jvp(partial, (point,), (jax.numpy.ones_like(point),))[1]
 
 
 def jvp(function: Callable[[Any], Sequence[Any]], point: Sequence[Any], direction: Sequence[Any]) -> tuple[Any, ...]:
@@ -204,8 +194,8 @@ def _symbolic_product(
 
 def jacobian(obj: Any, method: str, *arguments: Any) -> tuple[npt.NDArray[np.float64], npt.NDArray[np.float64]]:
     """Values of `obj.method` at N points, shape (N,), and derivatives with respect to its P leaves, shape (N, P)."""
-    results, _, count = _evaluate_traced(obj, method, arguments)
-    return results[0].reshape(-1), results[-1].reshape(count, sum(1 for _ in tree.leaves(obj)))
+    results, shape = _evaluate_traced(obj, method, arguments)
+    return results[0].reshape(-1), results[-1].reshape(math.prod(shape), sum(1 for _ in tree.leaves(obj)))
 
 
 def parameter_derivatives(obj: Any, method: str, arguments: Sequence[Any], leaves: Sequence[int]) -> Any:

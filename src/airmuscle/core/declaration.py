@@ -15,7 +15,7 @@ from typing import Any, TypeVar, dataclass_transform
 import numpy as np
 
 from .absolute_pressure import AbsolutePressure
-from .annotation import abridged, check_within, conforms, describe, one_line, type_hints, within
+from .annotation import abridged, check_within, conforms, describe, is_model, one_line, type_hints, within
 from .errors import AirmuscleWarning, ParameterError, check_known
 from .short_repr import ShortRepr
 from .units import is_known_unit, quantity, usual_unit
@@ -57,17 +57,8 @@ def parameter(
     magnitude is below `plausible` causes an AirmuscleWarning. Values are in SI units, in `unit`, or texts with a unit,
     such as "300 mm".
     """
-    return dataclasses.field(
-        metadata={
-            "unit": unit,
-            "symbol": symbol,
-            "meaning": meaning,
-            "bounds": bounds,
-            "fitted": fitted,
-            "plausible": plausible,
-        },
-        **field,
-    )
+    declared = {"unit": unit, "symbol": symbol, "meaning": meaning, "bounds": bounds, "fitted": fitted}
+    return dataclasses.field(metadata={**declared, "plausible": plausible}, **field)
 
 
 @dataclass_transform(frozen_default=True, field_specifiers=(parameter, within, dataclasses.field))
@@ -182,10 +173,10 @@ def _check_value(owner: str, declared: Parameter, value: Any) -> Any:
     if not math.isfinite(value):
         raise ParameterError(f"{label} is {value}; it must be finite.")
     if not low <= value <= high:
-        raise ParameterError(
-            f"{label} is {value:g}{unit}; allowed range: {low:g} to {high:g}{unit}."
-            f"{' Values are in SI units; check the unit.' if unit else _percent_hint(value, high)}"
-        )
+        hint = " Values are in SI units; check the unit." if unit else ""
+        if not unit and 0 < value / 100 <= high <= 1 < value:
+            hint = f" Is it in per cent? As a ratio it is {value / 100:g}."
+        raise ParameterError(f"{label} is {value:g}{unit}; allowed range: {low:g} to {high:g}{unit}.{hint}")
     if 0.0 < abs(value) < declared.plausible:
         warnings.warn(
             f"{label} is {value:g}{unit}, which is implausibly small: values without a unit are in SI units. Check the "
@@ -194,11 +185,6 @@ def _check_value(owner: str, declared: Parameter, value: Any) -> Any:
             stacklevel=5,
         )
     return value
-
-
-def _percent_hint(value: float, high: float) -> str:
-    """Return a hint if a ratio above its upper bound would be valid as a percentage, else an empty string."""
-    return f" Is it in per cent? As a ratio it is {value / 100:g}." if 0 < value / 100 <= high <= 1 < value else ""
 
 
 def as_float(label: str, value: Any) -> float:
@@ -219,7 +205,7 @@ def as_finite_float(label: str, value: Any) -> float:
 
 def attribute_hint(obj: Any, kind: type[Any]) -> str:
     """Sentence that names the fields of `obj` that hold an object of class `kind`; empty if there are none."""
-    if not dataclasses.is_dataclass(obj) or isinstance(obj, type):
+    if not is_model(obj):
         return ""
     names = [f".{f.name}" for f in dataclasses.fields(obj) if isinstance(getattr(obj, f.name), kind)]
     return f" It contains one: write {' or '.join(names)} after it." if names else ""
@@ -232,22 +218,16 @@ def _check_annotations(obj: Any) -> None:
         component, hint = getattr(obj, field.name), hints.get(field.name)
         if "unit" in field.metadata:
             continue
-        if isinstance(component, int | str):
-            _check_size(f"{type(obj).__name__}: {field.name}", component)
+        label = f"{type(obj).__name__}: {field.name}"
+        if isinstance(component, int) and abs(component) > _MAX_INTEGER:
+            raise ParameterError(f"{label} is too large an integer; allowed range: at most {_MAX_INTEGER}.")
+        if isinstance(component, str) and len(component) > _MAX_CHARACTERS:
+            length = f"a text of {len(component)} characters"
+            raise ParameterError(f"{label} is {length}; at most {_MAX_CHARACTERS} are allowed.")
         if not conforms(component, hint):
-            raise ParameterError(
-                f"{type(obj).__name__}: {field.name} must be {describe(hint)}; it is {abridged(component)}."
-                f"{attribute_hint(component, hint) if isinstance(hint, type) else ''}"
-            )
+            contained = attribute_hint(component, hint) if isinstance(hint, type) else ""
+            raise ParameterError(f"{label} must be {describe(hint)}; it is {abridged(component)}.{contained}")
         check_within(obj, field)
-
-
-def _check_size(label: str, value: int | str) -> None:
-    """Raise ParameterError for an integer or a text that is too large for any model."""
-    if isinstance(value, int) and abs(value) > _MAX_INTEGER:
-        raise ParameterError(f"{label} is too large an integer; allowed range: at most {_MAX_INTEGER}.")
-    if isinstance(value, str) and len(value) > _MAX_CHARACTERS:
-        raise ParameterError(f"{label} is a text of {len(value)} characters; at most {_MAX_CHARACTERS} are allowed.")
 
 
 def check_structure(obj: Any) -> None:
@@ -261,7 +241,7 @@ def parts_of(thing: Any, path: str = "") -> Iterator[tuple[str, Any]]:
     if isinstance(thing, tuple):
         for i, item in enumerate(thing):
             yield from parts_of(item, f"{path}[{i}]")
-    elif dataclasses.is_dataclass(thing) and not isinstance(thing, type):
+    elif is_model(thing):
         yield path, thing
         for field in dataclasses.fields(thing):
             yield from parts_of(getattr(thing, field.name), f"{path}.{field.name}" if path else field.name)

@@ -107,9 +107,6 @@ class Columns(Mapping[str, Array]):
     def __len__(self) -> int:
         return len(self._columns)
 
-    def __contains__(self, name: object) -> bool:
-        return name in self._columns
-
     def limits(self, name: str) -> tuple[float, float]:
         """The smallest and largest value of a column that has rows."""
         place = self._places.get(name)

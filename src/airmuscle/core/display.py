@@ -33,11 +33,22 @@ class DisplayUnits:
     """A choice of display units, which is in force in this process, or in a `with` block only.
 
     units  the texts of the units, such as ("bar", "mm"); a quantity without one keeps the default of the output
+
+    Raises UnitError.
     """
 
     def __init__(self, units: tuple[str, ...], where: str = "display") -> None:
         self.units = units
-        self._by_si = _factors_by_si_unit(units, where)
+        self.by_si: dict[str, tuple[float, str]] = {}
+        """Factor from SI and text of each unit, by SI unit."""
+        for unit in units:
+            if not isinstance(unit, str) or not unit.strip():
+                raise UnitError(f"{where}: {abridged(unit)} is not a unit; write texts, such as 'bar', 'mm', 'deg'.")
+            text, (si_unit, factor) = unit.strip(), _si_unit_and_factor(unit.strip(), where)
+            if si_unit in self.by_si:
+                both = f"'{self.by_si[si_unit][1]}' and '{text}'"
+                raise UnitError(f"{where}: {both} are units of the same quantity; choose one.")
+            self.by_si[si_unit] = (1.0 / factor, text)
 
     def __enter__(self) -> Self:
         """Restrict the choice to a block in this thread: the choice of the process is the earlier one again."""
@@ -52,10 +63,6 @@ class DisplayUnits:
 
     def __repr__(self) -> str:
         return f"DisplayUnits({', '.join(self.units) or 'default units'})"
-
-    def scale(self, si_unit: str) -> tuple[float, str] | None:
-        """Factor from SI and text of the unit chosen for the quantities of an SI unit; None if none is chosen."""
-        return self._by_si.get(si_unit)
 
 
 _lock = threading.Lock()
@@ -93,21 +100,22 @@ def chosen_scale(si_unit: str, factor: float, label: str) -> tuple[float, str]:
     Raises FileError or UnitError for an invalid configuration file.
     """
     choice = _choice_here() or _of_user()
-    return choice.scale(si_unit) or (factor, label)
+    return choice.by_si.get(si_unit, (factor, label))
 
 
 def quantity_text(value: Any, si_unit: str, default: str, digits: int = 4) -> str:
     """A value in SI as text with its display unit, `300 kPa`, to a number of significant digits."""
-    factor, unit = chosen_scale(si_unit, 1.0 / known_factor(default), default)
-    return f"{value * factor:.{digits}g} {'' if unit == '1' else unit}".rstrip()
+    return _scaled(value, *chosen_scale(si_unit, 1.0 / known_factor(default), default), digits)
 
 
 def contraction_text(value: Any, decimals: int = 2, digits: int = 4) -> str:
     """A contraction as text: in per cent with so many decimals, or to significant digits in the chosen unit."""
-    choice = chosen_scale("1", 0.0, "")
-    if not choice[1]:
-        return f"{100 * value:.{decimals}f} %"
-    return f"{value * choice[0]:.{digits}g} {'' if choice[1] == '1' else choice[1]}".rstrip()
+    factor, unit = chosen_scale("1", 0.0, "")
+    return _scaled(value, factor, unit, digits) if unit else f"{100 * value:.{decimals}f} %"
+
+
+def _scaled(value: Any, factor: float, unit: str, digits: int) -> str:
+    return f"{value * factor:.{digits}g} {'' if unit == '1' else unit}".rstrip()
 
 
 def level_text(quantity: str, level: float, span: float) -> str:
@@ -155,21 +163,6 @@ def _known(unit: str) -> tuple[str, float] | None:
     return (si_unit, known_factor(plain)) if si_unit in SI_UNITS else None
 
 
-def _factors_by_si_unit(units: tuple[str, ...], where: str) -> dict[str, tuple[float, str]]:
-    """Factor from SI and text of each unit, by SI unit. Raises UnitError."""
-    chosen: dict[str, tuple[float, str]] = {}
-    for unit in units:
-        if not isinstance(unit, str) or not unit.strip():
-            raise UnitError(f"{where}: {abridged(unit)} is not a unit; write texts, such as 'bar', 'mm', 'deg'.")
-        si_unit, factor = _si_unit_and_factor(unit.strip(), where)
-        if si_unit in chosen:
-            raise UnitError(
-                f"{where}: '{chosen[si_unit][1]}' and '{unit.strip()}' are units of the same quantity; choose one."
-            )
-        chosen[si_unit] = (1.0 / factor, unit.strip())
-    return chosen
-
-
 def _si_unit_and_factor(unit: str, where: str) -> tuple[str, float]:
     """SI unit and factor of a unit. Raises UnitError if it is unknown, has an offset, or cannot be chosen."""
     reason = ""
@@ -190,22 +183,12 @@ def _si_unit_and_factor(unit: str, where: str) -> tuple[str, float]:
 
 
 def _of_user() -> DisplayUnits:
-    folder = config_folder()
-    return DisplayUnits(()) if folder is None else _configured(str(folder / CONFIG_FILE))
-
-
-def config_folder() -> pathlib.Path | None:
-    """The folder of the configuration file: AIRMUSCLE_CONFIG_DIR, or airmuscle in the user's configuration folder.
-
-    None for a user who has no home folder.
-    """
-    named = os.environ.get("AIRMUSCLE_CONFIG_DIR")
-    if named:
-        return pathlib.Path(named)
+    """The choice of the configuration file in AIRMUSCLE_CONFIG_DIR, or in the user's configuration folder."""
     try:
-        return user_folder("config")
-    except RuntimeError:
-        return None
+        folder = os.environ.get("AIRMUSCLE_CONFIG_DIR") or user_folder("config")
+    except RuntimeError:  # a user without a home folder
+        return DisplayUnits(())
+    return _configured(str(pathlib.Path(folder) / CONFIG_FILE))
 
 
 def user_folder(kind: str) -> pathlib.Path:

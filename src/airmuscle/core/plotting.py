@@ -75,7 +75,10 @@ def rendered(
 
     relabel_in_display_units(figure.axes)
     _apply_text_style(figure)
-    _rasterise_markers(figure)
+    lines = [line for axes in figure.axes for line in axes.lines if line.get_linestyle() in ("None", "none", "", " ")]
+    if sum(len(line.get_xdata(orig=False)) for line in lines) > MAX_VECTOR_MARKERS:
+        for line in lines:
+            line.set_rasterized(True)
     files = {}
     layout = figure.get_layout_engine()
     with mpl.rc_context(_STYLE):
@@ -103,14 +106,6 @@ def _apply_text_style(figure: Any) -> None:
             text.set_fontsize(_STYLE["legend.fontsize"])
     for axes in figure.axes:
         axes.title.set_fontsize(_STYLE["axes.titlesize"])
-
-
-def _rasterise_markers(figure: Any) -> None:
-    """Draw the lines that consist of markers only as images where the figure has many of them."""
-    lines = [line for axes in figure.axes for line in axes.lines if line.get_linestyle() in ("None", "none", "", " ")]
-    if sum(len(line.get_xdata(orig=False)) for line in lines) > MAX_VECTOR_MARKERS:
-        for line in lines:
-            line.set_rasterized(True)
 
 
 def legend_outside(axes: Any, **options: Any) -> Any:

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from .annotation import check_field_types
+from .annotation import check_field_types, is_model
 from .errors import ParameterError
 
 
@@ -58,7 +58,7 @@ def _walk(obj: Any) -> Iterator[Reference]:
         yield obj
         return
     yield from getattr(obj, "references", ())
-    if dataclasses.is_dataclass(obj) and not isinstance(obj, type):
+    if is_model(obj):
         for field in dataclasses.fields(obj):
             yield from _walk(getattr(obj, field.name))
     elif isinstance(obj, tuple | list):

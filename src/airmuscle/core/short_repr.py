@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from .annotation import is_model
+
 MAX_LINES = 10
 """Maximum number of lines of a representation (chosen)."""
 MAX_VALUE = 60
@@ -21,16 +23,11 @@ class ShortRepr:
     """Base of results whose complete content would fill pages: their `repr` names each field on at most ten lines."""
 
     def __repr__(self) -> str:
-        return short_repr(self)
-
-
-def short_repr(thing: Any) -> str:
-    """Class and fields of a dataclass on at most ten lines; arrays and collections by their size."""
-    fields = [f.name for f in dataclasses.fields(thing) if f.repr]
-    items = [f"{name}={_value(getattr(thing, name))}" for name in fields]
-    text = f"{type(thing).__name__}({', '.join(items)})"
-    lines = textwrap.wrap(text, WIDTH, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False)
-    return "\n".join(lines if len(lines) <= MAX_LINES else [*lines[: MAX_LINES - 1], "    ...)"])
+        fields = [f.name for f in dataclasses.fields(self) if f.repr]  # type: ignore[arg-type]
+        items = [f"{name}={_value(getattr(self, name))}" for name in fields]
+        text = f"{type(self).__name__}({', '.join(items)})"
+        lines = textwrap.wrap(text, WIDTH, subsequent_indent="    ", break_long_words=False, break_on_hyphens=False)
+        return "\n".join(lines if len(lines) <= MAX_LINES else [*lines[: MAX_LINES - 1], "    ...)"])
 
 
 def _value(value: Any) -> str:
@@ -45,7 +42,7 @@ def _value(value: Any) -> str:
         return f"{{{textwrap.shorten(', '.join(map(str, value)), MAX_VALUE, placeholder=' ...')}}}"
     if isinstance(value, tuple | list):
         return _sequence(value)
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+    if is_model(value):
         return f"{type(value).__name__}(...)" if dataclasses.fields(value) else f"{type(value).__name__}()"
     return textwrap.shorten(" ".join(repr(value).split()), MAX_VALUE, placeholder=" ...")
 
@@ -72,24 +69,18 @@ def _described(value: Any) -> str:
         return f"{value:.12g}"
     if isinstance(value, tuple):
         return f"({', '.join(map(_described, value))}{',' * (len(value) == 1)})"
-    if not _is_model(value):
+    if not is_model(value):
         return repr(value)
-    fields = [(f, getattr(value, f.name)) for f in dataclasses.fields(value) if f.repr]
-    texts = [f"{f.name}={_described(each)}" for f, each in fields if not _is_default(f, each)]
+    texts = []
+    for field in dataclasses.fields(value):
+        each, default = getattr(value, field.name), field.default
+        is_default = type(each) is type(default) and not isinstance(each, np.ndarray) and bool(each == default)
+        texts += [f"{field.name}={_described(each)}"] if field.repr and not is_default else []
     return f"{type(value).__name__}({', '.join(texts)})"
-
-
-def _is_model(value: Any) -> bool:
-    return dataclasses.is_dataclass(value) and not isinstance(value, type)
-
-
-def _is_default(field: dataclasses.Field[Any], value: Any) -> bool:
-    default = field.default
-    return type(value) is type(default) and not isinstance(value, np.ndarray) and bool(value == default)
 
 
 def _structure(model: Any) -> str:
     """The class of a model with those of its parts."""
     values = [getattr(model, field.name) for field in dataclasses.fields(model)]
-    parts = [item for each in values for item in (each if isinstance(each, tuple) else (each,)) if _is_model(item)]
+    parts = [item for each in values for item in (each if isinstance(each, tuple) else (each,)) if is_model(item)]
     return type(model).__name__ + (f"({', '.join(map(_structure, parts))})" if parts else "")

@@ -17,6 +17,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 
 from .absolute_pressure import AbsolutePressure, at_ambient
+from .annotation import is_model
 from .arrays import Array
 from .declaration import Parameter, parameters
 from .units import ABSOLUTE
@@ -76,37 +77,21 @@ class _Identity:
         return id(self.value)
 
 
-def _is_hashable(obj: Any) -> bool:
-    try:
-        hash(obj)
-    except TypeError:
-        return False
-    return True
-
-
-def _is_model(obj: Any) -> bool:
-    return dataclasses.is_dataclass(obj) and not isinstance(obj, type)
-
-
 def _node(obj: Any) -> _Node:
     """The node of a model, which is stored with it, or of any other value of a structural field."""
     if isinstance(obj, tuple):
         nodes = [_node(item) for item in obj]
         return _Node(_intern((tuple, *(n.structure for n in nodes))), tuple(v for n in nodes for v in n.values))
-    if not _is_model(obj):
-        return _Node(_intern((type(obj), obj if _is_hashable(obj) else _Identity(obj))), ())
-    stored = obj.__dict__.get(_STORED)
-    if stored is None:
-        stored = _model_node(obj)
-        obj.__dict__[_STORED] = stored
-    node: _Node = stored
-    return node
-
-
-def _model_node(obj: Any) -> _Node:
     kind: Any = type(obj)
-    parts: list[Any] = [kind]
-    values: list[Any] = []
+    if not is_model(obj):
+        try:
+            return _Node(_intern((kind, obj)), ())
+        except TypeError:  # it cannot be hashed
+            return _Node(_intern((kind, _Identity(obj))), ())
+    stored: _Node | None = obj.__dict__.get(_STORED)
+    if stored is not None:
+        return stored
+    parts, values = [kind], list[Any]()
     for name, declared in _fields(kind) or ():
         value = getattr(obj, name)
         if declared is None:
@@ -117,7 +102,8 @@ def _model_node(obj: Any) -> _Node:
             several = isinstance(value, tuple)
             parts.append((name, len(value) if several else 1))
             values += value if several else (value,)
-    return _Node(_intern(tuple(parts)), tuple(values))
+    stored = obj.__dict__[_STORED] = _Node(_intern(tuple(parts)), tuple(values))
+    return stored
 
 
 def structure(obj: Any) -> Structure:
@@ -213,7 +199,7 @@ def with_ambient(obj: T, ambient: float) -> T:
 def _revalidate(obj: Any) -> Any:
     if isinstance(obj, tuple):
         return tuple(_revalidate(item) for item in obj)
-    if _is_model(obj):
+    if is_model(obj):
         return dataclasses.replace(
             obj, **{f.name: _revalidate(getattr(obj, f.name)) for f in dataclasses.fields(obj) if f.init}
         )
@@ -244,7 +230,7 @@ def _to_json(value: Any) -> Any:
         return {"keys": [[_to_json(k), _to_json(v)] for k, v in value.items()]}
     if isinstance(value, list | tuple):
         return [_to_json(item) for item in value]
-    if dataclasses.is_dataclass(value) and not isinstance(value, type):
+    if is_model(value):
         fields = {f.name: _to_json(getattr(value, f.name)) for f in dataclasses.fields(value)}
         module = type(value).__module__
         package = "airmuscle" if module.startswith("airmuscle.") else module  # whose public names are unique
