@@ -97,30 +97,24 @@ def surface(data: str = FORCE_MAPS[0]) -> am.characteristic.ContractileSurface:
     return dataclasses.replace(fitted, max_force=1200.0)
 
 
-def muscle(
-    parameters: UnpublishedParameters, data: str = FORCE_MAPS[0], spring: am.physics.Spring | None = None
-) -> am.Muscle:
+def muscle(parameters: UnpublishedParameters, data: str = FORCE_MAPS[0]) -> am.Muscle:
     """Return the Hill muscle of equation (1)."""
     braid = am.geometry.Braid(0.010, parameters.braid_angle.value, parameters.length.value)
-    stiffness, damper = parameters.stiffness.value, am.LinearDamper(parameters.damping.value)
-    return am.Muscle(surface(data), braid, spring or am.LinearSpring(stiffness), damper)
+    spring, damper = am.LinearSpring(parameters.stiffness.value), am.LinearDamper(parameters.damping.value)
+    return am.Muscle(surface(data), braid, spring, damper)
 
 
 def plant(
-    parameters: UnpublishedParameters,
-    mechanism: am.Mechanism,
-    *,
-    gas: am.physics.Gas = am.Isothermal(),
-    spring: am.physics.Spring | None = None,
-    wall: am.physics.Wall = am.physics.RigidWall(),
-    valve: am.physics.Orifice = MATRIX,
-    tube: am.physics.TubeModel | None = None,
-    series: am.physics.SeriesElement = am.physics.RigidSeriesElement(),
-    data: str = FORCE_MAPS[0],
-) -> am.Plant:
-    """Return the plant; the defaults are those of the paper: isothermal gas, rigid wall, no line, no series spring."""
+    parameters: UnpublishedParameters, mechanism: am.Mechanism, *, gas: am.physics.Gas = am.Isothermal(),
+    valve: am.physics.Orifice = MATRIX, tube: am.physics.TubeModel | None = None, data: str = FORCE_MAPS[0],
+    **elements: Any,
+) -> am.Plant:  # fmt: skip
+    """Return the plant; the defaults are those of the paper: isothermal gas, rigid wall, no line, no series spring.
+
+    elements  of the muscle that replace those of the paper: spring, wall, series
+    """
     valves = am.FillDischarge(am.Supply(SUPPLY_PRESSURE), valve, valve)
-    actuator = dataclasses.replace(muscle(parameters, data, spring), wall=wall, series=series)
+    actuator = dataclasses.replace(muscle(parameters, data), **elements)
     circuit = valves if tube is None else am.physics.WithTubes(valves, tube)
     return am.Plant(actuator, circuit, mechanism, gas, am.Ambient())
 

@@ -67,11 +67,7 @@ def release(
 
 
 def damping(time: npt.NDArray[Any], position: npt.NDArray[Any], speed: npt.NDArray[Any]) -> tuple[float, float]:
-    """Return damping ratio [1] and decay rate [1/s] from the logarithmic decrement of the first three half-cycles.
-
-    A half-cycle is the distance between two turning points, so the equilibrium position is not needed. NaN if there
-    are fewer than four turning points (overdamped).
-    """
+    """Return damping ratio [1] and decay rate [1/s] by the decrement of three half-cycles; NaN if overdamped."""
     turns = np.flatnonzero(np.sign(speed[1:-1]) * np.sign(speed[2:]) < 0) + 1
     if turns.size < 4:
         return float("nan"), float("nan")
@@ -79,7 +75,7 @@ def damping(time: npt.NDArray[Any], position: npt.NDArray[Any], speed: npt.NDArr
     instants = time[turns] + fraction * (time[turns + 1] - time[turns])
     step = time[turns + 1] - time[turns]
     extremes = position[turns] + 0.5 * speed[turns] * fraction * step
-    half_cycles = np.abs(np.diff(extremes[:4]))
+    half_cycles = np.abs(np.diff(extremes[:4]))  # between turning points: no equilibrium position is needed
     half_decrement = float(np.log(half_cycles[0] / half_cycles[2]) / 2)
     ratio = half_decrement / np.hypot(np.pi, half_decrement)
     return float(ratio), half_decrement / float(np.mean(np.diff(instants[:4])))

@@ -79,12 +79,7 @@ class Table(ShortRepr):
         lengths = {key: len(each.values) for key, each in made.items()}
         if len(set(lengths.values())) > 1:
             raise ValueError(f"table {self.name}: all columns must have the same length, not {lengths}.")
-        for name, value in (
-            ("columns", made),
-            ("shown", self.shown and not self.series),
-            ("key", self.key or self.name),
-        ):
-            object.__setattr__(self, name, value)
+        vars(self).update(columns=made, shown=self.shown and not self.series, key=self.key or self.name)
 
     def __len__(self) -> int:
         return len(next(iter(self.columns.values())).values) if self.columns else 0

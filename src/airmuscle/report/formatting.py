@@ -56,15 +56,11 @@ def format_cell(value: Any, digits: int = DIGITS) -> str:
     """Return a table cell: as `format_number` does, also numbers stored as text, in typographic form."""
     if isinstance(value, str) and not _NUMBERS.fullmatch(value):
         return value
-    return typographic(_NEGATIVE_ZERO.sub("", _rounded(value, digits)))
-
-
-def _rounded(value: Any, digits: int) -> str:
     if is_number_text(value) and not value.lstrip("-+").isdigit():
         mantissa = value.partition("e")[0].lstrip("-+0.")
         if "e" in value or sum(map(str.isdigit, mantissa)) > DIGITS:
-            return format_number(float(value))
-    return format_number(value, digits)
+            value, digits = float(value), DIGITS
+    return typographic(_NEGATIVE_ZERO.sub("", format_number(value, digits)))
 
 
 def is_number_text(value: Any) -> bool:
@@ -199,14 +195,11 @@ def _plain(element: ElementTree.Element) -> str:
         return f"sqrt({''.join(parts)})"
     if tag == "mspace":
         return " "
-    return _join(list(element), parts) if parts else (element.text or "").replace("\u2212", "-")
-
-
-def _join(elements: list[ElementTree.Element], parts: list[str]) -> str:
-    """Join the parts of a row; a sign at its beginning or after another operator has no space behind it."""
-    text, after_operator = "", True
-    for element, part in zip(elements, parts, strict=True):
-        operator = element.tag.endswith("}mo")
+    if not parts:
+        return (element.text or "").replace("\u2212", "-")
+    text, after_operator = "", True  # of a row; a sign at its beginning or after an operator has no space behind it
+    for child, part in zip(element, parts, strict=True):
+        operator = child.tag.endswith("}mo")
         text += f" {part} " if operator and part in _SPACED and not after_operator else part
         after_operator = operator and part not in (")", "|")
     return text

@@ -49,31 +49,28 @@ def shown_columns(table: Table, *, chosen: bool = True, brief: bool = False) -> 
     A meaning that is that of the row above, as of the coefficients of a polynomial, is shown once.
     """
     rows = table.brief_rows if brief else list(range(len(table)))
-    columns = {name: each for name, each in table.columns.items() if each.brief or not brief}
     units = table.columns.get(UNIT, TableColumn(()))
     labels = units.shown or units.values
     scales = [scale_of("", units.values[i], labels[i], chosen=chosen) for i in rows if len(units)]
-    shown = [_shown(name, each, rows, scales, chosen, brief) for name, each in columns.items()]
-    for each in shown if chosen else ():
-        if each.heading == MEANING:
-            each.cells[1:] = ["" if cell == above else cell for above, cell in itertools.pairwise(each.cells)]
+    shown = []
+    for name, column in table.columns.items():
+        if brief and not column.brief:
+            continue
+        cells, heading, factor = [column.values[i] for i in rows], (brief and column.short) or name, 1.0
+        if column.unit == BY_ROW:
+            cells = [_times(cell, scale) for cell, (scale, _) in zip(cells, scales, strict=True)]
+        elif name == UNIT:
+            cells = ["" if unit == "1" else unit for _, unit in scales]
+        elif column.unit:
+            factor, unit = scale_of(name, column.unit, str(column.shown), chosen=chosen)
+            heading = heading if unit == "" or (unit == "1" and chosen) else f"{heading} [{unit}]"
+        elif chosen:
+            factor, heading = heading_scale(heading)
+        cells = [_times(cell, factor) for cell in cells]
+        if chosen and heading == MEANING:
+            cells[1:] = ["" if cell == above else cell for above, cell in itertools.pairwise(cells)]
+        shown.append(ShownColumn(heading, cells, column))
     return shown
-
-
-def _shown(
-    name: str, column: TableColumn, rows: list[int], scales: list[tuple[float, str]], chosen: bool, brief: bool
-) -> ShownColumn:
-    values, title = [column.values[i] for i in rows], (brief and column.short) or name
-    if column.unit == BY_ROW:
-        return ShownColumn(title, [_times(v, scale) for v, (scale, _) in zip(values, scales, strict=True)], column)
-    if name == UNIT:
-        return ShownColumn(title, ["" if unit == "1" else unit for _, unit in scales], column)
-    if not column.unit:
-        factor, heading = heading_scale(title) if chosen else (1.0, title)
-        return ShownColumn(heading, [_times(value, factor) for value in values], column)
-    factor, unit = scale_of(name, column.unit, str(column.shown), chosen=chosen)
-    heading = title if unit == "" or (unit == "1" and chosen) else f"{title} [{unit}]"
-    return ShownColumn(heading, [_times(value, factor) for value in values], column)
 
 
 def scale_of(name: str, unit: str, shown: str = "", *, chosen: bool = True) -> tuple[float, str]:

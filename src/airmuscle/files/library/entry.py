@@ -15,7 +15,7 @@ from ...physics import Characteristic, ForceLaw, Friction, Geometry, Plant, Vali
 from ...physics.muscle import CreepElements, Damper, Muscle, Ratings, SeriesElement, Spring, Stop, Wall
 from ...physics.pneumatics import REFERENCE_DENSITY, REFERENCE_TEMPERATURE, Orifice
 from ...report.chapter import Table
-from .entry_display import EntryDisplay
+from .entry_display import CHECK_UNITS, EntryDisplay
 from .files import entries_of_product
 from .uncertainty import ParameterUncertainty, StatedBand
 
@@ -68,8 +68,7 @@ class Check:
     @property
     def conditions(self) -> tuple[tuple[str, float], ...]:
         """The quantities on which the checked one depends, with their values."""
-        names = ("pressure", "contraction", "force", "upstream", "downstream")
-        return tuple((name, getattr(self, name)) for name in names if getattr(self, name) is not None)
+        return tuple((name, getattr(self, name)) for name in CHECK_UNITS if getattr(self, name) is not None)
 
     @staticmethod
     def units_of_table(table: Mapping[str, Any]) -> dict[str, str]:

@@ -24,13 +24,10 @@ PARTS = (
     "validity_range", "valve", "exhaust", "switching_times", "plant",
 )  # fmt: skip
 """Components of an entry, in the order in which they are described."""
-CHECK_UNITS = {
-    "pressure": ("Pa", "kPa"), "contraction": ("1", "%"), "force": ("N", "N"), "upstream": ("Pa", "kPa"),
-    "downstream": ("Pa", "kPa"),
-}  # fmt: skip
-"""Conditions of a check: their unit, and the one in which they are shown; the last two are absolute."""
+CHECK_UNITS = {"pressure": "Pa", "contraction": "1", "force": "N", "upstream": "Pa", "downstream": "Pa"}
+"""Conditions of a check with their unit; the last two are absolute pressures."""
 SHOWN_UNITS = {"Pa": "kPa", "1": "%", "m3": "cm3", "m3/s": "l/min"}
-"""Units in which published values are shown."""
+"""Units in which published values and the conditions of a check are shown."""
 FLOW_SUPPLY = 7e5
 """Absolute pressure [Pa] upstream of a valve in its chart (chosen)."""
 
@@ -96,7 +93,7 @@ class EntryDisplay(Reported, abc.ABC):
         units = [check.units_of_table({"quantity": check.quantity})["equals"] for check in checks]
         columns: dict[str, Any] = {
             "checked quantity": TableColumn([check.quantity for check in checks], short="check"),
-            **{f"at {name}": TableColumn(values, CHECK_UNITS[name][0], CHECK_UNITS[name][1])
+            **{f"at {name}": TableColumn(values, unit := CHECK_UNITS[name], SHOWN_UNITS.get(unit, unit))
                for name, values in at.items() if any(value is not None for value in values)},
             "published value": TableColumn([check.equals for check in checks], BY_ROW, short="published"),
             "tolerance": TableColumn([check.tolerance for check in checks], BY_ROW),

@@ -22,7 +22,7 @@ from ...core import Hint, HintedText, Parameter, ParameterError, UnknownNameErro
 from ...engine import loop, run
 from ...physics import mechanism, muscle, plant, pneumatics
 from ...physics.muscle import characteristic, friction, geometry
-from .files import Location, located_errors, read_number, with_article
+from .files import Location, located_errors, read_number
 
 PACKAGES = (characteristic, estimation, friction, geometry, laws, loop, mechanism, muscle, plant, pneumatics, run)
 
@@ -159,10 +159,7 @@ def check_required(
 
 
 def read_parameter(value: Any, declared: Parameter, hint: Any, location: Location) -> Any:
-    """Value of a declared parameter in SI units: a number, or a tuple of numbers if the annotation is a tuple.
-
-    A tuple may also be a column of a data file. Raises ParameterError, UnitError, FileError or ColumnError.
-    """
+    """Value of a declared parameter [SI]: a number, or of a tuple a list of numbers or a column of a data file."""
     where, many = location.at(declared.name), origin(hint) is tuple
     unit, about = declared.unit, f" ({declared.symbol}, {declared.meaning})"
     if isinstance(value, Mapping) and many:  # a column of a data file, in the SI unit of recordings
@@ -213,6 +210,6 @@ def describe_type(hint: Any) -> str:
         if origin(option) is tuple:
             words.append(f"a list{_ITEMS.get(item_type(option), '')}")
         elif option is not types.NoneType:
-            name = origin(option)
-            words.append(_TYPE_NAMES.get(name) or with_article(str(getattr(name, "__name__", name))))
+            name = str(getattr(origin(option), "__name__", origin(option)))
+            words.append(_TYPE_NAMES.get(origin(option)) or f"{'an' if name[0] in 'AEIOU' else 'a'} {name}")
     return " or ".join(words)

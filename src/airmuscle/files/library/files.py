@@ -85,11 +85,6 @@ def read_text(table: Mapping[str, Any], key: str, location: Location, *, needed:
     return value
 
 
-def with_article(name: str) -> str:
-    """A class name with its indefinite article."""
-    return f"{'an' if name[0] in 'AEIOU' else 'a'} {name}"
-
-
 LAWS = Path(__file__).parent
 """Folder of the muscles and laws."""
 PLANTS = LAWS / "plants"

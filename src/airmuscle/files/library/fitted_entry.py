@@ -82,10 +82,18 @@ def fitted_entry(
     if isinstance(inside, Geometry) and (geometry is None or type(geometry) is type(inside)):
         geometry = inside  # the law was fitted with it
     title = f"{type(result.model).__name__} fitted to {list_files([f.stem for f in files])}"
+    residuals, band = np.abs(result.residuals[result.censoring == 0]), None
+    size = residuals.size
+    half = error_ratio * float(np.quantile(residuals, min(np.ceil((size + 1) * LEVEL) / size, 1.0))) if size else 0.0
+    if np.isfinite(half) and half > 0.0:
+        source = f"95 % quantile of the residuals of {size} rows of the fit"
+        if error_ratio != 1.0:
+            source += f", times {error_ratio:.3g}, the ratio of the rms errors of rows left out and of all rows"
+        band = _complete_band(StatedBand(result.fitted_quantity.name, half, source), recordings, errors)
     entry = dataclasses.replace(
         initial, name="muscle", title=title, provenance="fitted", note=note, warning="", characteristic=result.model,
         geometry=geometry, validity_range=result.validity_range, checks=(),
-        uncertainty=None, error_band=_error_band(result, error_ratio, recordings, errors),
+        uncertainty=None, error_band=band,
         references=tuple(cite((initial.references, result.recording.references))),
     )  # fmt: skip
     return dataclasses.replace(entry, note=" ".join([note, *missing_geometry(entry)]))
@@ -96,22 +104,6 @@ def left_out_ratio(best: RankedModel) -> float:
     if not (best.in_sample_rmse > 0.0 and np.isfinite(best.cross_validated_rmse)):
         return 1.0
     return max(best.cross_validated_rmse / best.in_sample_rmse, 1.0)
-
-
-def _error_band(
-    result: Fit, ratio: float, recordings: Sequence[Recording], errors: SpecimenErrors | None
-) -> StatedBand | None:
-    """The quantile of the residuals of the uncensored rows that contains 95 % of further ones [SI], for the measured
-    specimens, and the band of others by the errors of specimens left out."""
-    residuals = np.abs(result.residuals[result.censoring == 0])
-    size = residuals.size
-    half = ratio * float(np.quantile(residuals, min(np.ceil((size + 1) * LEVEL) / size, 1.0))) if size else 0.0
-    if not (np.isfinite(half) and half > 0.0):
-        return None
-    source = f"95 % quantile of the residuals of {size} rows of the fit"
-    if ratio != 1.0:
-        source += f", times {ratio:.3g}, the ratio of the rms errors of rows left out and of all rows"
-    return _complete_band(StatedBand(result.fitted_quantity.name, half, source), recordings, errors)
 
 
 def _complete_band(band: StatedBand, recordings: Sequence[Recording], errors: SpecimenErrors | None) -> StatedBand:

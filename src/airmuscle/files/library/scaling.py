@@ -63,8 +63,12 @@ def scale_entry(
 def own_length(entry: Entry) -> float | None:
     """Resting length [m] of the law or geometry of an entry; None if it has none."""
     parts = (part for part in (entry.characteristic, entry.geometry) if part is not None)
-    lengths = (leaf.value for part in parts for leaf in leaves(part) if leaf.declared.name == "resting_length")
-    return next((float(length) for length in lengths), None)
+    return next((length for part in parts for length in _resting_lengths(part).values()), None)
+
+
+def _resting_lengths(thing: Any) -> dict[str, float]:
+    """The resting lengths [m] in a model, by path."""
+    return {leaf.path: float(leaf.value) for leaf in leaves(thing) if leaf.declared.name == "resting_length"}
 
 
 def _with_resting_length(entry: Entry, length: float) -> Entry:
@@ -107,27 +111,18 @@ def scale_to_length(thing: T, resting_length: float, where: str) -> T:
     length is returned unchanged. Raises ParameterError, which begins with `where`, for a law or geometry that is not of
     this length and cannot be scaled.
     """
-    if not _different_lengths(thing, resting_length):
+    if all(abs(length - resting_length) <= LENGTH_TOLERANCE for length in _resting_lengths(thing).values()):
         return thing
     scaled = _scale(thing, resting_length)
-    if remaining := _different_lengths(scaled, resting_length):
-        path, length = next(iter(remaining.items()))
-        raise ParameterError(
-            f"{where}: {path} of {type(thing).__name__} is {length:.4g} m, but the resting length of the data is "
-            f"{resting_length:.4g} m, and {type(thing).__name__} cannot be scaled to another length: only laws with a "
-            "Braid, or with a resting length of their own, can. Give a muscle file with the geometry of the measured "
-            "muscle, or correct the resting length."
-        )
+    for path, length in _resting_lengths(scaled).items():
+        if abs(length - resting_length) > LENGTH_TOLERANCE:
+            raise ParameterError(
+                f"{where}: {path} of {type(thing).__name__} is {length:.4g} m, but the resting length of the data is "
+                f"{resting_length:.4g} m, and {type(thing).__name__} cannot be scaled to another length: only laws "
+                "with a Braid, or with a resting length of their own, can. Give a muscle file with the geometry of the "
+                "measured muscle, or correct the resting length."
+            )
     return cast(T, scaled)
-
-
-def _different_lengths(thing: Any, resting_length: float) -> dict[str, float]:
-    """The resting lengths [m] in a model that differ from this one, by path."""
-    return {
-        leaf.path: float(leaf.value)
-        for leaf in leaves(thing)
-        if leaf.declared.name == "resting_length" and abs(leaf.value - resting_length) > LENGTH_TOLERANCE
-    }
 
 
 def _scale(thing: Any, resting_length: float) -> Any:

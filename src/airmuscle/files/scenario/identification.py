@@ -177,10 +177,7 @@ class DynamicFitSetup(ShortRepr):
 
 
 def load_dynamic_fit(path: str | Path) -> DynamicFitSetup:
-    """The dynamic fit in a file.
-
-    Raises FileError, ParameterError, UnitError, UnknownNameError or ColumnError with the location.
-    """
+    """The dynamic fit in a file. Raises FileError, ParameterError, UnitError, UnknownNameError or ColumnError."""
     file = Path(path)
     tables, location = read_toml(file), Location.of_file(file)
     check_keys(tables, ("title", "plant", "input", "observed", "fit", "record"), location)

@@ -50,20 +50,25 @@ class PlantModel:
         The run begins at the recorded initial pressure, and at the recorded initial values of other states that the
         scenario states. Raises ColumnError for a recording without a predictable quantity, ParameterError otherwise.
         """
+        plant, state, observed = self.scenario.plant, dict(self.scenario.initial_state), self._observed
+        outputs = {**plant.outputs(state, dict.fromkeys(plant.inputs, 0.0)), **state}
         with located_errors(recording.origin):
             headings = [split_unit(heading)[0] for heading in recording]
-            kept = {name: observed for name, observed in self._observed.items() if observed[1] in headings}
-            recording = with_observed(recording, kept, self.scenario.plant)
-            plant_columns = [n for kind in PREDICTABLE for n in self._outputs() if n.rpartition(".")[2] == kind]
-            known = self._observed or plant_columns
+            kept = {name: each for name, each in observed.items() if each[1] in headings}
+            recording = with_observed(recording, kept, plant)
+            known = observed or [n for kind in PREDICTABLE for n in outputs if n.rpartition(".")[2] == kind]
             names = [name for name in known if name in recording]
             if not names:
                 raise ColumnError(f"no column can be predicted; the plant gives {', '.join(known)}.")
-            row = {"start_time": start_time, "initial_state": self._initial_state(recording)}
+            pressures = {name: float(outputs[name]) for name in pressure_names(plant)}
+            initial = pressures | recorded_pressures(plant, recording)
+            stated = self.tables["run"].get("initial_state", {})
+            for name in (each for c in plant.mechanism.coordinates for each in (c.name, c.speed) if each in stated):
+                initial[name] = first_value(recording, name) if name in recording else float(outputs[name])
+        row = {"start_time": start_time, "initial_state": initial}
         place = Location(recording.origin, "", self.location.folder)
-        plant = self.scenario.plant
         experiment, _ = build_experiment(row, place, self.tables, plant, {}, recording, predicted=True)
-        return self._predict(experiment, {name: self._observed.get(name, (0.0, name))[0] for name in names}, own)
+        return self._predict(experiment, {name: observed.get(name, (0.0, name))[0] for name in names}, own)
 
     def predict_file(self, path: Path) -> list[RecordPrediction]:
         """Predict each record of a file of records. Raises FileError, ParameterError, UnitError or ColumnError."""
@@ -91,22 +96,6 @@ class PlantModel:
         stated = () if uncertainty is None else uncertainty.deviations
         return {name: (0.0, name) for name in stated} | dict(self.scenario.observed)
 
-    def _outputs(self) -> Mapping[str, Any]:
-        plant, state = self.scenario.plant, dict(self.scenario.initial_state)
-        return {**plant.outputs(state, dict.fromkeys(plant.inputs, 0.0)), **state}
-
-    def _initial_state(self, recording: Recording) -> dict[str, float]:
-        """The recorded initial pressures, else those of the scenario, and the other states that it states, at their
-        recorded initial values if there are any."""
-        plant, outputs, stated = self.scenario.plant, self._outputs(), self.tables["run"].get("initial_state", {})
-        pressures = {name: float(outputs[name]) for name in pressure_names(plant)}
-        initial = {**pressures, **recorded_pressures(plant, recording)}
-        own = [c for coordinate in plant.mechanism.coordinates for c in (coordinate.name, coordinate.speed)]
-        for name in own:
-            if name in stated:
-                initial[name] = first_value(recording, name) if name in recording else float(outputs[name])
-        return initial
-
     def _predict(
         self, experiment: Experiment, observed: Mapping[str, float], own: Sequence[RecordUnknown],
         method: Integrator | None = None,
@@ -120,10 +109,7 @@ class PlantModel:
 
 
 def load_plant_model(path: str | Path) -> PlantModel:
-    """The identified plant of a scenario file, or of a plant of the library by its name.
-
-    Raises FileError, ParameterError, UnitError or UnknownNameError with the location.
-    """
+    """The identified plant of a scenario file, or of a plant of the library by name. Raises as `load_scenario`."""
     tables, location = scenario_tables(path)
     scenario = build_scenario(tables, location)
     if "controller" in tables.get("input", {}):

@@ -117,20 +117,18 @@ class _ModelSchemas:
         hints = typing.get_type_hints(cls)
         for field in dataclasses.fields(cls):
             if field.init and (key := field.metadata.get("key", field.name)):
-                properties[key] = self._field(cls, field, declared.get(field.name), hints[field.name])
+                if field.name in declared:
+                    properties[key] = self.number(declared[field.name], hints[field.name])
+                elif "read" in field.metadata:
+                    read, meaning = self._read(field.metadata["read"]), field.metadata["meaning"]
+                    properties[key] = {"description": meaning, **read}
+                elif (cls, field.name) in _CHOICES:
+                    properties[key] = {"enum": list(_CHOICES[cls, field.name])}
+                else:
+                    properties[key] = self.part(hints[field.name])
         own = [*(["model"] if is_model and model_needed else []), *_required_keys(cls)]
         summary = " ".join(inspect.cleandoc(cls.__doc__ or "").partition("\n\n")[0].split())
         return {"description": summary, **_table(properties, [n for n in own if n not in plant_fields(cls)])}
-
-    def _field(self, cls: type[Any], field: dataclasses.Field[Any], declared: Parameter | None, hint: Any) -> Schema:
-        """A field of a class: a number with meaning, unit and bounds, a value with a reader of its own, or a part."""
-        if declared is not None:
-            return self.number(declared, hint)
-        if "read" in field.metadata:
-            return {"description": field.metadata["meaning"], **self._read(field.metadata["read"])}
-        if (cls, field.name) in _CHOICES:
-            return {"enum": list(_CHOICES[cls, field.name])}
-        return self.part(hint)
 
     def number(self, declared: Parameter, hint: Any) -> Schema:
         """A declared parameter."""

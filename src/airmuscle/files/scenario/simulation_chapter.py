@@ -41,6 +41,8 @@ def run_chapter(scenario: Scenario, recording: Recording) -> Chapter:
         plots.insert(0, loop_plot(scenario, loop, recording))
     if scenario.plant.inputs:
         plots.append(_input_plot(scenario, recording))
+    start = ", ".join(f"{name} {typographic(format_number(value))}" for name, value in scenario.initial_state.items())
+    own = {key: "scenario" for key in ("integrator", "initial_state") if key not in scenario.defaults}
     return Chapter(
         name="simulation",
         title=scenario.title,
@@ -53,7 +55,11 @@ def run_chapter(scenario: Scenario, recording: Recording) -> Chapter:
         ),
         notes=recording.notes,
         references=tuple(cite((scenario.plant, loop))),
-        chosen=_settings(scenario),
+        chosen=(
+            ("integrator", str(problem.integrator), own.get("integrator", "default")),
+            ("initial state (SI)", start, own.get("initial_state", "default: equilibrium at ambient pressure")),
+            ("inputs", describe_input(problem.input), "scenario"),
+        ),
     )
 
 
@@ -111,16 +117,6 @@ def _input_plot(scenario: Scenario, recording: Recording) -> Plot:
     part = f" (first {MAX_DRIVER_SEGMENTS} segments)" if shortened else ""
     legend = "; dashed: commands to the drivers" if commanded is not None else ""
     return Plot("inputs", f"Inputs applied to the plant{part}{legend}.", figure)
-
-
-def _settings(scenario: Scenario) -> tuple[tuple[str, str, str], ...]:
-    start = ", ".join(f"{name} {typographic(format_number(value))}" for name, value in scenario.initial_state.items())
-    own = {key: "scenario" for key in ("integrator", "initial_state") if key not in scenario.defaults}
-    return (
-        ("integrator", str(scenario.problem.integrator), own.get("integrator", "default")),
-        ("initial state (SI)", start, own.get("initial_state", "default: equilibrium at ambient pressure")),
-        ("inputs", describe_input(scenario.problem.input), "scenario"),
-    )
 
 
 def describe_input(command: InputSignal | ControlLoop) -> str:

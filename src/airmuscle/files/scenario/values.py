@@ -47,18 +47,14 @@ class BySignal:
     positive: bool = False
 
     def __call__(self, value: Any, plant: Plant, where: Location) -> dict[str, Any]:
-        return {
-            name: self._read(item, name, plant, where.at(name))
-            for name, item in read_table(value, plant, where).items()
-        }
-
-    def _read(self, value: Any, name: str, plant: Plant, where: Location) -> Any:
-        number = Number(self.unit or f"{signal_unit(name, plant) or '1'}{self.per}", self.positive)
-        if not self.pairs:
-            return number(value, plant, where)
-        if not isinstance(value, list) or len(value) != 2:
-            raise ParameterError(f"{where} is {abridged(value)}; it must be a list of minimum and maximum.")
-        return number(value[0], plant, where), number(value[1], plant, where)
+        read: dict[str, Any] = {}
+        for name, item in read_table(value, plant, where).items():
+            number = Number(self.unit or f"{signal_unit(name, plant) or '1'}{self.per}", self.positive)
+            place = where.at(name)
+            if self.pairs and (not isinstance(item, list) or len(item) != 2):
+                raise ParameterError(f"{place} is {abridged(item)}; it must be a list of minimum and maximum.")
+            read[name] = tuple(number(e, plant, place) for e in item) if self.pairs else number(item, plant, place)
+        return read
 
 
 def table_reader(plant: Plant) -> TableReader:

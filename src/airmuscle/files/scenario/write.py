@@ -3,6 +3,7 @@
 import dataclasses
 import re
 import tomllib
+from collections import Counter
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -45,11 +46,10 @@ class RecordScenario(NamedTuple):
 
 def campaign_scenarios(campaign: Campaign) -> tuple[RecordScenario, ...]:
     """The scenario of each record, or the reason why it has none; names are those of the files."""
-    names: dict[str, int] = {}
-    scenarios = []
+    names, scenarios = Counter[str](), []
     for record in campaign.records:
         stem = re.sub(r"[^\w-]+", "-", record.origin.rpartition(".")[0] or record.origin).strip("-").lower()
-        names[stem] = names.get(stem, 0) + 1
+        names[stem] += 1
         unique = stem if names[stem] == 1 else f"{stem}-{names[stem]}"
         scenarios.append(RecordScenario(record.origin, f"{unique}.toml", *_text_or_reason(campaign, record)))
     return tuple(scenarios)
@@ -178,10 +178,7 @@ def scenario_text(scenario: Scenario) -> str:
 
 
 def save_scenario(scenario: Scenario, path: str | Path) -> Path:
-    """Write a scenario to a file that `load_scenario` reads; the file is complete or unchanged.
-
-    Raises FileError, and ParameterError as `scenario_text`.
-    """
+    """Write a scenario to a file that `load_scenario` reads. Raises FileError, ParameterError as `scenario_text`."""
     return write_text(Path(path), scenario_text(scenario))
 
 

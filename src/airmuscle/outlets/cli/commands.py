@@ -4,7 +4,6 @@ Exit code 0: success. 1: failure, with one line on stderr that gives the reason.
 """
 
 import contextlib
-import functools
 import importlib
 import warnings
 from collections.abc import Iterator
@@ -108,9 +107,17 @@ class LazyCommands(TyperGroup):
             return super().make_context(*args, **settings)
 
     def invoke(self, ctx: Any) -> Any:
+        def show(message: Warning | str, category: type[Warning], *location: Any, **options: Any) -> None:
+            if issubclass(category, AirmuscleWarning):  # one line, the others with their location in the code
+                text = message.args[0] if isinstance(message, Warning) else message
+                show_warning(in_options(text, ctx.invoked_subcommand))
+            else:
+                show_other(message, category, *location, **options)
+
         with warnings.catch_warnings():
+            show_other: Any = warnings.showwarning
             warnings.simplefilter("always", AirmuscleWarning)
-            warnings.showwarning = functools.partial(_show_warning, ctx, warnings.showwarning)
+            warnings.showwarning = show
             with _exit_codes(ctx), _printable_usage_errors(), deferred_sigint(), exclusive_folders():
                 return super().invoke(ctx)
 
@@ -163,17 +170,6 @@ def _printable_usage_errors() -> Iterator[None]:
     except _UsageError as error:
         error.message = quotable(error.message)
         raise
-
-
-def _show_warning(
-    ctx: Any, show_other: Any, message: Warning | str, category: type[Warning], *location: Any, **options: Any
-) -> None:
-    """Print one line for a warning of airmuscle; other warnings are shown with their location in the code."""
-    if issubclass(category, AirmuscleWarning):
-        text = message.args[0] if isinstance(message, Warning) else message
-        show_warning(in_options(text, ctx.invoked_subcommand))
-    else:
-        show_other(message, category, *location, **options)
 
 
 install_completion_classes()

@@ -18,7 +18,6 @@ from .terminal import echo, in_options, on_one_screen, print_json, terminal_widt
 
 Files = Mapping[str, "str | Callable[[Path], object]"]
 """Files of a result by name: a text, or a function that writes the file at a path."""
-WITHOUT_REPORT = "the report of --out"
 
 
 def deliver(
@@ -49,7 +48,7 @@ def print_result(chapters: Sequence[Chapter], paths: Mapping[str, Path], json: b
         return
     if on_one_screen():
         chapters = [replace(each, notes=tuple(text for text in each.notes if text not in warned)) for each in chapters]
-    echo(as_text(chapters, terminal_width(), "the report" if "report" in paths else WITHOUT_REPORT))
+    echo(as_text(chapters, terminal_width(), "the report" if "report" in paths else "the report of --out"))
     for name, path in paths.items():
         echo(f"{name}: {path}")
 

@@ -26,7 +26,6 @@ STACKS: dict[str, Stack] = {"torch": TorchStack(), "warp": WarpStack(), "onnx": 
 """Learning stacks by the names of the option --to."""
 NAMES = (*TARGETS, "arduino", "fmu", "ssp", "mujoco", *WRITERS, "modelica", *STACKS)
 """All values of the option --to."""
-DEFAULT_FOLDER = Path("export")
 
 SOURCE = "A scenario file or a plant of the library; with --law a library entry or a muscle file."
 Source = Annotated[str, argument("SOURCE", SOURCE, complete_entry)]
@@ -87,7 +86,7 @@ class ExportRequest:
 
 
 @with_requests
-def export(source: Source, request: ExportRequest, out: Folder = DEFAULT_FOLDER, json: Json = False) -> None:
+def export(source: Source, request: ExportRequest, out: Folder = Path("export"), json: Json = False) -> None:
     """Export to C, MATLAB, FMU, MuJoCo, PyTorch and other targets.
 
     \b

@@ -2,7 +2,6 @@
 
 import contextlib
 import dataclasses
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -12,9 +11,8 @@ from ...bench.identify import approximate as approximate_law
 from ...bench.identify.approximation import GRID_POINTS, sample_on_grid
 from ...bench.identify.volume_fit import fit_volume, volume_chapter, volume_points, volume_summary
 from ...core import ParameterError, PhysicsError, check_writable
-from ...files.library import Entry, find_initial_law, list_files, load_law, part_toml, resting_lengths, save, to_toml
+from ...files.library import find_initial_law, list_files, load_law, part_toml, resting_lengths, save, to_toml
 from ...physics.muscle.characteristic import ValidityRange, maxwell_defect, validity_range_of
-from ...recording import Recording
 from ..requests import FitRequest, ReadingRequest, check_one_length, fit_requested
 from ..requests.declaration import RequestError, option, optional, request
 from .delivery import Execution, deliver, print_result
@@ -89,7 +87,15 @@ def fit_volume_command(
     entry = None if request.muscle is None else load_law(request.muscle)
     check_writable(out)
     recordings = read_recordings(files, reading)
-    fit = fit_volume(volume_points(recordings, request.temperature), _length(recordings, entry))
+    lengths = resting_lengths(recordings)
+    own = getattr(getattr(entry, "geometry", None), "resting_length", None)
+    if entry is not None and own is not None and any(abs(length - own) > 1e-6 for length in lengths):
+        raise ParameterError(
+            f"the resting length of the data is {lengths[0]:.4g} m, that of {entry.name} {own:.4g} m. "
+            "Correct one of them."
+        )
+    length = float(own) if own is not None and not lengths else check_one_length(lengths)
+    fit = fit_volume(volume_points(recordings, request.temperature), length)
     if entry is None:
         chapter = volume_chapter(fit, f"Volume fitted to {list_files([f.stem for f in files])}", None, None, None)
         contents = {"geometry.toml": part_toml("geometry", fit.geometry)}
@@ -110,22 +116,6 @@ def fit_volume_command(
     deliver("fit-volume", chapters, json=json, out=out, title="Volume", files=contents)
 
 
-def _length(recordings: Sequence[Recording], entry: Entry | None) -> float:
-    """The resting length [m] of the data, otherwise of the muscle; both must agree. Raises ParameterError."""
-    lengths = resting_lengths(recordings)
-    own = getattr(entry.geometry, "resting_length", None) if entry is not None else None
-    if own is not None and any(abs(length - own) > 1e-6 for length in lengths):
-        raise ParameterError(
-            f"the resting length of the data is {lengths[0]:.4g} m, that of {entry.name if entry else ''} {own:.4g} m. "
-            "Correct one of them."
-        )
-    if not lengths and own is not None:
-        return float(own)
-    if len(lengths) != 1:
-        check_one_length(lengths)
-    return float(lengths[0])
-
-
 LIMIT = "Limit of the validity range; default: that of the muscle."
 LIMITS = ("min_pressure", "max_pressure", "min_contraction", "max_contraction")
 MODEL = "The other model: ContractileSurface, Sarosi2012, or a library entry of it."
@@ -144,20 +134,6 @@ class ApproximateRequest:
     max_contraction: float | None = optional(LIMIT, unit="1")
     degree: int = option("Total degree of a ContractileSurface.", default=5, bounds=(1, 9))
 
-    def validity_range(self, entry: Entry) -> ValidityRange:
-        """The validity range of the muscle with the given limits. Raises ParameterError."""
-        default = validity_range_of(entry.characteristic, entry.validity_range)
-        given = {name: getattr(self, name) for name in LIMITS}
-        limits: dict[str, Any] = {
-            name: getattr(default, name, None) if value is None else value for name, value in given.items()
-        }
-        missing = [f"--{name.replace('_', '-')}" for name, value in limits.items() if value is None]
-        if missing:
-            raise ParameterError(
-                f"{entry.name} has no validity range for the approximation; give {', '.join(missing)}."
-            )
-        return ValidityRange(**limits)
-
 
 @with_requests
 def approximate(name: Name, model: Model, request: ApproximateRequest, out: Out = None, json: Json = False) -> None:
@@ -174,7 +150,12 @@ def approximate(name: Name, model: Model, request: ApproximateRequest, out: Out 
       airmuscle approximate fit/muscle.toml Sarosi2012 --max-pressure "5 bar"
     """
     entry = load_law(name)
-    limits = request.validity_range(entry)
+    stated: Any = {name: getattr(request, name) for name in LIMITS}
+    default = validity_range_of(entry.characteristic, entry.validity_range)
+    stated = {n: getattr(default, n, None) if value is None else value for n, value in stated.items()}
+    if missing := [f"--{name.replace('_', '-')}" for name, value in stated.items() if value is None]:
+        raise ParameterError(f"{entry.name} has no validity range for the approximation; give {', '.join(missing)}.")
+    limits = ValidityRange(**stated)
     grid = sample_on_grid(entry.characteristic, limits, GRID_POINTS)
     length = getattr(entry.geometry, "resting_length", None)
     data = grid if length is None else grid.with_constants(resting_length=length)

@@ -1,11 +1,10 @@
 """Deferred handling of SIGINT (Ctrl-C), so that no interruption of the command `airmuscle` is lost."""
 
 import contextlib
-import functools
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any
 
 INTERRUPTED = 130
@@ -28,9 +27,14 @@ def deferred_sigint() -> Iterator[None]:
         yield
         return
     outermost, report_unraisable = handler is not _receive, sys.unraisablehook
+
+    def report_others(discarded: Any) -> None:  # but no interruption, which the end of the block raises
+        if not issubclass(discarded.exc_type, KeyboardInterrupt):
+            report_unraisable(discarded)
+
     if outermost:
         _received.clear()
-        sys.unraisablehook = functools.partial(_report_unraisable, report_unraisable)
+        sys.unraisablehook = report_others
         signal.signal(signal.SIGINT, _receive)
     try:
         yield
@@ -49,12 +53,6 @@ def check_interrupted() -> None:
     """Raise KeyboardInterrupt if SIGINT was received within a block; long computations call this repeatedly."""
     if _received.is_set():
         raise KeyboardInterrupt
-
-
-def _report_unraisable(report: Callable[[Any], Any], discarded: Any) -> None:
-    """Report an exception that Python discards, unless it is an interruption, which the end of the block raises."""
-    if not issubclass(discarded.exc_type, KeyboardInterrupt):
-        report(discarded)
 
 
 def _receive(number: int, frame: Any) -> None:

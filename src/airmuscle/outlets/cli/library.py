@@ -6,7 +6,7 @@ import re
 import tomllib
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Annotated, Any, NamedTuple
+from typing import Annotated, Any
 
 import typer
 
@@ -43,11 +43,7 @@ class EntryRequest:
 
 
 def with_values(entry: Any, changes: Mapping[str, float | str]) -> Any:
-    """The entry with other values of declared parameters, by their paths: numbers [SI] or texts with a unit.
-
-    A muscle or law loses what belongs to its own parameters: standard errors, error band and checks. Raises
-    ParameterError for a path or a value that the entry cannot have, UnitError.
-    """
+    """The entry with other values, [SI] or texts, by path; a law loses standard errors, error band and checks."""
     if not changes:
         return entry
     parts = {name: part for name in PARTS if (part := getattr(entry, name, None)) is not None}
@@ -142,15 +138,6 @@ def show(name: Name, variant: EntryRequest, json: Json = False) -> None:
         echo(f"- {source}")
 
 
-class ListRow(NamedTuple):
-    """Name, title, kind and provenance of a library file."""
-
-    name: str
-    title: str
-    kind: str
-    provenance: str
-
-
 def list_entries(json: Json = False) -> None:
     """List muscles, laws, valves, plants, products and data sets.
 
@@ -167,12 +154,12 @@ def list_entries(json: Json = False) -> None:
     """
     rows = _library_rows()
     if json:
-        print_json([row._asdict() for row in rows])
-        return
-    print_table(dict(zip(ListRow._fields, zip(*rows, strict=True), strict=True)))
+        print_json(rows)
+    else:
+        print_table({key: [row[key] for row in rows] for key in rows[0]})
 
 
-def _library_rows() -> list[ListRow]:
+def _library_rows() -> list[dict[str, str]]:
     """All library entries, valves, plants and data sets, read from the files without building any model."""
     kinds: dict[str, Callable[[Mapping[str, Any]], str]] = {
         "muscle or law": _law_kind,
@@ -187,9 +174,9 @@ def _library_rows() -> list[ListRow]:
             kind, provenance = kind_of(tables), tables["provenance"]
             if kind_of is _law_kind and name in data:  # one row with the data set of the same name
                 measured = data.pop(name)
-                kind = f"{kind}; {measured.kind}"
-                provenance = "; ".join(filter(None, dict.fromkeys((provenance, measured.provenance))))
-            rows.append(ListRow(name, tables["title"], kind, provenance))
+                kind = f"{kind}; {measured['kind']}"
+                provenance = "; ".join(filter(None, dict.fromkeys((provenance, measured["provenance"]))))
+            rows.append({"name": name, "title": tables["title"], "kind": kind, "provenance": provenance})
     return [*rows, *data.values()]
 
 
@@ -200,14 +187,14 @@ def _law_kind(tables: Mapping[str, Any]) -> str:
     return f"{'muscle' if is_muscle else 'characteristic'}, {law['model']}"
 
 
-def _data_row(path: Path) -> ListRow:
+def _data_row(path: Path) -> dict[str, str]:
     """Title and provenance from the comments at the top of a data file."""
     with path.open(encoding="utf-8") as file:
         comments = list(itertools.takewhile(lambda line: line.startswith("#"), file))
     text = " ".join(line.lstrip("# ").strip() for line in comments)
     title = comments[0].lstrip("# ").strip() if comments else ""
     provenance = next((word for word in ("secondary source", "measured") if word in text), "")
-    return ListRow(path.stem, title, "data set", provenance)
+    return {"name": path.stem, "title": title, "kind": "data set", "provenance": provenance}
 
 
 Bibtex = Annotated[bool, typer.Option("--bibtex", help="Print BibTeX entries.")]

@@ -66,8 +66,6 @@ def reading_chapters(recordings: Iterable[Recording]) -> list[Chapter]:
     return [Chapter("reading", "Rows left out or filled", "\n\n".join(notes))] if notes else []
 
 
-UNORDERED = ColumnMapping(time=RecordedTime(ordered=False))
-"""Stamps that repeat or decrease are shown, not refused."""
 INSPECTED = "Files, folders or glob patterns: CSV, LVM, Excel, MAT, TDMS, MDF; '-' is text on standard input."
 AnyFiles = Annotated[list[str], argument("FILES", INSPECTED)]
 
@@ -89,13 +87,11 @@ def inspect(files: AnyFiles, reading: ReadingRequest, json: Json = False, out: O
       airmuscle inspect log.mat --column "data(:,1)=time [s]" --column "data(:,2)=pressure [bara]"
       airmuscle inspect runs/*.tdms --mapping rig.toml --json
     """
+    unordered = ColumnMapping(time=RecordedTime(ordered=False))  # stamps that repeat or decrease are shown
     with reading_progress() as progress:
-        recordings = read(files, reading.column_mapping(UNORDERED), progress=progress)
+        recordings = read(files, reading.column_mapping(unordered), progress=progress)
     deliver("inspect", inspection_chapters(inspect_all(recordings)), json=json, out=out, title="Inspection")
 
-
-EVERY_ROW = 2**62
-"""A number of rows that no file has."""
 
 Source = Annotated[str, argument("FILE", "A file, folder or glob pattern, as for inspect.")]
 Target = Annotated[Path, argument("TARGET", f"The file to write: {', '.join(EXTENSIONS)}.")]
@@ -130,7 +126,9 @@ def convert(
         raise typer.BadParameter("--plain belongs to a target that ends in .csv.")
     if target.suffix.lower() not in EXTENSIONS:
         raise FileError(f"{target}: the extension must be one of {', '.join(EXTENSIONS)}.")
-    recordings = read(source, reading.column_mapping(), downsampling=Decimation(request.max_rows or EVERY_ROW))
+    recordings = read(
+        source, reading.column_mapping(), downsampling=Decimation(request.max_rows or 2**62)
+    )  # no file has as many
     print_row_notes(recordings)
     numbered = [target.with_name(f"{target.stem}_{i:03d}{target.suffix}") for i in range(1, len(recordings) + 1)]
     paths, sources = numbered if len(recordings) > 1 else [target], {path.resolve() for path in find_files(source)}

@@ -134,8 +134,7 @@ def print_json(content: Any) -> None:
 
 def print_table(columns: Mapping[str, Sequence[Any]]) -> None:
     """Print a table of all its rows."""
-    table = Table("table", "", columns)
-    for line in table_lines(Table("table", "", columns, brief=len(table)), terminal_width(), ""):
+    for line in table_lines(Table("table", "", columns, brief=sys.maxsize), terminal_width(), ""):
         echo(line)
 
 

@@ -22,7 +22,6 @@ from .interruption import check_interrupted
 from .options import Folder, Json, argument, with_requests
 from .terminal import computation_progress, echo
 
-HISTORY_FILE = "history.csv"
 INDICES: dict[str, type[TrackingIndex]] = {
     "rmse": RootMeanSquareError,
     "iae": IntegralAbsoluteError,
@@ -110,7 +109,7 @@ def tune(
     units = signal_units(scenario_.plant, scenario_.initial_state)
     units = {**units, **{leaf.path: loaded.unit(leaf) for leaf in leaves(controller)}}
     chapter = tuning_chapter(tuning, scenario_.title, units, notes, rules, scenario_.problem.integrator)
-    files = {HISTORY_FILE: lambda path: save_table(history_table(tuning), path)}
+    files = {"history.csv": lambda path: save_table(history_table(tuning), path)}
     if tuning.interrupted:
         echo("interrupted: the best gains so far are written", err=True)
     others = {"scenario": target}

@@ -100,7 +100,10 @@ class Option:
     def convert(self, value: Any, where: str) -> Any:
         """A value as given, a text or what a parser has made of it, as that of the field. Raises InputError."""
         if self.choices:
-            return self._choice(value, where)
+            if value not in self.choices:
+                allowed, similar = ", ".join(filter(None, self.choices)), suggestion(str(value), self.choices)
+                raise RequestError(f"{where} is '{value}'; allowed range: {allowed}.{similar}", self.name)
+            return self.choices[value]
         if self.read is not None:
             return self.read(value, where) if isinstance(value, str) else value
         if self.unit and isinstance(value, str):
@@ -117,14 +120,6 @@ class Option:
         if isinstance(value, int | float) and not isinstance(value, bool) and not low <= value <= high:
             raise RequestError(f"{where} is {value:g}; allowed range: {low:g} to {high:g}.", self.name)
         return value
-
-    def _choice(self, text: Any, where: str) -> Any:
-        if text not in self.choices:
-            allowed = ", ".join(filter(None, self.choices))
-            raise RequestError(
-                f"{where} is '{text}'; allowed range: {allowed}.{suggestion(str(text), self.choices)}", self.name
-            )
-        return self.choices[text]
 
 
 def option(meaning: str, *, default: Any = dataclasses.MISSING, choices: Any = None, **declared: Any) -> Any:
@@ -155,22 +150,19 @@ def request(cls: type[T]) -> type[T]:
 
 def options_of(cls: Any) -> tuple[Option, ...]:
     """The declared fields of a request, in order."""
-    hints = typing.get_type_hints(cls)
-    return tuple(_option(field, hints[field.name]) for field in dataclasses.fields(cls) if _KEY in field.metadata)
-
-
-def _option(field: dataclasses.Field[Any], hint: Any) -> Option:
-    declared = dict(field.metadata[_KEY])
-    default = declared.pop("default")
-    parts = typing.get_args(hint) if isinstance(hint, types.UnionType) else (hint,)
-    kind = next(each for each in parts if each is not type(None))
-    repeated = typing.get_origin(kind) is tuple
-    kind = typing.get_args(kind)[0] if repeated else kind
-    needed = default is dataclasses.MISSING
-    return Option(
-        field.name, kind if kind in (bool, int, float, str, Path) else str, repeated, needed=needed,
-        default=None if needed or default in ((), None) else default, **declared,
-    )  # fmt: skip
+    hints, found = typing.get_type_hints(cls), []
+    for field in (each for each in dataclasses.fields(cls) if _KEY in each.metadata):
+        declared, hint = dict(field.metadata[_KEY]), hints[field.name]
+        default = declared.pop("default")
+        parts = typing.get_args(hint) if isinstance(hint, types.UnionType) else (hint,)
+        kind = next(each for each in parts if each is not type(None))
+        repeated, needed = typing.get_origin(kind) is tuple, default is dataclasses.MISSING
+        kind = typing.get_args(kind)[0] if repeated else kind
+        found.append(Option(
+            field.name, kind if kind in (bool, int, float, str, Path) else str, repeated, needed=needed,
+            default=None if needed or default in ((), None) else default, **declared,
+        ))  # fmt: skip
+    return tuple(found)
 
 
 def form_fields(cls: type[Any]) -> list[dict[str, Any]]:

@@ -47,9 +47,7 @@ def fit_requested(
 ) -> FittedMuscle:  # fmt: skip
     """The fit of the named law, or the recommended one of the comparison, with what else is requested.
 
-    names  of the files of the recordings
-
-    Raises IdentificationError, ParameterError and others of the fit.
+    `names` are those of the files. Raises IdentificationError, ParameterError and others of the fit.
     """
     recordings = list(recordings)
     if request.compare:
@@ -109,8 +107,16 @@ def _more(
     workers: Workers,
 ) -> tuple[Entry, list[Chapter], list[str]]:  # fmt: skip
     """The entry with a constrained surface if one is requested, chapters of further results, and notes."""
-    chapters, notes = list[Chapter](), list[str]()
-    uncertainty = _uncertainty(request, found, recordings, progress, workers)
+    chapters, notes, sample = list[Chapter](), list[str](), None
+    weak = weakly_determined(found) if WEAK in request.profile else ()
+    names = dict.fromkeys((*weak, *(name for name in request.profile if name != WEAK)))
+    if request.bootstrap is not None:
+        report = None if progress is None else lambda fraction: progress("refits", fraction)
+        sample = bootstrap(
+            found, recordings, refits=request.bootstrap, by=request.split, progress=report, workers=workers
+        )
+    profiles = tuple(profile(found, name) for name in names)
+    uncertainty = Uncertainty(found, sample, profiles, WEAK in request.profile and not weak)
     if request.shape:
         if not isinstance(found.model, ContractileSurface):
             raise ParameterError(
@@ -133,21 +139,6 @@ def _more(
         errors = [estimate_length_error(found.model, recordings, name) for name in request.length_error]
         chapters.append(length_error_chapter(errors))
     return entry, chapters, notes
-
-
-def _uncertainty(
-    request: FitRequest, found: Fit, recordings: list[Recording], progress: Progress | None, workers: Workers
-) -> Uncertainty:
-    weak = weakly_determined(found) if WEAK in request.profile else ()
-    names = dict.fromkeys((*weak, *(name for name in request.profile if name != WEAK)))
-    sample = None
-    if request.bootstrap is not None:
-        report = None if progress is None else lambda fraction: progress("refits", fraction)
-        sample = bootstrap(
-            found, recordings, refits=request.bootstrap, by=request.split, progress=report, workers=workers
-        )
-    profiles = tuple(profile(found, name) for name in names)
-    return Uncertainty(found, sample, profiles, WEAK in request.profile and not weak)
 
 
 def _in_one_screen(chapters: Sequence[Chapter]) -> list[Chapter]:

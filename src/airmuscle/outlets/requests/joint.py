@@ -88,10 +88,7 @@ def _mapping(source: Path, request: JointFitRequest) -> EpisodeMapping:
 def fit_requested_arm(
     source: Path, request: JointFitRequest, progress: Callable[[str], None]
 ) -> tuple[Chapter, dict[str, str]]:
-    """The chapter of the fit, and the scenarios and muscle files by the names of their files.
-
-    Raises RequestError without a mapping file, IdentificationError, ParameterError and others of the fit.
-    """
+    """The chapter of the fit, and scenarios and muscles by file. Raises RequestError without a mapping file."""
     rules, title = _mapping(source, request), f"Arm identified from {source.name}"
     episodes = read_episodes(source, rules)
     common: dict[str, Any] = {

@@ -91,21 +91,18 @@ class ReadingRequest:
     def column_mapping(self, default: ColumnMapping = ColumnMapping(), **others: Any) -> ColumnMapping:
         """The mapping of the file, if any, or else `default`; the fields, and the further keys, have precedence.
 
-        Raises FileError and ParameterError for a mapping file that is invalid, and ColumnError for contradictory
-        columns.
+        Raises FileError, ParameterError for an invalid mapping file, and ColumnError for contradictory columns.
         """
         stated = {
             "columns": dict(self.column),
             "units": dict(self.unit),
             "constants": dict(self.constant),
             "missing_codes": self.missing_code or None,
-            **{name: getattr(self, name) for name in _SAME_IN_MAPPING},
+            **{name: value for name, value in vars(self).items() if name not in _TABLES},
             **others,
         }
         return mapping_of_tables(stated, "mapping", read_mapping(self.mapping, default) if self.mapping else default)
 
 
-_SAME_IN_MAPPING = (
-    "resting_length", "ambient", "displacement_zero", "file_name", "time", "skip_rows", "missing", "outliers",
-    "delimiter", "decimal", "sheet", "group",
-)  # fmt: skip
+_TABLES = ("mapping", "column", "unit", "constant", "missing_code")
+"""Fields that are no keys of a mapping file under this name."""

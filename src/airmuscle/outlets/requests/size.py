@@ -11,11 +11,6 @@ from .declaration import RequestError, Where, many, option, optional, request
 
 LIFT, JOINT = ("load", "stroke", "stiffness"), ("torque", "angle", "inertia")
 """Fields of either requirement; the first two are needed."""
-SORTS = (
-    ("air", "air of a cycle"), ("length", "length"), ("count", "number of muscles"), ("reserve", "force reserve"),
-    ("diameter", "diameter"),
-)  # fmt: skip
-"""Criteria of ranking with their names in a form."""
 
 
 def read_load(text: str, where: str) -> dict[str, float]:
@@ -76,7 +71,9 @@ class SizeRequest:
     muscle: tuple[str, ...] = many("Muscle or file instead of the catalogue; repeatable.", metavar="NAME")
     sort: str = option(
         f"Criterion of ranking: {', '.join(SORT_KEYS)}.", choices=SORT_KEYS, default="air", metavar="KEY",
-        label="Rank by", offered=SORTS,
+        label="Rank by",
+        offered=(("air", "air of a cycle"), ("length", "length"), ("count", "number of muscles"),
+                 ("reserve", "force reserve"), ("diameter", "diameter")),
     )  # fmt: skip
 
     def check(self, where: Where) -> None:
