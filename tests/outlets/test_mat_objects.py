@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from airmuscle.bench import ColumnMapping, read
-from airmuscle.bench.readers import MatlabObject, find_objects, mat_objects, read_mat_tables_here
+from airmuscle.bench.readers import MatlabObject, find_objects, mat_contents, read_mat_tables
 from airmuscle.errors import FileError
 
 scipy_io = pytest.importorskip("scipy.io")
@@ -51,8 +51,8 @@ def with_objects(path: Path, objects: dict[str, str], content: dict[str, object]
 @pytest.fixture
 def without_package(monkeypatch):
     """The reader as it is where mat-io is not installed."""
-    known = mat_objects.is_installed
-    monkeypatch.setattr(mat_objects, "is_installed", lambda name: name != "matio" and known(name))
+    known = mat_contents.is_installed
+    monkeypatch.setattr(mat_contents, "is_installed", lambda name: name != "matio" and known(name))
 
 
 @pytest.mark.parametrize("compressed", [False, True])
@@ -82,13 +82,13 @@ def test_a_damaged_file_has_no_objects(tmp_path):
 def test_an_object_alone_is_named_with_the_command_that_exports_it(tmp_path, class_name, export):
     path = with_objects(tmp_path / "run.mat", {"T": class_name}, {})
     with pytest.raises(FileError, match=rf"T is a MATLAB {class_name}\).*{export}"):
-        read_mat_tables_here(path, None)
+        read_mat_tables.__wrapped__(path, None)
 
 
 @pytest.mark.usefixtures("without_package")
 def test_an_object_beside_vectors_is_a_note_and_no_column(tmp_path):
     path = with_objects(tmp_path / "run.mat", {"T": "table"}, {"force_N": FORCE, "pressure_kPa": 10 * FORCE})
-    (table,) = read_mat_tables_here(path, None)
+    (table,) = read_mat_tables.__wrapped__(path, None)
     assert table.headings == ("force_N", "pressure_kPa")
     assert "Not read: T is a MATLAB table." in table.notes[-1]
 

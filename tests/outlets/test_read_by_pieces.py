@@ -93,11 +93,11 @@ def test_the_pieces_of_a_column_give_the_rows_of_the_whole(small_pieces, size, d
 @pytest.mark.parametrize(
     ("name", "write", "reader"),
     [
-        ("run.h5", hdf5, lambda path, d: raw_columnar.read_hdf5_tables_here(path, "/log", d)),
-        ("run.h5", hdf5, lambda path, d: raw_columnar.read_hdf5_tables_here(path, "/", d)),
-        ("run.mat", mat_7_3, lambda path, d: raw_mat.read_mat_tables_here(path, "run", (), d)),
-        ("run.mat", mat_5, lambda path, d: raw_mat.read_mat_tables_here(path, "run", (), d)),
-        ("run.mf4", mdf, lambda path, d: raw_mdf_tdms_ros.read_mdf_tables_here(path, None, d)),
+        ("run.h5", hdf5, lambda path, d: raw_columnar.read_hdf5_tables.__wrapped__(path, "/log", d)),
+        ("run.h5", hdf5, lambda path, d: raw_columnar.read_hdf5_tables.__wrapped__(path, "/", d)),
+        ("run.mat", mat_7_3, lambda path, d: raw_mat.read_mat_tables.__wrapped__(path, "run", (), d)),
+        ("run.mat", mat_5, lambda path, d: raw_mat.read_mat_tables.__wrapped__(path, "run", (), d)),
+        ("run.mf4", mdf, lambda path, d: raw_mdf_tdms_ros.read_mdf_tables.__wrapped__(path, None, d)),
     ],
 )
 def test_a_large_file_gives_every_nth_row_as_measured_with_a_note(tmp_path, small_pieces, name, write, reader):
@@ -155,7 +155,7 @@ def test_lengths_that_the_reduction_would_hide_are_refused(tmp_path):
     with h5py.File(tmp_path / "run.h5", "w") as file:
         file["time_s"], file["force_N"] = TIME[:10_000], FORCE[:9_999]
     with pytest.raises(ColumnError, match=r"different lengths \(9999, 10000 rows\)"):
-        raw_columnar.read_hdf5_tables_here(tmp_path / "run.h5", None, Decimation(1000))
+        raw_columnar.read_hdf5_tables.__wrapped__(tmp_path / "run.h5", None, Decimation(1000))
 
 
 @pytest.mark.parametrize("write", [mat_7_3, mat_5])
@@ -169,11 +169,11 @@ def test_a_damaged_large_file_is_an_error_and_no_crash(tmp_path, write):
 MEASURE = """
 import sys, resource, pathlib
 from airmuscle.bench import Decimation
-from airmuscle.bench.readers.raw_mat import read_mat_tables_here
+from airmuscle.bench.readers.raw_mat import read_mat_tables
 path = pathlib.Path(sys.argv[1])
-read_mat_tables_here(pathlib.Path(sys.argv[2]), None, (), Decimation(1000))
+read_mat_tables.__wrapped__(pathlib.Path(sys.argv[2]), None, (), Decimation(1000))
 before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-(table,) = read_mat_tables_here(path, None, (), Decimation(10_000))
+(table,) = read_mat_tables.__wrapped__(path, None, (), Decimation(10_000))
 print(len(table.rows), resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)
 """
 

@@ -8,14 +8,14 @@ from .header import parse_unit_row as parse_unit_row
 from .mapping import ColumnMapping as ColumnMapping
 from .mapping import mapping_of_tables as mapping_of_tables
 from .mapping import read_mapping as read_mapping
+from .mat_contents import MatlabObject as MatlabObject
+from .mat_contents import find_objects as find_objects
 from .mat_contents import read_contents as read_contents
-from .mat_objects import MatlabObject as MatlabObject
-from .mat_objects import find_objects as find_objects
 from .missing_values import DropMissing as DropMissing
 from .missing_values import InterpolateMissing as InterpolateMissing
 from .missing_values import MissingValues as MissingValues
 from .missing_values import RefuseMissing as RefuseMissing
-from .raw_mat import read_mat_tables_here as read_mat_tables_here
+from .raw_mat import read_mat_tables as read_mat_tables
 from .reader import check_bench as check_bench
 from .reader import read as read
 from .reader import read_csv as read_csv

@@ -20,10 +20,8 @@ MAX_SPECIMENS = 100
 
 
 def split_specimens(table: RawTable) -> tuple[RawTable, ...]:
-    """The tables of the specimens that the column `specimen` names, each with the constant `specimen`.
-
-    The table itself without such a column, or if it has more than `MAX_SPECIMENS` values.
-    """
+    """The tables of the specimens that the column `specimen` names, each with the constant `specimen`; the table itself
+    without such a column, or if it has more than `MAX_SPECIMENS` values."""
     names = [heading.strip().lower() for heading in table.headings]
     if names.count(SPECIMEN) != 1:
         return (table,)
@@ -45,24 +43,21 @@ def label_texts(cells: Cells) -> npt.NDArray[np.str_]:
     return np.array([cell.strip() if isinstance(cell, str) else f"{cell:g}" for cell in cells], dtype=str)
 
 
-CONSTANT_UNITS = {"resting_length": "m", "ambient": "Pa", "ambient_temperature": "K", "displacement_zero": "m"}
-"""The SI units of the constants that have a unit."""
-CONSTANT_QUANTITIES = {
-    "resting_length": "length", "ambient": "pressure", "ambient_temperature": "temperature",
-    "displacement_zero": "length",
-}  # fmt: skip
-"""The quantities of these constants, which have their display units."""
-CONSTANT_RANGES = {
-    "resting_length": (1e-3, 20.0), "ambient": (1e3, 2e5), "ambient_temperature": (200.0, 400.0),
-    "displacement_zero": (-20.0, 20.0),
-}  # fmt: skip
-"""The allowed ranges in SI units, those of the parameters of a geometry and of the ambient air."""
-_NAMES = {
-    "resting_length": ("resting_length", "rest_length", "initial_length", "original_length", "l0", "l_0", "ruhelänge"),
-    "ambient": ("ambient", "ambient_pressure", "atmospheric_pressure", "barometer", "umgebungsdruck", "luftdruck"),
-    "ambient_temperature": ("ambient_temperature", "room_temperature", "umgebungstemperatur", "raumtemperatur"),
-    "displacement_zero": ("displacement_zero",),
+_TABLE = {
+    "resting_length": ("m", "length", (1e-3, 20.0), "rest_length initial_length original_length l0 l_0 ruhelänge"),
+    "ambient": (
+        "Pa",
+        "pressure",
+        (1e3, 2e5),
+        "ambient_pressure atmospheric_pressure barometer umgebungsdruck luftdruck",
+    ),
+    "ambient_temperature": ("K", "temperature", (200.0, 400.0), "room_temperature umgebungstemperatur raumtemperatur"),
+    "displacement_zero": ("m", "length", (-20.0, 20.0), ""),
 }
+"""Of the constants that have a unit: SI unit, quantity, which has its display units, allowed range [SI], that of the
+parameters of a geometry and of the ambient air, and other names."""
+CONSTANT_UNITS = {name: unit for name, (unit, *_) in _TABLE.items()}
+CONSTANT_QUANTITIES = {name: quantity for name, (_, quantity, *_) in _TABLE.items()}
 _WITH_UNIT = re.compile(
     r"(?P<name>.*?)[\s_]*"
     r"(?:\[(?P<square>[^\]]*)\]|\((?P<round>[^)]*)\)|[\s_/](?P<loose>mm|cm|m|kPa|hPa|mbar|bar|Pa))"
@@ -73,10 +68,8 @@ def parse_constant_name(text: str) -> tuple[str, str] | None:
     """Name and unit ('' if not stated) of the constant in a heading; None if it names no constant."""
     match = _WITH_UNIT.fullmatch(text.strip())
     name, unit = (match["name"], match["square"] or match["round"] or match["loose"] or "") if match else (text, "")
-    for constant, names in _NAMES.items():
-        if re.sub(r"[\s-]+", "_", name.strip()).lower() in names:
-            return constant, unit
-    return None
+    word = re.sub(r"[\s-]+", "_", name.strip()).lower()
+    return next(((key, unit) for key, (*_, others) in _TABLE.items() if word in (key, *others.split())), None)
 
 
 def collect_constants(origin: str, stated: Mapping[str, float | str]) -> dict[str, Any]:
@@ -95,8 +88,8 @@ def collect_constants(origin: str, stated: Mapping[str, float | str]) -> dict[st
 
 def check_constants(origin: str, constants: Mapping[str, Any]) -> None:
     """Raise ColumnError for a constant that is not positive, or outside its allowed range."""
-    for name, (low, high) in CONSTANT_RANGES.items():
-        value, unit = constants.get(name, low), CONSTANT_UNITS[name]
+    for name, (unit, _, (low, high), _) in _TABLE.items():
+        value = constants.get(name, low)
         if low > 0 and not value > 0:
             raise ColumnError(f"{origin}: {name} is {value:g} {unit}; it must be positive.")
         if not low <= value <= high:

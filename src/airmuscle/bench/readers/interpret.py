@@ -19,7 +19,7 @@ from .channels import Cells, RawTable
 from .constants import constant_from_column, parse_constant_name
 from .mapping import ColumnMapping
 from .plausibility import check_plausible, check_unique, check_width, without_repeated_columns
-from .time_base import TimeBase, seconds_from_clock
+from .time_base import seconds_from_clock
 
 MAX_QUOTED = 180
 """Maximum number of characters of headings in a message (chosen)."""
@@ -66,7 +66,10 @@ def interpret(table: RawTable, mapping: ColumnMapping, constants: Mapping[str, f
     notes += _add_held(table, columns, held, ambient)
     columns, displaced = headed.displacement_columns(columns, run_constants)
     notes += displaced
-    notes += _apply_time_base(table, columns, mapping.time)
+    if "time" in columns:
+        time, note = mapping.time.apply(table, columns["time"])
+        columns = {name: values for name, values in {**columns, "time": time}.items() if values is not None}
+        notes += [note] if note else []
     check_plausible(table, columns, run_constants.get("resting_length"), ambient, ordered=mapping.time.ordered)
     written = {h.name: h.unit for h in headings if h.known and h.unit and h.name in columns}
     return Recording(columns, table.origin, run_constants, tuple(notes), written)
@@ -97,30 +100,15 @@ def _add_held(table: RawTable, columns: dict[str, Array], held: Mapping[str, flo
     return notes
 
 
-def _apply_time_base(table: RawTable, columns: dict[str, Array], time_base: TimeBase) -> list[str]:
-    """Replace or remove the time column; returns a note if it is changed."""
-    if "time" not in columns:
-        return []
-    time, note = time_base.apply(table, columns["time"])
-    if time is None:
-        del columns["time"]
-    else:
-        columns["time"] = time
-    return [note] if note else []
-
-
 def resolve_headings(table: RawTable, units: Mapping[str, str]) -> list[Heading]:
     """The headings with their units, from the user, the unit row or the heading itself, in this order of precedence."""
     parsed = [Heading(h, h, None, False) if h in table.fields else parse_heading(h) for h in table.headings]
     user_units = {find_quantity_name(key) or key: unit for key, unit in units.items()}
-    keys = [key for heading in parsed for key in (heading.name, heading.text)]
-    for key in user_units:
-        if key not in keys:
-            names = [heading.name for heading in parsed]
-            raise ColumnError(
-                f"{table.origin}: a unit is given for '{key}', but the columns are {listed(names)}."
-                f"{suggestion(key, names)}"
-            )
+    names = [heading.name for heading in parsed]
+    for key in (each for each in user_units if each not in {*names, *(heading.text for heading in parsed)}):
+        raise ColumnError(
+            f"{table.origin}: a unit is given for '{key}', but the columns are {listed(names)}.{suggestion(key, names)}"
+        )
     row = table.units or ()
     headings = []
     for h, below in zip(parsed, [*row, *[""] * (len(parsed) - len(row))], strict=False):
@@ -130,7 +118,14 @@ def resolve_headings(table: RawTable, units: Mapping[str, str]) -> list[Heading]
         headings.append(Heading(h.text, h.name, stated or below or h.unit, h.known))
     check_unique(table, headings)
     if not any(heading.known for heading in headings):
-        raise _no_known_column(table, headings)
+        texts = [heading.text for heading in headings]
+        near = [n for text in texts for n in difflib.get_close_matches(text.lower(), QUANTITIES, n=1)]
+        hint = f" Did you mean '{near[0]}'?" if near else ""
+        raise ColumnError(
+            f"{table.origin}: no column is a known quantity ({listed(texts, MAX_QUOTED)}); known quantities are "
+            f"{', '.join(QUANTITIES)}.{hint}",
+            hint=Hint("To state the number of lines above the headings", "skip_rows", 1, "ColumnMapping"),
+        )
     return headings
 
 
@@ -157,17 +152,6 @@ def _override_notes(table: RawTable, headings: list[Heading]) -> list[str]:
         for h, below in zip(headings, row, strict=False)
         if (unit := below or parse_heading(h.text).unit) and h.unit and unit != h.unit
     ]
-
-
-def _no_known_column(table: RawTable, headings: list[Heading]) -> ColumnError:
-    names = [heading.text for heading in headings]
-    near = [n for name in names for n in difflib.get_close_matches(name.lower(), QUANTITIES, n=1)]
-    hint = f" Did you mean '{near[0]}'?" if near else ""
-    return ColumnError(
-        f"{table.origin}: no column is a known quantity ({listed(names, MAX_QUOTED)}); known quantities are "
-        f"{', '.join(QUANTITIES)}.{hint}",
-        hint=Hint("To state the number of lines above the headings", "skip_rows", 1, "ColumnMapping"),
-    )
 
 
 def _convert_column(table: RawTable, heading: Heading, cells: Cells, ambient: float) -> tuple[Array, str]:
@@ -214,10 +198,7 @@ def unit_conversion(table: RawTable, heading: Heading, ambient: float) -> UnitCo
 def _keep_unknown_column(
     table: RawTable, heading: Heading, cells: Cells, columns: dict[str, Array], unknown: list[str]
 ) -> str:
-    """Keep an unknown numeric column without conversion, and return what there is to say of this column alone, if any.
-
-    A column of which nothing else is known is added to `unknown`, for one note on all.
-    """
+    """Keep an unknown column without conversion; the note on this column alone, without which it is in `unknown`."""
     if isinstance(cells, list):
         return _keep_labels(heading, cells, columns) if any(cells) else ""
     constant = constant_from_column(table, heading.text, heading.unit, cells)

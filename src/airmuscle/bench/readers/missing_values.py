@@ -49,13 +49,7 @@ class ExaminedColumn:
         return f"{self.heading.name} {text}"
 
 
-def examine(table: RawTable, headings: Sequence[Heading], codes: Sequence[float | str]) -> list[ExaminedColumn]:
-    """The columns of known quantities and of constants."""
-    known = [i for i, each in enumerate(headings) if each.known or parse_constant_name(each.text)]
-    return [_examine_column(i, headings[i], table.columns[i], codes) for i in known]
-
-
-def _examine_column(index: int, heading: Heading, cells: Cells, codes: Sequence[float | str]) -> ExaminedColumn:
+def _examined(index: int, heading: Heading, cells: Cells, codes: Sequence[float | str]) -> ExaminedColumn:
     numeric = [number(code) if isinstance(code, str) else code for code in codes]  # NaN equals no cell
     if not isinstance(cells, list):
         missing = np.isnan(cells) | np.isin(cells, numeric)
@@ -78,7 +72,7 @@ def number(cell: str) -> float:
         return math.nan
 
 
-def describe_faulty(table: RawTable, found: Sequence[tuple[int, ExaminedColumn]]) -> str:
+def _describe_faulty(table: RawTable, found: Sequence[tuple[int, ExaminedColumn]]) -> str:
     """The cells with their rows in the file, and what to do."""
     if len(found) == 1:
         ((row, each),) = found
@@ -113,17 +107,28 @@ class MissingValues(abc.ABC):
     def __post_init__(self) -> None:
         check_field_types(self)
 
-    @abc.abstractmethod
     def treat(self, table: RawTable, headings: Sequence[Heading]) -> RawTable:
         """The table with a number or time in each cell of a known quantity. Raises ColumnError, which lists others."""
+        known = [i for i, each in enumerate(headings) if each.known or parse_constant_name(each.text)]
+        cells = [_examined(i, headings[i], table.columns[i], self.codes) for i in known]
+        strict = isinstance(self, RefuseMissing)
+        faulty = [(each, each.bad | each.missing if strict else each.bad) for each in cells]
+        found = [(int(row), each) for each, mask in faulty for row in np.flatnonzero(mask)]
+        if found:
+            found.sort(key=lambda pair: pair[0])
+            raise ColumnError(HintedText(_describe_faulty(table, found), *_remedies(found)))
+        return self.completed(table, cells)
+
+    @abc.abstractmethod
+    def completed(self, table: RawTable, cells: list[ExaminedColumn]) -> RawTable:
+        """The table without missing values, of which the cells of known quantities and of constants were examined."""
 
 
 @dataclasses.dataclass(frozen=True)
 class RefuseMissing(MissingValues):
     """Missing values are an error, which lists them."""
 
-    def treat(self, table: RawTable, headings: Sequence[Heading]) -> RawTable:
-        _refuse(table, examine(table, headings, self.codes), missing=True)
+    def completed(self, table: RawTable, cells: list[ExaminedColumn]) -> RawTable:
         return table
 
 
@@ -131,9 +136,7 @@ class RefuseMissing(MissingValues):
 class DropMissing(MissingValues):
     """Rows with a missing value are left out; a note reports them."""
 
-    def treat(self, table: RawTable, headings: Sequence[Heading]) -> RawTable:
-        cells = examine(table, headings, self.codes)
-        _refuse(table, cells)
+    def completed(self, table: RawTable, cells: list[ExaminedColumn]) -> RawTable:
         return _without_rows(table, np.any([each.missing for each in cells], axis=0)) if cells else table
 
 
@@ -141,15 +144,11 @@ class DropMissing(MissingValues):
 class InterpolateMissing(MissingValues):
     """Missing values are interpolated linearly in time where the gap is short; the other rows are left out.
 
-    A gap is short if the readings before and after it are at most `max_gap` sample times (median steps) apart. Valve
+    A gap is short if the readings before and after it are at most MAX_GAP = 5 sample times (median steps) apart. Valve
     commands, branches and latches keep the value before the gap. Requires time.
     """
 
-    max_gap: float = MAX_GAP
-
-    def treat(self, table: RawTable, headings: Sequence[Heading]) -> RawTable:
-        cells = examine(table, headings, self.codes)
-        _refuse(table, cells)
+    def completed(self, table: RawTable, cells: list[ExaminedColumn]) -> RawTable:
         if not any(each.missing.any() for each in cells):
             return table
         timed = next((each for each in cells if each.heading.name == "time"), None)
@@ -162,7 +161,7 @@ class InterpolateMissing(MissingValues):
         columns, filled, left = list(table.columns), *np.zeros((2, len(time)), dtype=bool)
         for each in cells:
             if each.missing.any():
-                columns[each.index], done = _interpolated(each, time, self.max_gap)
+                columns[each.index], done = _interpolated(each, time)
                 filled, left = filled | done, left | (each.missing & ~done)
         table = dataclasses.replace(table, columns=tuple(columns))
         if (filled & ~left).any():
@@ -182,15 +181,6 @@ def parse_code(code: float | str) -> float | str:
         return float(code)
     except ValueError:
         return str(code).strip()
-
-
-def _refuse(table: RawTable, columns: Sequence[ExaminedColumn], *, missing: bool = False) -> None:
-    """Raise ColumnError for the cells that are no numbers, and with `missing` also for those without a value."""
-    faulty = [(each, each.bad | each.missing if missing else each.bad) for each in columns]
-    found = [(int(row), each) for each, mask in faulty for row in np.flatnonzero(mask)]
-    if found:
-        found.sort(key=lambda pair: pair[0])
-        raise ColumnError(HintedText(describe_faulty(table, found), *_remedies(found)))
 
 
 def _remedies(found: Sequence[tuple[int, ExaminedColumn]]) -> Iterator[Hint]:
@@ -236,7 +226,7 @@ def _with_time(
     return table, cells, time
 
 
-def _interpolated(column: ExaminedColumn, time: Array, max_gap: float) -> tuple[Array, Mask]:
+def _interpolated(column: ExaminedColumn, time: Array) -> tuple[Array, Mask]:
     """The values (N,) with short gaps filled, and the filled rows."""
     values = np.array([number(c) for c in column.cells] if isinstance(column.cells, list) else column.cells)
     known, rows, steps = np.flatnonzero(~column.missing), np.flatnonzero(column.missing), np.diff(time)
@@ -245,7 +235,7 @@ def _interpolated(column: ExaminedColumn, time: Array, max_gap: float) -> tuple[
     inside = (after > 0) & (after < len(known))
     rows, after = rows[inside], after[inside]
     span = time[known[after]] - time[known[after - 1]]
-    short = (span > 0) & (span <= (max_gap + 1e-6) * sample_time)
+    short = (span > 0) & (span <= (MAX_GAP + 1e-6) * sample_time)
     rows, first, last, span = rows[short], known[after - 1][short], known[after][short], span[short]
     share = 0.0 if column.heading.name.rpartition(".")[2] in _HELD else (time[rows] - time[first]) / span
     values[rows] = values[first] + share * (values[last] - values[first])

@@ -24,7 +24,8 @@ class StoredTable(NamedTuple):
     reduction: Reduction
 
 
-def read_parquet_tables_here(path: Path, group: str | None = None) -> tuple[RawTable, ...]:
+@in_separate_process("pyarrow")
+def read_parquet_tables(path: Path, group: str | None = None) -> tuple[RawTable, ...]:
     """Read the table of a Parquet file; the metadata `unit` of a column states its unit, that of the file constants.
 
     A Parquet file has no groups; `group` is not used. Raises FileError or ColumnError.
@@ -42,7 +43,8 @@ def read_parquet_tables_here(path: Path, group: str | None = None) -> tuple[RawT
         return (merge_channels(path.name, channels, constants),)
 
 
-def read_hdf5_tables_here(
+@in_separate_process("h5py")
+def read_hdf5_tables(
     path: Path, group: str | None = None, downsampling: Downsampling = Decimation()
 ) -> tuple[RawTable, ...]:
     """Read one table from each group with vectors, or from the named group; the attribute `unit` states a unit.
@@ -62,10 +64,6 @@ def read_hdf5_tables_here(
     origins = {name: f"{path.name}, group '{name}'" if len(contents) > 1 else path.name for name in contents}
     selected = [each for name, each in contents.items() if group in (None, name)]
     return tuple(t.reduction.noted(merge_channels(origins[t.name], t.channels, t.constants)) for t in selected)
-
-
-read_parquet_tables = in_separate_process("pyarrow", read_parquet_tables_here)
-read_hdf5_tables = in_separate_process("h5py", read_hdf5_tables_here)
 
 
 def check_own_values(h5py: Any, file: Any, path: Path) -> None:

@@ -28,11 +28,10 @@ def read_csv_table(path: str | Path, text_format: TextFormat = TextFormat()) -> 
         raise FileError(f"read_csv: {abridged(path)} is not a path. Pass the name of a file.")
     path = Path(path)
     check_text_file(path)
-    return parse_text(path.name, read_text(path), text_format)
+    return _parse_text(path.name, read_text(path), text_format)
 
 
-def parse_text(origin: str, text: str, text_format: TextFormat) -> RawTable:
-    """The table in a text. Raises FileError or ColumnError."""
+def _parse_text(origin: str, text: str, text_format: TextFormat) -> RawTable:
     header, body = _header_and_body(origin, re.split(r"\r\n|\n|\r", text), text_format)
     return header.table(origin, parse_columns(origin, header, body, text_format), [i for i, _ in body])
 
@@ -45,6 +44,7 @@ def _header_and_body(origin: str, lines: list[str], text_format: TextFormat) -> 
 
 
 def read_text(path: Path) -> str:
+    """The text of a file. Raises FileError."""
     with readable(path):
         content = path.read_bytes()
     if not content.strip():
@@ -78,10 +78,7 @@ def _parse_by_cell(origin: str, header: TextHeader, body: NumberedLines, decimal
                 f"{len(row)}."
                 f"{hint if header.delimiter == ',' else ''} Start lines that are not part of the table with '#'."
             )
-    if decimal is None:
-        _check_decimal_sign(origin, body, rows)
-    else:
-        _check_thousands(origin, body, rows, decimal)
+    _check_decimal_sign(origin, body, rows, decimal)
     return tuple(numbers_if_all([_with_decimal_point(row[i], decimal) for row in rows]) for i in range(width))
 
 
@@ -94,41 +91,33 @@ def _with_decimal_point(cell: str, decimal: str | None) -> str:
     return plain if re.fullmatch(r"[-+]?[\d.]+(?:[eE][-+]?\d+)?", plain) else cell
 
 
-def _check_thousands(origin: str, body: NumberedLines, rows: list[list[str]], decimal: str) -> None:
-    """Raise ColumnError where the sign that is not the stated decimal sign cannot separate thousands, as in `0.5`."""
-    other = COMMA_NUMBER if decimal == "." else POINT_NUMBER
-    wrong = [(i, cell) for i, cell in _cells(body, rows) if other.fullmatch(cell) and not _THOUSANDS.fullmatch(cell)]
-    if wrong:
-        line, cell = wrong[0]
+def _check_decimal_sign(origin: str, body: NumberedLines, rows: list[list[str]], decimal: str | None) -> None:
+    """Raise ColumnError where the sign that is not the stated decimal sign cannot separate thousands, as in `0.5`.
+
+    If none is stated, both signs must not occur: next to `0.5`, the comma in `1,234` may separate thousands.
+    """
+
+    def matching(sign: re.Pattern[str]) -> Iterator[tuple[int, str]]:
+        return ((i, cell) for (i, _), row in zip(body, rows, strict=True) for cell in row if sign.fullmatch(cell))
+
+    other = matching(POINT_NUMBER if decimal == "," else COMMA_NUMBER)
+    found = [(i, cell) for i, cell in other if not (decimal and _THOUSANDS.fullmatch(cell))]
+    if not found:
+        return
+    line, cell = found[0]
+    lines = list(dict.fromkeys(line for line, _ in found))
+    further = f"; there are {len(found)} such cells ({list_rows('line', lines, MAX_LISTED)})" if len(found) > 1 else ""
+    if decimal:
         raise ColumnError(
             f"{origin}, line {line}: '{cell}' contradicts the decimal sign '{decimal}', which is stated: the other "
-            f"sign separates groups of three digits{_further(wrong)}. Correct the decimal sign or the numbers."
+            f"sign separates groups of three digits{further}. Correct the decimal sign or the numbers."
         )
-
-
-def _check_decimal_sign(origin: str, body: NumberedLines, rows: list[list[str]]) -> None:
-    """Raise ColumnError if both signs occur: next to `0.5`, the comma in `1,234` may separate thousands."""
-    commas = [(i, cell) for i, cell in _cells(body, rows) if COMMA_NUMBER.fullmatch(cell)]
-    point = next(((i, cell) for i, cell in _cells(body, rows) if POINT_NUMBER.fullmatch(cell)), None)
-    if commas and point is not None:
-        (line, cell), (other, example) = commas[0], point
+    for point, example in matching(POINT_NUMBER):
         raise ColumnError(
-            f"{origin}, line {line}: the comma in '{cell}' is ambiguous, because line {other} contains a decimal point "
-            f"('{example}'){_further(commas)}. Write all numbers with the same decimal sign and without thousands "
-            "separators.",
+            f"{origin}, line {line}: the comma in '{cell}' is ambiguous, because line {point} contains a decimal point "
+            f"('{example}'){further}. Write all numbers with the same decimal sign and without thousands separators.",
             hint=Hint("To specify the decimal sign", "decimal", ",", function="ColumnMapping"),
         )
-
-
-def _cells(body: NumberedLines, rows: list[list[str]]) -> Iterator[tuple[int, str]]:
-    """All cells with the numbers of their lines."""
-    return ((line, cell) for (line, _), row in zip(body, rows, strict=True) for cell in row)
-
-
-def _further(cells: list[tuple[int, str]]) -> str:
-    """The number of all such cells and their first lines; empty for one."""
-    lines = list(dict.fromkeys(line for line, _ in cells))
-    return f"; there are {len(cells)} such cells ({list_rows('line', lines, MAX_LISTED)})" if len(cells) > 1 else ""
 
 
 LARGE_FILE_BYTES = 32_000_000
@@ -183,7 +172,7 @@ def read_text_stream(
     check_beginning(origin, beginning)
     encoding = form.detect_encoding(beginning)
     if len(beginning) < _HEADER_BYTES:
-        return downsample(parse_text(origin, beginning.decode(encoding, errors="replace"), text_format), downsampling)
+        return downsample(_parse_text(origin, beginning.decode(encoding, errors="replace"), text_format), downsampling)
     first, header = _read_header(origin, beginning, encoding, text_format)
     blocks = itertools.chain([beginning], iter(lambda: stream.read(1 << 20), b""))
     lines = enumerate(_split_lines(codecs.iterdecode(blocks, encoding, errors="replace")), 1)
@@ -239,12 +228,10 @@ def _read_chunks(path: Path, encoding: str, first: int, stride: int, step: int) 
 
 
 def _joined(chunks: list[tuple[Cells, ...]]) -> tuple[Cells, ...]:
-    return tuple(_concatenate(list(parts)) for parts in zip(*chunks, strict=True))
-
-
-def _concatenate(parts: list[Cells]) -> Cells:
-    """One column from its chunks: numbers if all chunks contain numbers, texts otherwise."""
-    numbers = [part for part in parts if not isinstance(part, list)]
-    if len(numbers) == len(parts):
-        return np.concatenate(numbers)
-    return [cell for part in parts for cell in (part if isinstance(part, list) else map(repr, part.tolist()))]
+    """The columns from their chunks: numbers if all chunks contain numbers, texts otherwise."""
+    columns: list[Cells] = []
+    for parts in zip(*chunks, strict=True):
+        numbers = [part for part in parts if not isinstance(part, list)]
+        texts = (part if isinstance(part, list) else map(repr, part.tolist()) for part in parts)
+        columns.append(np.concatenate(numbers) if len(numbers) == len(parts) else list(itertools.chain(*texts)))
+    return tuple(columns)

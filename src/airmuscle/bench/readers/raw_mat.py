@@ -6,6 +6,7 @@ Also supported: a matrix next to a list of column names (`importdata` writes `da
 structure with time that Simulink saves; tables and timetables with the package mat-io.
 """
 
+import inspect
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -15,13 +16,13 @@ import numpy as np
 from ...core import ColumnError, FileError, Hint, alternatives
 from ...recording.columns import parse_heading
 from .channels import Channel, RawTable, merge_channels
-from .mat_contents import is_plain_hdf5, read_contents
-from .mat_objects import READABLE, MatlabObject, find_objects, read_objects
+from .mat_contents import READABLE, MatlabObject, find_objects, is_plain_hdf5, read_contents, read_objects
 from .raw_columnar import read_hdf5_tables
 from .separate_process import in_separate_process, reading
 from .time_base import Decimation, Downsampling, Reduction
 
 
+@in_separate_process("scipy")
 def read_mat_tables(
     path: Path, group: str | None = None, columns: Sequence[str] = (), downsampling: Downsampling = Decimation()
 ) -> tuple[RawTable, ...]:
@@ -30,18 +31,11 @@ def read_mat_tables(
     If the vectors of a struct differ in length, those of the length of the mapped `columns` are read, or without any
     those of the length of the known quantities.
 
-    A file with a variable of more than `downsampling.max_rows` rows is reduced while it is read. The packages for this
-    format are native code, therefore a separate process reads the file.
+    A file with a variable of more than `downsampling.max_rows` rows is reduced while it is read.
     """
     if is_plain_hdf5(path):
-        return read_hdf5_tables(path, group, downsampling)
-    return in_separate_process("scipy", read_mat_tables_here)(path, group, tuple(columns), downsampling)
-
-
-def read_mat_tables_here(
-    path: Path, group: str | None, columns: Sequence[str] = (), downsampling: Downsampling = Decimation()
-) -> tuple[RawTable, ...]:
-    """As `read_mat_tables`, in this process."""
+        plain: tuple[RawTable, ...] = inspect.unwrap(read_hdf5_tables)(path, group, downsampling)
+        return plain
     with reading(path, "MATLAB"):
         contents, objects = read_contents(path, downsampling), find_objects(path)
         tables = read_objects(path, objects)
@@ -108,15 +102,9 @@ def _is_cell(value: Any) -> bool:
 
 
 def _is_array(value: Any) -> bool:
-    return _is_vector(value) or _is_matrix(value)
-
-
-def _is_vector(value: Any) -> bool:
-    return isinstance(value, np.ndarray) and value.ndim == 1 and value.dtype.kind in "biuf" and value.size > 1
-
-
-def _is_matrix(value: Any) -> bool:
-    return isinstance(value, np.ndarray) and value.ndim == 2 and value.dtype.kind in "biuf" and min(value.shape) > 0
+    """Whether a value is a vector of several numbers, or a matrix."""
+    numeric = isinstance(value, np.ndarray) and value.dtype.kind in "biuf"
+    return numeric and (value.size > 1 if value.ndim == 1 else value.ndim == 2 and value.size > 0)
 
 
 def _simulink_signals(fields: Mapping[str, Any]) -> dict[str, Any] | None:
@@ -191,9 +179,9 @@ def _channels(origin: str, fields: Mapping[str, Any]) -> Iterator[Channel]:
     units_field = fields.get("units", fields.get("unit", {}))
     units = units_field if isinstance(units_field, Mapping) else {}
     for name, value in fields.items():
-        if _is_vector(value):
+        if _is_array(value) and value.ndim == 1:
             yield Channel(name, value, unit=str(units.get(name, "")))
-        elif _is_matrix(value):
+        elif _is_array(value):
             names = _column_names(name, value.shape[1], fields)
             yield from (Channel(names[j], value[:, j]) for j in range(value.shape[1]))
         elif isinstance(value, np.ndarray) and value.ndim > 2:

@@ -17,7 +17,8 @@ _TIME_MASTER = 1
 """Type of a master channel that contains time, in both versions of the format."""
 
 
-def read_mdf_tables_here(
+@in_separate_process("asammdf")
+def read_mdf_tables(
     path: Path, group: str | None = None, downsampling: Downsampling = Decimation()
 ) -> tuple[RawTable, ...]:
     """Read one table from all channels, or from the named channel group. Raises FileError or ColumnError.
@@ -35,9 +36,6 @@ def read_mdf_tables_here(
         table = merge_channels(path.name, list(_channels(file, reductions)), {})
         notes = [f"Channel group '{names[i]}': {each.note}" for i, each in reductions.items() if each.note]
         return (table.noted(*notes),)
-
-
-read_mdf_tables = in_separate_process("asammdf", read_mdf_tables_here)
 
 
 def _channels(file: Any, reductions: Mapping[int, Reduction]) -> Iterator[Channel]:

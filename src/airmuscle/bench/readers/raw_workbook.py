@@ -18,7 +18,8 @@ Rows = list[tuple[int, list[Any]]]
 """Non-empty rows of a worksheet with their numbers, counted from 1."""
 
 
-def read_workbook_tables_here(
+@in_separate_process("python_calamine")
+def read_workbook_tables(
     path: Path, sheet: str | None = None, text_format: TextFormat = TextFormat()
 ) -> tuple[RawTable, ...]:
     """Read one table from each worksheet that contains one, or from the named worksheet.
@@ -43,9 +44,6 @@ def read_workbook_tables_here(
         )
     origins = [f"{path.name}, sheet '{name}'" if len(sheets) > 1 else path.name for name in sheets]
     return tuple(_parse_table(*each, text_format) for each in zip(origins, sheets.values(), strict=True))
-
-
-read_workbook_tables = in_separate_process("python_calamine", read_workbook_tables_here)
 
 
 def _parse_table(origin: str, rows: Rows, text_format: TextFormat) -> RawTable:

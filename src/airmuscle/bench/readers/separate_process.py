@@ -4,6 +4,7 @@ import contextlib
 import functools
 import importlib
 import importlib.util
+import inspect
 import threading
 import time
 from collections.abc import Callable, Iterator
@@ -67,22 +68,25 @@ _worker = Worker(quiet=True)
 _lock = threading.Lock()
 
 
-def in_separate_process(package: str, read: Callable[Given, Result]) -> Callable[Given, Result]:
-    """A reader of a module of this package as a function that the separate process evaluates, from a regular file.
+def in_separate_process(package: str) -> Callable[[Callable[Given, Result]], Callable[Given, Result]]:
+    """A decorator of a reader in native code, which the separate process evaluates, from a regular file.
 
     It raises FileError if the package that the reader needs is not installed, or if the file is not regular.
     """
 
-    @functools.wraps(read)
-    def call(*arguments: Given.args, **named: Given.kwargs) -> Result:
-        path: Any = arguments[0]
-        if not is_installed(package):
-            raise _missing_package(package, path)
-        check_regular_file(path)
-        found: Result = call_in_separate_process(read.__module__, read.__name__, path, *arguments[1:])
-        return found
+    def decorated(read: Callable[Given, Result]) -> Callable[Given, Result]:
+        @functools.wraps(read)
+        def call(*arguments: Given.args, **named: Given.kwargs) -> Result:
+            path: Any = arguments[0]
+            if not is_installed(package):
+                raise _missing_package(package, path)
+            check_regular_file(path)
+            found: Result = call_in_separate_process(read.__module__, read.__name__, path, *arguments[1:])
+            return found
 
-    return call
+        return call
+
+    return decorated
 
 
 def call_in_separate_process(module: str, function: str, path: Path, *arguments: Any) -> Any:
@@ -115,7 +119,8 @@ def call_function(seconds: float, module: str, function: str, path: Path, *argum
         size = path.stat().st_size
         _limit(resource.RLIMIT_CPU, time.process_time() + seconds)
         _limit(resource.RLIMIT_AS, MEMORY_LIMIT + MEMORY_FACTOR * size)
-    return getattr(importlib.import_module(module), function)(path, *arguments)
+    reader = inspect.unwrap(getattr(importlib.import_module(module), function))
+    return reader(path, *arguments)
 
 
 def _limit(kind: int, value: float) -> None:

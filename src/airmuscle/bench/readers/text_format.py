@@ -49,7 +49,10 @@ class TextFormat:
     def detect_delimiter(self, line: str) -> str:
         """The given delimiter, otherwise the one detected in a line of the table; blanks only between numbers."""
         sign = next((d for d in "\t;" if d in line), "|" if "|" in line and "," not in line else "")
-        return self.delimiter or sign or (" " if _are_numbers_and_blanks(line) else ",")
+        if self.delimiter or sign:
+            return self.delimiter or sign
+        cells = line.split()
+        return " " if len(cells) > 1 and all(header.is_number(c) and not c.endswith(",") for c in cells) else ","
 
     def with_blanks(self, body: NumberedLines) -> "TextFormat":
         """The format with blanks as the delimiter, if none is given and they separate the first numbers of a table."""
@@ -146,10 +149,8 @@ def parse_header(origin: str, lines: NumberedLines, text_format: TextFormat) -> 
 
 
 def _lines_above_headings(body: NumberedLines, text_format: TextFormat) -> int:
-    """The number of lines above the headings, such as the title and the settings of a logger.
-
-    The headings are where the user states them, else the line of as many cells above the first numbers or unit row.
-    """
+    """The number of lines above the headings, which are where the user states them, else the line of as many cells
+    above the first numbers or unit row."""
     cells_of = ((i, split_cells(line, text_format.detect_delimiter(line))) for i, line in body)
     stated = header.stated_heading_row(cells_of, text_format.named, text_format.skip_rows)
     if stated is not None:
@@ -177,12 +178,6 @@ def _heading_above(rows: list[tuple[str, list[str]]], delimiter: str, width: int
     if len(last) == 2 and header.parse_unit_row(last[0][1], last[1][1]):
         return len(rows) - 2 if max(header.count_cells(cells) for _, cells in last) >= width else None
     return len(rows) - 1 if header.count_cells(last[-1][1]) >= width else None
-
-
-def _are_numbers_and_blanks(line: str) -> bool:
-    """Whether a line consists of two numbers or more between blanks."""
-    cells = line.split()
-    return len(cells) > 1 and all(header.is_number(cell) and not cell.endswith(",") for cell in cells)
 
 
 def _is_numeric(cells: list[str]) -> bool:
