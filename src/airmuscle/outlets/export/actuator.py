@@ -125,7 +125,16 @@ class ActuatorModel:
         """`prepare` and the functions in a language, and the length of c."""
         import casadi
 
-        printer = Printer(dataclasses.replace(language, labels=self._labels))  # type: ignore[type-var]
+        states = [(s.name, s.unit, s.meaning) for s in self.part.states]
+        unit = self.controls[0].unit if self.controls else ""
+        labels = make_labels({
+            "x": states, "y": [(f"next {name}", unit, "") for name, unit, _ in states],
+            "z": [("command", unit, ""), ("length", "m", "of the muscle"), ("speed", "m/s", "of the length")],
+            "q": [("initial pressure", "Pa", "gauge"), ("initial length", "m", "of the muscle")],
+            "o": [("tension", "N", ""), ("pressure", "Pa", "gauge"), ("valid", "", "1 within the validity range")],
+            "p": [(leaf.path, leaf.declared.unit, leaf.declared.meaning) for leaf in self.parameters],
+        })  # fmt: skip
+        printer = Printer(dataclasses.replace(language, labels=labels))  # type: ignore[type-var]
         functions = (("start", self.start, "x"), ("step", self.step_of_time, "y"), ("observe", self.observe, "o"))
         for name, (inputs, result), output in functions:
             printer.add(name, inputs, {output: casadi.cse(casadi.densify(result))}, ["h"] if "h" in inputs else ())
@@ -138,18 +147,6 @@ class ActuatorModel:
         if len(names) == 2:
             return f"{names[0]} where positive, {names[1]} where negative"
         return f"{names[0]}: {self.controls[0].meaning}" if names else "without effect"
-
-    @property
-    def _labels(self) -> Any:
-        states = [(s.name, s.unit, s.meaning) for s in self.part.states]
-        unit = self.controls[0].unit if self.controls else ""
-        return make_labels({
-            "x": states, "y": [(f"next {name}", unit, "") for name, unit, _ in states],
-            "z": [("command", unit, ""), ("length", "m", "of the muscle"), ("speed", "m/s", "of the length")],
-            "q": [("initial pressure", "Pa", "gauge"), ("initial length", "m", "of the muscle")],
-            "o": [("tension", "N", ""), ("pressure", "Pa", "gauge"), ("valid", "", "1 within the validity range")],
-            "p": [(leaf.path, leaf.declared.unit, leaf.declared.meaning) for leaf in self.parameters],
-        })  # fmt: skip
 
 
 def actuator_model(plant: Plant, *, muscle: str = "", step: float | None = None) -> ActuatorModel:

@@ -1,7 +1,6 @@
 """C99 sources of a system: header, source with solver, and main programs that run a scenario or a control loop."""
 
 import csv
-import dataclasses
 import io
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
@@ -21,87 +20,63 @@ PUBLIC = frozenset({"prepare", "rhs", "outputs", "partials", "indicators"})
 """Printed functions that other files may call."""
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class CSource:
-    """The C99 files of one system; `name` is the beginning of every name in them, and the name of the files.
+def c_files(
+    name: str,
+    system: ExportedSystem,
+    integrator: Integrator,
+    provenance: Sequence[str],
+    extend: Extension | None = None,
+) -> dict[str, str]:
+    """The C99 header and source of a system, by file name.
 
-    provenance  lines of the comment at the beginning of each file
+    name        beginning of every name in the files, and their name
+    provenance  lines of the comment at their beginning
+    extend      further functions; those named in PUBLIC can be called by other files
     """
+    upper, known = name.upper(), system.known
+    shapes = {array: tuple(f"{upper}_{size}" for size in sizes) for array, sizes in SHAPES.items()}
+    fields = {field: f"s->{field}" for field in {*STEP.values(), *BETWEEN.values()}}
+    fields |= {"c": "c", "nominal": f"{name}_nominal"} | {key: key.upper() for key in TABLEAU}
+    lengths = {size: f"{upper}_{size}{'' if size in {'STATES', 'STAGES'} else ' + 1'}"
+               for each in SHAPES.values() for size in each}  # fmt: skip
+    solver = SolverText(CKernels(shapes, f"{name}_"), integrator, fields, lengths)
+    functions, sizes = system.printed(CLanguage("double", f"{name}_", PUBLIC), implicit=solver.implicit, extend=extend)
+    numbers = {
+        "states": sizes.states, "inputs": sizes.inputs, "parameters": len(system.tunable), "held": sizes.held,
+        "outputs": sizes.outputs,
+    }  # fmt: skip
+    names = {"state": known.state_names, "input": known.input_names, "output": known.output_names,
+             "parameter": system.paths}  # fmt: skip
+    units = system.units | {leaf.path: leaf.declared.unit for leaf in system.tunable}
+    places = {
+        "provenance": block_comment(provenance), "file": name, "functions": functions,
+        **{key: str(number) for key, number in numbers.items()},
+        "enumerations": "".join(_enumeration(f"{name}_{kind}", each) for kind, each in names.items() if each),
+        **{f"{kind}_names": c_strings(each) for kind, each in names.items()},
+        **{f"{kind}_units": c_strings(units[word] for word in each) for kind, each in names.items()},
+        "defaults": c_values(system.defaults, 1), "nominal": c_values(system.compiled.nominal),
+        "state_minimum": c_values(known.lower_bounds), "input_minimum": c_values(known.input_minimum, 1),
+        "input_maximum": c_values(known.input_maximum, 1),
+        **{key.lower(): c_number(solver.constants[key]) for key in ("FIRST_STEP", "CLOSE")},
+        "solver": _solver_constants(upper, sizes, solver.constants) + filled("solver.c", solver.places, name),
+    }  # fmt: skip
+    return {f"{name}.{end}": filled(f"model.{end}", places, name) for end in "hc"}
 
-    name: str
-    system: ExportedSystem
-    integrator: Integrator
-    provenance: Sequence[str]
-    extend: Extension | None = None
-    """Further functions; those named in PUBLIC can be called by other files."""
 
-    def files(self) -> dict[str, str]:
-        """Contents of the header and of the source, by file name."""
-        language = CLanguage("double", f"{self.name}_", PUBLIC)
-        solver = self._solver()
-        constants = solver.constants
-        functions, sizes = self.system.printed(language, implicit=solver.implicit, extend=self.extend)
-        numbers = {
-            "states": sizes.states, "inputs": sizes.inputs, "parameters": len(self.system.tunable), "held": sizes.held,
-            "outputs": sizes.outputs,
-        }  # fmt: skip
-        places = {
-            "provenance": block_comment(self.provenance), "file": self.name, "enumerations": self._enumerations(),
-            **{key: str(number) for key, number in numbers.items()}, **self._constants(),
-            **{key.lower(): c_number(constants[key]) for key in ("FIRST_STEP", "CLOSE")}, "functions": functions,
-            "solver": self._solver_constants(sizes, constants) + filled("solver.c", solver.places, self.name),
-        }  # fmt: skip
-        return {f"{self.name}.{end}": filled(f"model.{end}", places, self.name) for end in "hc"}
+def _enumeration(prefix: str, names: Sequence[str]) -> str:
+    rows = ",\n".join(f"  {f'{prefix}_{word}'.upper()} = {i}" for i, word in enumerate(make_identifiers(names)))
+    return f"enum {{\n{rows}\n}};\n"
 
-    @property
-    def upper(self) -> str:
-        """Beginning of the macros."""
-        return self.name.upper()
 
-    @property
-    def _kinds(self) -> dict[str, Sequence[str]]:
-        """The names of the elements of the arrays."""
-        known = self.system.known
-        names = known.state_names, known.input_names, known.output_names, self.system.paths
-        return dict(zip(("state", "input", "output", "parameter"), names, strict=True))
-
-    def _enumerations(self) -> str:
-        text = ""
-        for kind, names in self._kinds.items():
-            words = [f"{self.name}_{kind}_{word}".upper() for word in make_identifiers(names)]
-            rows = ",\n".join(f"  {word} = {i}" for i, word in enumerate(words))
-            text += f"enum {{\n{rows}\n}};\n" if words else ""
-        return text
-
-    def _constants(self) -> dict[str, str]:
-        """The elements of the arrays of names, units and numbers, by the places of the template."""
-        known, system = self.system.known, self.system
-        units = system.units | {leaf.path: leaf.declared.unit for leaf in system.tunable}
-        places = {f"{kind}_names": c_strings(names) for kind, names in self._kinds.items()}
-        places |= {f"{kind}_units": c_strings(units[name] for name in names) for kind, names in self._kinds.items()}
-        return places | {
-            "defaults": c_values(system.defaults, 1), "nominal": c_values(system.compiled.nominal),
-            "state_minimum": c_values(known.lower_bounds), "input_minimum": c_values(known.input_minimum, 1),
-            "input_maximum": c_values(known.input_maximum, 1),
-        }  # fmt: skip
-
-    def _solver(self) -> SolverText:
-        shapes = {name: tuple(f"{self.upper}_{size}" for size in sizes) for name, sizes in SHAPES.items()}
-        fields = {name: f"s->{name}" for name in {*STEP.values(), *BETWEEN.values()}}
-        fields |= {"c": "c", "nominal": f"{self.name}_nominal"} | {key: key.upper() for key in TABLEAU}
-        sizes = {size: f"{self.upper}_{size}{'' if size in {'STATES', 'STAGES'} else ' + 1'}"
-                 for each in SHAPES.values() for size in each}  # fmt: skip
-        return SolverText(CKernels(shapes, f"{self.name}_"), self.integrator, fields, sizes)
-
-    def _solver_constants(self, sizes: ArraySizes, constants: Mapping[str, Any]) -> str:
-        tableau = {key: value for key, value in constants.items() if isinstance(value, np.ndarray)}
-        numbers = {"RTOL": c_number(constants["RTOL"]), "JACOBIAN": sizes.jacobian, "FACTORS": sizes.factors}
-        if tableau:
-            numbers["STAGES"] = len(tableau["NODES"])
-        text = "".join(f"#define {self.upper}_{key} {value}\n" for key, value in numbers.items())
-        for key, value in tableau.items():
-            text += f"static double {key}{f'[{len(value)}]' * value.ndim} = {{{c_values(value)}}};\n"
-        return text
+def _solver_constants(upper: str, sizes: ArraySizes, constants: Mapping[str, Any]) -> str:
+    tableau = {key: value for key, value in constants.items() if isinstance(value, np.ndarray)}
+    numbers = {"RTOL": c_number(constants["RTOL"]), "JACOBIAN": sizes.jacobian, "FACTORS": sizes.factors}
+    if tableau:
+        numbers["STAGES"] = len(tableau["NODES"])
+    text = "".join(f"#define {upper}_{key} {value}\n" for key, value in numbers.items())
+    for key, value in tableau.items():
+        text += f"static double {key}{f'[{len(value)}]' * value.ndim} = {{{c_values(value)}}};\n"
+    return text
 
 
 def csv_header(columns: Sequence[str]) -> str:
@@ -125,7 +100,7 @@ def main_program(program: ExportedRun) -> str:
         "provenance": block_comment(program.provenance), "file": name, "valid": filled("valid.c", {}, name),
         "header": c_string(csv_header(columns)), "start": c_number(program.problem.start_time),
         "initial": c_values(program.problem.initial_vector), "times": c_values(program.times),
-        **_signal("", program.segments),
+        **_signal(program.segments),
     }  # fmt: skip
     if loop is None:
         every = program.system.known.column_names
@@ -141,10 +116,10 @@ def main_program(program: ExportedRun) -> str:
     return filled("loop.c" if loop else "main.c", places, name)
 
 
-def _signal(kind: str, signal: PiecewiseLinear) -> dict[str, str]:
+def _signal(signal: PiecewiseLinear, kind: str = "") -> dict[str, str]:
     """The places of the segments of a signal."""
-    tables = {"values": c_values(signal.values, 1), "slopes": c_values(signal.slopes, 1), "ends": c_values(signal.ends)}
-    return {f"{kind}{name}": text for name, text in tables.items()}
+    return {f"{kind}values": c_values(signal.values, 1), f"{kind}slopes": c_values(signal.slopes, 1),
+            f"{kind}ends": c_values(signal.ends)}  # fmt: skip
 
 
 def _loop_places(program: ExportedRun, loop: ExportedLoop) -> dict[str, str]:
@@ -159,7 +134,7 @@ def _loop_places(program: ExportedRun, loop: ExportedLoop) -> dict[str, str]:
         **{key: c_number(loop.numbers[key]) for key in ("sample_time", "near", "finish")},
         "columns_at": c_integers(loop.column_at(known, program.columns)),
         "measured_at": c_integers(loop.measured_at(known)), "commanded": c_integers(loop.prepared.commanded),
-        **_signal("setpoint_", loop.prepared.setpoint_signal),
+        **_signal(loop.prepared.setpoint_signal, "setpoint_"),
         "driver_tables": filled("driver_tables.c", tables, name) if driven else "",
         "apply_drivers": filled("apply_drivers.c", {}, name) if driven else "",
         "kernels": CKernels(_shapes(f"{name.upper()}_INPUTS")).text("driven_inputs", loop.kernels),

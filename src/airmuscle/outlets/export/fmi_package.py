@@ -35,137 +35,6 @@ class FmuExperiment:
     step: float = 0.0
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class FmuDescription:
-    """What modelDescription.xml states of an FMU.
-
-    name       identifier of the model
-    token      text that an importer passes on, so that description and binary belong together
-    dependencies  the value references of the states and inputs on which an unknown depends, by its value reference
-    indicators  number of event indicators
-    sources    C sources next to that of the functions of FMI
-    has_states  whether it has states and derivatives, and can be used in Model Exchange
-    """
-
-    name: str
-    title: str
-    token: str
-    variables: Sequence[Variable]
-    dependencies: Mapping[int, Sequence[int]]
-    indicators: int
-    experiment: FmuExperiment
-    sources: tuple[str, ...] = ()
-    has_states: bool = True
-
-    def units(self, version: int) -> tuple[str, ...]:
-        """The C sources that a compiler is given."""
-        return (f"fmi{version}.c", *self.sources)
-
-    def text(self, version: int) -> str:
-        """The file for FMI 2 or 3."""
-        return xml_text((self._fmi2 if version == 2 else self._fmi3)())
-
-    def terminals(self) -> str:
-        """The file terminalsAndIcons.xml of FMI 3: buses of the signals that plant and controller exchange."""
-        root = Element("fmiTerminalsAndIcons", fmiVersion="3.0")
-        parent = SubElement(root, "Terminals")
-        signals = [v for v in self.variables if v.causality in ("input", "output")]
-        names = {
-            "commands": [v.name for v in signals if (v.causality == "input") == self.has_states],
-            "measurements": [v.name for v in signals if (v.causality == "output") == self.has_states
-                             and not v.name.startswith(SETPOINT)],
-            "setpoints": [v.name for v in signals if v.name.startswith(SETPOINT)],
-        }  # fmt: skip
-        for terminal, members in names.items():
-            if members:
-                bus = SubElement(parent, "Terminal", name=terminal, matchingRule="bus")
-                for name in members:
-                    attributes = {"variableName": name, "memberName": name, "variableKind": "signal"}
-                    SubElement(bus, "TerminalMemberVariable", attributes)
-        return xml_text(root)
-
-    def _root(self, attributes: Mapping[str, str]) -> Element:
-        structured = all(_STRUCTURED.fullmatch(v.name) for v in self.variables)
-        common = {
-            "modelName": self.title, "generationTool": f"airmuscle {metadata.version('airmuscle')}",
-            "license": " ".join(LICENCE), "variableNamingConvention": "structured" if structured else "flat",
-        }  # fmt: skip
-        return Element("fmiModelDescription", {**attributes, **common})
-
-    def _variables(self, root: Element) -> Element:
-        """The element of the variables, after units, categories of messages, and experiment."""
-        add_units(root, [v.unit for v in self.variables])
-        categories, given = SubElement(root, "LogCategories"), self.experiment
-        for name in CATEGORIES:
-            SubElement(categories, "Category", name=name)
-        attributes = {"startTime": given.start, "stopTime": given.stop}
-        attributes |= {key: x for key, x in (("tolerance", given.tolerance), ("stepSize", given.step)) if x}
-        SubElement(root, "DefaultExperiment", {key: repr(float(x)) for key, x in attributes.items()})
-        return SubElement(root, "ModelVariables")
-
-    def _fmi2(self) -> Element:
-        root = self._root({"fmiVersion": "2.0", "guid": self.token, "numberOfEventIndicators": str(self.indicators)})
-        can = {
-            "modelIdentifier": self.name, "canNotUseMemoryManagementFunctions": "true", "canGetAndSetFMUstate": "true",
-            "canSerializeFMUstate": "true",
-        }  # fmt: skip
-        stepping = {"canHandleVariableCommunicationStepSize": "true"}
-        kinds = {"CoSimulation": stepping}
-        if self.has_states:
-            can["providesDirectionalDerivative"] = "true"
-            kinds = {"ModelExchange": {}, "CoSimulation": {**stepping, "canInterpolateInputs": "true"}}
-        for kind, more in kinds.items():
-            files = SubElement(SubElement(root, kind, {**can, **more}), "SourceFiles")
-            for file in self.units(2):
-                SubElement(files, "File", name=file)
-        variables = self._variables(root)
-        for v in self.variables:
-            scalar = SubElement(variables, "ScalarVariable", _kind(v))
-            derivative = {} if v.derivative_of is None else {"derivative": str(v.derivative_of + 1)}
-            SubElement(scalar, "Real", {**_numbers(v), **derivative})
-        structure = SubElement(root, "ModelStructure")
-        for group, references in zip(("Outputs", "Derivatives", "InitialUnknowns"), self._unknowns, strict=True):
-            parent = SubElement(structure, group) if references else structure
-            for reference in references:
-                given = self._dependencies(reference, 1) if group != "InitialUnknowns" else {}
-                SubElement(parent, "Unknown", {"index": str(reference + 1), **given})
-        return root
-
-    def _fmi3(self) -> Element:
-        root = self._root({"fmiVersion": "3.0", "instantiationToken": self.token})
-        can = {"modelIdentifier": self.name, "canGetAndSetFMUState": "true", "canSerializeFMUState": "true"}
-        if self.has_states:
-            can |= {"providesDirectionalDerivatives": "true", "providesAdjointDerivatives": "true"}
-            SubElement(root, "ModelExchange", can)
-        SubElement(root, "CoSimulation", {**can, "canHandleVariableCommunicationStepSize": "true"})
-        variables = self._variables(root)
-        for v in self.variables:
-            derivative = {} if v.derivative_of is None else {"derivative": str(v.derivative_of)}
-            SubElement(variables, "Float64", {**_kind(v), **_numbers(v), **derivative})
-        structure = SubElement(root, "ModelStructure")
-        elements = ("Output", "ContinuousStateDerivative", "InitialUnknown")
-        for element, references in zip(elements, self._unknowns, strict=True):
-            for reference in references:
-                given = self._dependencies(reference, 0) if element != "InitialUnknown" else {}
-                SubElement(structure, element, {"valueReference": str(reference), **given})
-        for v in (each for each in self.variables if each.is_indicator):
-            SubElement(structure, "EventIndicator", valueReference=str(v.reference))
-        return root
-
-    @property
-    def _unknowns(self) -> tuple[list[int], list[int], list[int]]:
-        """The value references of outputs, of rates, and of what is computed at the start."""
-        return (
-            [v.reference for v in self.variables if v.causality == "output"],
-            [v.reference for v in self.variables if v.derivative_of is not None],
-            [v.reference for v in self.variables if v.initial == "calculated"],
-        )
-
-    def _dependencies(self, reference: int, offset: int) -> dict[str, str]:
-        """The states and inputs on which an unknown depends; of a state, itself."""
-        return {"dependencies": " ".join(str(k + offset) for k in sorted(self.dependencies.get(reference, ())))}
-
-
 def xml_text(root: Element) -> str:
     """An element as the text of a file, indented."""
     indent(root)
@@ -187,8 +56,6 @@ def _numbers(v: Variable) -> dict[str, str]:
     attributes = {key: repr(float(x)) for key, x in numbers.items() if x is not None and math.isfinite(x)}
     return ({"unit": v.unit} if has_unit(v.unit) else {}) | attributes
 
-
-# The package
 
 HEADERS = {
     2: ("fmi2FunctionTypes.h", "fmi2Functions.h", "fmi2TypesPlatform.h"),
@@ -214,36 +81,137 @@ class WrittenFmu:
 class FmuPackage:
     """An FMU without its binary.
 
-    provenance  lines of the comment at the beginning of each file
-    sources     C sources and headers by name, without those of the standard
-    adjoint     whether the instance has adjoint derivatives
-    related     inputs.csv and results.csv, data of run.exp and the manifest of FMI-LS-REF 1.0.0-alpha.1; or none
+    name          identifier of the model
+    provenance    lines of the comment at the beginning of each file, of which the first is the title
+    token         text that an importer passes on, so that description and binary belong together
+    dependencies  the value references of the states and inputs on which an unknown depends, by its value reference
+    indicators    number of event indicators
+    sources       C sources and headers by name, without those of the standard and of its functions
+    has_states    whether it has states with derivatives, also adjoint ones, and can be used in Model Exchange
+    related       inputs.csv and results.csv, data of run.exp and the manifest of FMI-LS-REF 1.0.0-alpha.1; or none
     """
 
-    about: FmuDescription
+    name: str
     provenance: Sequence[str]
+    token: str
+    variables: Sequence[Variable]
+    dependencies: Mapping[int, Sequence[int]]
+    indicators: int
+    experiment: FmuExperiment
     sources: Mapping[str, str]
-    adjoint: bool = False
+    has_states: bool = True
     related: Mapping[str, str] = dataclasses.field(default_factory=dict)
+
+    def description(self, fmi: int) -> str:
+        """The file modelDescription.xml."""
+        given, structured = self.experiment, all(_STRUCTURED.fullmatch(v.name) for v in self.variables)
+        tokens = {2: {"guid": self.token, "numberOfEventIndicators": str(self.indicators)},
+                  3: {"instantiationToken": self.token}}  # fmt: skip
+        root = Element("fmiModelDescription", {
+            "fmiVersion": f"{fmi}.0", **tokens[fmi], "modelName": self.provenance[0],
+            "generationTool": f"airmuscle {metadata.version('airmuscle')}", "license": " ".join(LICENCE),
+            "variableNamingConvention": "structured" if structured else "flat",
+        })  # fmt: skip
+        self._add_kinds(root, fmi)
+        add_units(root, [v.unit for v in self.variables])
+        categories = SubElement(root, "LogCategories")
+        for name in CATEGORIES:
+            SubElement(categories, "Category", name=name)
+        attributes = {"startTime": given.start, "stopTime": given.stop}
+        attributes |= {key: x for key, x in (("tolerance", given.tolerance), ("stepSize", given.step)) if x}
+        SubElement(root, "DefaultExperiment", {key: repr(float(x)) for key, x in attributes.items()})
+        variables = SubElement(root, "ModelVariables")
+        for v in self.variables:
+            numbers = _numbers(v)
+            if v.derivative_of is not None:
+                numbers["derivative"] = str(v.derivative_of + (fmi == 2))  # FMI 2.0 counts from 1
+            if fmi == 2:
+                SubElement(SubElement(variables, "ScalarVariable", _kind(v)), "Real", numbers)
+            else:
+                SubElement(variables, "Float64", {**_kind(v), **numbers})
+        self._add_structure(SubElement(root, "ModelStructure"), fmi)
+        return xml_text(root)
+
+    def _add_kinds(self, root: Element, fmi: int) -> None:
+        """The elements of Model Exchange and Co-Simulation, with what the FMU can."""
+        state, stepping = "FMUstate" if fmi == 2 else "FMUState", {"canHandleVariableCommunicationStepSize": "true"}
+        can = {"modelIdentifier": self.name}
+        can |= {"canNotUseMemoryManagementFunctions": "true"} if fmi == 2 else {}
+        can |= {f"canGetAndSet{state}": "true", f"canSerialize{state}": "true"}
+        kinds = {"CoSimulation": stepping}
+        if self.has_states:
+            derivatives = {2: ["Directional"], 3: ["Directional", "Adjoint"]}[fmi]
+            can |= {f"provides{kind}Derivative{'s' if fmi == 3 else ''}": "true" for kind in derivatives}
+            interpolating = {"canInterpolateInputs": "true"} if fmi == 2 else {}
+            kinds = {"ModelExchange": {}, "CoSimulation": {**stepping, **interpolating}}
+        for kind, more in kinds.items():
+            element = SubElement(root, kind, {**can, **more})
+            if fmi == 2:
+                files = SubElement(element, "SourceFiles")
+                for file in self._units(2):
+                    SubElement(files, "File", name=file)
+
+    def _add_structure(self, structure: Element, fmi: int) -> None:
+        """Outputs, rates and what is computed at the start, with the states and inputs on which they depend; a state
+        depends on itself."""
+        unknowns = (
+            ("Outputs", "Output", [v.reference for v in self.variables if v.causality == "output"]),
+            ("Derivatives", "ContinuousStateDerivative",
+             [v.reference for v in self.variables if v.derivative_of is not None]),
+            ("InitialUnknowns", "InitialUnknown", [v.reference for v in self.variables if v.initial == "calculated"]),
+        )  # fmt: skip
+        for group, element, references in unknowns:
+            parent = SubElement(structure, group) if fmi == 2 and references else structure
+            for reference in references:
+                place = {"index": str(reference + 1)} if fmi == 2 else {"valueReference": str(reference)}
+                known = " ".join(str(k + (fmi == 2)) for k in sorted(self.dependencies.get(reference, ())))
+                given = {} if element == "InitialUnknown" else {"dependencies": known}
+                SubElement(parent, "Unknown" if fmi == 2 else element, {**place, **given})
+        for v in self.variables if fmi == 3 else ():
+            if v.is_indicator:
+                SubElement(structure, "EventIndicator", valueReference=str(v.reference))
+
+    def _units(self, fmi: int) -> tuple[str, ...]:
+        """The C sources that a compiler is given."""
+        return (f"fmi{fmi}.c", *(file for file in self.sources if file.endswith(".c")))
+
+    def terminals(self) -> str:
+        """The file terminalsAndIcons.xml of FMI 3: buses of the signals that plant and controller exchange."""
+        root = Element("fmiTerminalsAndIcons", fmiVersion="3.0")
+        parent = SubElement(root, "Terminals")
+        signals = [v for v in self.variables if v.causality in ("input", "output")]
+        names = {
+            "commands": [v.name for v in signals if (v.causality == "input") == self.has_states],
+            "measurements": [v.name for v in signals if (v.causality == "output") == self.has_states
+                             and not v.name.startswith(SETPOINT)],
+            "setpoints": [v.name for v in signals if v.name.startswith(SETPOINT)],
+        }  # fmt: skip
+        for terminal, members in names.items():
+            if members:
+                bus = SubElement(parent, "Terminal", name=terminal, matchingRule="bus")
+                for name in members:
+                    attributes = {"variableName": name, "memberName": name, "variableKind": "signal"}
+                    SubElement(bus, "TerminalMemberVariable", attributes)
+        return xml_text(root)
 
     def files(self, fmi: int) -> dict[str, bytes]:
         """The files by their paths in the FMU."""
-        name, places = self.about.name, {"provenance": block_comment(self.provenance), "file": self.about.name}
-        stated = {"title": html.escape(self.about.title), "lines": html.escape("\n".join(self.provenance))}
+        name, places = self.name, {"provenance": block_comment(self.provenance), "file": self.name}
+        stated = {"title": html.escape(self.provenance[0]), "lines": html.escape("\n".join(self.provenance))}
         page = filled("documentation.html", stated, name)
-        files = {"modelDescription.xml": self.about.text(fmi), "documentation/index.html": page}
+        files = {"modelDescription.xml": self.description(fmi), "documentation/index.html": page}
         texts = {**self.sources, **{file: template(f"fmi/{file}") for file in HEADERS[fmi]}}
         if fmi == 3:  # FMI 2.0 has no terminals
-            places["adjoint"] = filled("adjoint.h", {}, name) if self.adjoint else ""
+            places["adjoint"] = filled("adjoint.h", {}, name) if self.has_states else ""
             texts["fmi3_absent.h"] = filled("fmi3_absent.h", {}, name)
-            sources = "\n".join(f'<SourceFile name="{unit}"/>' for unit in self.about.units(fmi))
+            sources = "\n".join(f'<SourceFile name="{unit}"/>' for unit in self._units(fmi))
             texts["buildDescription.xml"] = filled("buildDescription.xml", {"file": name, "sources": sources}, name)
-            files["terminalsAndIcons/terminalsAndIcons.xml"] = self.about.terminals()
+            files["terminalsAndIcons/terminalsAndIcons.xml"] = self.terminals()
         texts[f"fmi{fmi}.c"] = filled(f"fmi{fmi}.c", places, name)
         files |= {f"sources/{file}": text for file, text in texts.items()}
         if self.related:
-            span = {key: repr(value) for key, value in dataclasses.asdict(self.about.experiment).items()}
-            run = filled("run.exp", {**span, "title": html.escape(self.about.title)}, name)
+            span = {key: repr(value) for key, value in dataclasses.asdict(self.experiment).items()}
+            run = filled("run.exp", {**span, "title": html.escape(self.provenance[0])}, name)
             texts = {**self.related, "run.exp": run, "fmi-ls-manifest.xml": template("fmi-ls-manifest.xml")}
             files |= {f"extra/org.fmi-standard.fmi-ls-ref/{file}": text for file, text in texts.items()}
         return {file: text.encode("utf-8", "replace") for file, text in files.items()}
@@ -251,12 +219,12 @@ class FmuPackage:
     def content(self, fmi: int, binary: bool, platforms: Sequence[Platform]) -> tuple[bytes, list[str], str]:
         """The bytes of the FMU, the folders of its binaries, and why there are none; without platforms the binary is
         that of this machine, if it can be compiled. Raises ParameterError and FileError."""
-        files, name, folders = self.files(fmi), self.about.name, list[str]()
+        files, name, folders = self.files(fmi), self.name, list[str]()
         remark = "" if binary else "none was requested"
         sources = {file.removeprefix("sources/"): text for file, text in files.items() if file.startswith("sources/")}
         for target in (platforms or [this_platform()]) if binary else ():
             try:
-                library = target.compile(sources, self.about.units(fmi), name)
+                library = target.compile(sources, self._units(fmi), name)
             except ParameterError as reason:
                 if platforms:
                     raise

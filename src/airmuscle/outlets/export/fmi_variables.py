@@ -67,7 +67,7 @@ class Variables(list[Variable]):
                 raise ParameterError(
                     f"the FMU would have two variables '{name}'; rename the muscle or signal of this name."
                 )
-        return list(map(_stated, self))
+        return [_stated(each) for each in self]
 
 
 def make_variables(program: ExportedRun, indicators: int, starts: Mapping[str, float]) -> list[Variable]:

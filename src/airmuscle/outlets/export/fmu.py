@@ -12,10 +12,10 @@ from ...engine.compile.functions import Printer
 from ...engine.run import Problem, solve
 from ...physics.plant.diagnostics import describe_limit
 from ...physics.plant.plant import Plant
-from .c_source import CSource, csv_text
+from .c_source import c_files, csv_text
 from .compiler import Platform
 from .exported_run import ExportedRun
-from .fmi_package import FmuDescription, FmuExperiment, FmuPackage, WrittenFmu, check_target, token_of, write_archive
+from .fmi_package import FmuExperiment, FmuPackage, WrittenFmu, check_target, token_of, write_archive
 from .fmi_variables import has_unit, make_variables, references_of
 from .identifiers import c_number, c_string, c_strings, c_values, filled
 from .printed_system import acting_parameters
@@ -51,8 +51,7 @@ def write_fmu(
     file on one machine and compiler. Raises ParameterError for what cannot be exported, which it names, and FileError.
     """
     target = check_target(path, fmi)
-    package = fmu_package(problem, fmi, name, title, tunable)
-    package = replace(package, related=_reference(problem))
+    package = replace(fmu_package(problem, fmi, name, title, tunable), related=_reference(problem))
     return write_archive(target, *package.content(fmi, binary, platforms))
 
 
@@ -89,7 +88,7 @@ def fmu_package(
         derivatives.extend(printer)
         indicators.extend(printer)
 
-    source = CSource(program.name, program.system, program.integrator, program.provenance, extend).files()
+    source = c_files(program.name, program.system, program.integrator, program.provenance, extend)
     starts = _start_pressures(program, derivatives)
     variables = make_variables(program, indicators.count if fmi == 3 else 0, {s.column: s.pressure for s in starts})
     token = token_of(*source.values(), *variables, fmi)
@@ -99,12 +98,11 @@ def fmu_package(
         unknown, known = references_of(program.system.known, place)
         dependencies.setdefault(unknown, []).append(known)
     experiment = FmuExperiment(problem.start_time, float(program.times[-1]), program.tolerance or 1e-6)
-    about = FmuDescription(
-        program.name, program.provenance[0], token, variables, dependencies, indicators.count, experiment,
-        (f"{program.name}.c",),
-    )  # fmt: skip
     instance = filled("instance.h", _instance(program, derivatives, indicators, token, starts), program.name)
-    return FmuPackage(about, program.provenance, {**source, f"{program.name}_instance.h": instance}, adjoint=True)
+    return FmuPackage(
+        program.name, program.provenance, token, variables, dependencies, indicators.count, experiment,
+        {**source, f"{program.name}_instance.h": instance},
+    )  # fmt: skip
 
 
 class StartPressure(NamedTuple):

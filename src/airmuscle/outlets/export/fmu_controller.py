@@ -13,7 +13,7 @@ from ...engine.run.sampled_loop import SampledLoop, prepare_loop
 from ...recording.columns import column_units
 from . import fmi_package
 from .compiler import Platform
-from .fmi_package import FmuDescription, FmuExperiment, FmuPackage, WrittenFmu, archive, check_target, token_of
+from .fmi_package import FmuExperiment, FmuPackage, WrittenFmu, archive, check_target, token_of
 from .fmi_variables import Variable, Variables, base_powers, has_unit
 from .fmu import fmu_package
 from .identifiers import block_comment, c_number, c_values, filled, program_name
@@ -53,12 +53,19 @@ def controller_package(problem: Problem, fmi: int, name: str = "", title: str = 
     token = token_of(*variables, *printed.source_files().values(), fmi)
     outputs = [v.reference for v in variables if v.causality == "output"]
     known = [v.reference for v in variables if v.causality == "input"]
-    about = FmuDescription(
-        chosen, printed.provenance[0], token, variables, dict.fromkeys(outputs, known), 0,
-        FmuExperiment(problem.start_time, float(prepared.instants[-1]), step=loop.sample_time), has_states=False,
+    experiment = FmuExperiment(problem.start_time, float(prepared.instants[-1]), step=loop.sample_time)
+    bounds = [leaf.declared.bounds for leaf in printed.tunable]
+    places = printed.places | {
+        "provenance": block_comment(printed.provenance), "token": token, "period": c_number(loop.sample_time),
+        "start": c_number(problem.start_time), "start_inputs": c_values(start, 1),
+        "lowest": c_values([low for low, _ in bounds], 1), "highest": c_values([high for _, high in bounds], 1),
+        "functions": printed.sample_in(CLanguage("double", f"{chosen}_")),
+    }  # fmt: skip
+    sources = {f"{chosen}_instance.h": filled("controller_instance.h", places, chosen)}
+    return FmuPackage(
+        chosen, printed.provenance, token, variables, dict.fromkeys(outputs, known), 0, experiment, sources,
+        has_states=False,
     )  # fmt: skip
-    instance = _instance(printed, token, problem.start_time, loop.sample_time, start)
-    return FmuPackage(about, printed.provenance, {f"{chosen}_instance.h": instance})
 
 
 def _variables(problem: Problem, printed: PrintedController, prepared: SampledLoop) -> list[Variable]:
@@ -85,18 +92,6 @@ def _first_row(problem: Problem) -> dict[str, float]:
     short = dataclasses.replace(problem, duration=min(problem.duration, loop.sample_time), output_times=None)
     recording = solve(short).raise_if_incomplete().recording
     return {name: float(recording[name][0]) for name in recording}
-
-
-def _instance(printed: PrintedController, token: str, start: float, sample_time: float, inputs: Sequence[float]) -> str:
-    """The C source of an instance."""
-    name, bounds = printed.name, [leaf.declared.bounds for leaf in printed.tunable]
-    places = printed.places | {
-        "provenance": block_comment(printed.provenance), "token": token, "period": c_number(sample_time),
-        "start": c_number(start), "start_inputs": c_values(inputs, 1),
-        "lowest": c_values([low for low, _ in bounds], 1), "highest": c_values([high for _, high in bounds], 1),
-        "functions": printed.sample_in(CLanguage("double", f"{name}_")),
-    }  # fmt: skip
-    return filled("controller_instance.h", places, name)
 
 
 def write_ssp(
@@ -127,18 +122,18 @@ def write_ssp(
     files, folders, remark = dict[str, bytes](), list[str](), ""
     for part, package in packages.items():
         files[f"resources/{part}.fmu"], folders, remark = package.content(fmi, binary, platforms)
-    files["SystemStructure.ssd"] = _structure(base, {part: p.about for part, p in packages.items()}).encode()
+    files["SystemStructure.ssd"] = _structure(base, packages).encode()
     return fmi_package.write_archive(target, archive(files, "SystemStructure.ssd"), folders, remark)
 
 
-def _structure(name: str, parts: dict[str, FmuDescription]) -> str:
+def _structure(name: str, parts: dict[str, FmuPackage]) -> str:
     """The file SystemStructure.ssd of a plant and a controller."""
     described = {"xmlns:ssd": STRUCTURE, "xmlns:ssc": COMMON, "version": "1.0", "name": name}
     root = Element("ssd:SystemStructureDescription", described)
     system = SubElement(root, "ssd:System", name=name)
     inside = {
-        part: {v.name: v for v in about.variables if v.causality in ("input", "output")}
-        for part, about in parts.items()
+        part: {v.name: v for v in package.variables if v.causality in ("input", "output")}
+        for part, package in parts.items()
     }
     joined = [
         (a, signal, b) for a, b in (("plant", "controller"), ("controller", "plant"))

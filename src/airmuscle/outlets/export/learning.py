@@ -27,48 +27,6 @@ OPSET, IR_VERSION = 17, 8
 """Versions of the operators and of the format: ONNX Runtime reads them from 1.12 on."""
 
 
-def onnx_models(actuator: "ExportedActuator", single: bool, *, tunable: bool, substeps: int) -> dict[str, bytes]:
-    """The graphs NAME_start.onnx and NAME.onnx; a step of dt is divided into so many steps of the integrator.
-
-    tunable  whether the parameters (P, 1) or (P, count) are an input; otherwise they are constants
-
-    Raises AirmuscleError without the package onnx.
-    """
-    name, model = actuator.name, actuator.model
-    try:
-        import onnx
-    except ImportError:
-        raise AirmuscleError("an ONNX graph needs the package 'onnx'; pip install airmuscle[learning].") from None
-    start, begun = _Graph(), ("pressure", "length")
-    start.append(*model.start, {"q": dict(enumerate(begun))}, "x")
-    step, driven = _Graph(), ("command", "length", "speed")
-    rows = dict(enumerate(driven))
-    step.append(*model.observe, {"z": rows}, "o")
-    step.nodes.append(("Div", ("dt", step.constant(float(substeps))), "h"))
-    for k in range(substeps):
-        moved = step.node("Mul", step.constant(float(k)), step.node("Mul", "h", "speed"))
-        at = step.node("Add", "length", moved) if k else "length"
-        step.append(*model.step_of_time, {"z": {**rows, 1: at}}, "y")
-        step.results["x"] = step.results.pop("y")
-    observed = step.results["o"]
-    valid = step.node("Greater", observed[2], step.constant(0.5))
-    rows_out = {"tension": observed[0], "pressure": observed[1], "valid": valid}
-    given = ("state", *driven, "dt")
-    models = {
-        f"{name}_start.onnx": _model(onnx, start, model, single, tunable, begun, {"state": "x"}, {}),
-        f"{name}.onnx": _model(onnx, step, model, single, tunable, given, {"next_state": "x"}, rows_out),
-    }
-    low, high = model.command_range
-    facts = {
-        "title": actuator.title, "provenance": "\n".join(actuator.provenance), "step": repr(model.step),
-        "command": f"{low!r} to {high!r}", "states": ", ".join(s.name for s in model.part.states),
-        "parameters": ", ".join(leaf.path for leaf in model.parameters),
-    }  # fmt: skip
-    for each in models.values():
-        onnx.helper.set_model_props(each, facts)
-    return {file: each.SerializeToString() for file, each in models.items()}
-
-
 class _Graph(GraphBody):
     """The nodes of a model; its arrays are the states and the parameters."""
 
@@ -200,8 +158,39 @@ class OnnxStack(Stack):
     """Steps of the integrator in a step of the graph."""
 
     def files(self, actuator: ExportedActuator) -> dict[str, str | bytes]:
-        single = self.precision == Single()
-        return dict(onnx_models(actuator, single, tunable=self.tunable, substeps=self.substeps))
+        """The graphs NAME_start.onnx and NAME.onnx. Raises AirmuscleError without the package onnx."""
+        name, model, single = actuator.name, actuator.model, self.precision == Single()
+        try:
+            import onnx
+        except ImportError:
+            raise AirmuscleError("an ONNX graph needs the package 'onnx'; pip install airmuscle[learning].") from None
+        start, begun = _Graph(), ("pressure", "length")
+        start.append(*model.start, {"q": dict(enumerate(begun))}, "x")
+        step, driven = _Graph(), ("command", "length", "speed")
+        rows = dict(enumerate(driven))
+        step.append(*model.observe, {"z": rows}, "o")
+        step.nodes.append(("Div", ("dt", step.constant(float(self.substeps))), "h"))
+        for k in range(self.substeps):
+            moved = step.node("Mul", step.constant(float(k)), step.node("Mul", "h", "speed"))
+            at = step.node("Add", "length", moved) if k else "length"
+            step.append(*model.step_of_time, {"z": {**rows, 1: at}}, "y")
+            step.results["x"] = step.results.pop("y")
+        observed = step.results["o"]
+        valid = step.node("Greater", observed[2], step.constant(0.5))
+        rows_out, given = {"tension": observed[0], "pressure": observed[1], "valid": valid}, ("state", *driven, "dt")
+        low, high = model.command_range
+        facts = {
+            "title": actuator.title, "provenance": "\n".join(actuator.provenance), "step": repr(model.step),
+            "command": f"{low!r} to {high!r}", "states": ", ".join(s.name for s in model.part.states),
+            "parameters": ", ".join(leaf.path for leaf in model.parameters),
+        }  # fmt: skip
+        models = {
+            f"{name}_start.onnx": _model(onnx, start, model, single, self.tunable, begun, {"state": "x"}, {}),
+            f"{name}.onnx": _model(onnx, step, model, single, self.tunable, given, {"next_state": "x"}, rows_out),
+        }
+        for each in models.values():
+            onnx.helper.set_model_props(each, facts)
+        return {file: each.SerializeToString() for file, each in models.items()}
 
 
 def write_actuator(

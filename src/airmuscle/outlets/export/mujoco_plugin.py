@@ -15,7 +15,7 @@ from ...engine.run.integrators import Rodas4
 from ...physics.mechanism import HangingMass
 from ...physics.plant import Plant, open_plant
 from .actuator import control_range, controls_of, single_muscle
-from .c_source import CSource
+from .c_source import c_files
 from .compiler import compile_library
 from .identifiers import block_comment, c_integers, c_number, c_strings, filled, program_name, provenance
 from .printed_system import export_system
@@ -186,7 +186,7 @@ def _sources(part: Plant, name: str, controls: Sequence[Input], lines: Sequence[
         "rest_length": c_number(part.muscles[0].geometry.resting_length),
         "attributes": str(len(own) + 1), "first": str(places[0]), "second": str(places[1]),
     }  # fmt: skip
-    texts = CSource(name, system, Rodas4(TOLERANCE), lines).files()
+    texts = c_files(name, system, Rodas4(TOLERANCE), lines)
     texts[f"{name}_plugin.c"] = filled("mujoco_plugin.c", values, name)
     return {file: text.encode() for file, text in texts.items()}
 

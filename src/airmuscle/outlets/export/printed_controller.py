@@ -13,7 +13,6 @@ from ...engine.compile.ir import emission
 from ...engine.compile.ir.emission import TargetLanguage
 from ...engine.compile.ir.instructions import Code, instructions
 from ...engine.compile.ir.interpreter import InterpretedBody
-from ...engine.compile.text.body import Labels
 from ...engine.compile.text.languages import CLanguage
 from ...engine.run.compiled_law import trace_sample
 from ...engine.run.sampled_loop import SampledLoop
@@ -65,8 +64,11 @@ class PrintedController:
         """The places of a header: numbers of memories, measurements and so on, enumerations, provenance."""
         keys = ("memory", "measurements", "setpoints", "commands", "parameters")
         counts = {key: str(len(names)) for key, names in zip(keys, self._kinds.values(), strict=True)}
+        rows = {kind: enumerate(make_identifiers(names)) for kind, names in self._kinds.items() if names}
+        words = [[f"{self.name}_{kind}_{word}".upper() + f" = {i}" for i, word in row] for kind, row in rows.items()]
+        enumerations = "".join(f"enum {{ {', '.join(each)} }};\n" for each in words)
         return counts | {
-            "provenance": block_comment(self.provenance), "file": self.name, "enumerations": self._enumerations(),
+            "provenance": block_comment(self.provenance), "file": self.name, "enumerations": enumerations,
             "number": self.number, "initial_memory": c_values(self.initial_memory, 1, self.number),
             "parameter_values": c_values(self.defaults, 1, self.number), "parameter_names": c_strings(self.paths),
         }  # fmt: skip
@@ -79,13 +81,6 @@ class PrintedController:
     def sample_in(self, language: TargetLanguage) -> str:
         """The function of a sample in another language; its arguments are measurement, set point, memory, parameters,
         and the arrays of the command and of the later memory, which MATLAB returns."""
-        printer = Printer(dataclasses.replace(language, labels=self._labels))  # type: ignore[type-var]
-        printer.add_code("sample", list(self.inputs), self.code, list(self.outputs))
-        return printer.text[-1]
-
-    @property
-    def _labels(self) -> Labels:
-        """Names of the elements of the arrays of a sample."""
         law = self.law
         names = {
             "measurement": law.measured_columns, "setpoint": [f"{name} set point" for name in law.setpoints],
@@ -94,7 +89,10 @@ class PrintedController:
         }  # fmt: skip
         rows = {array: [(name, "", "") for name in each] for array, each in names.items()}
         of_law = [(leaf.path, leaf.declared.unit, leaf.declared.meaning) for leaf in self.tunable]
-        return make_labels({**rows, "parameters": of_law})
+        labels = make_labels({**rows, "parameters": of_law})
+        printer = Printer(dataclasses.replace(language, labels=labels))  # type: ignore[type-var]
+        printer.add_code("sample", list(self.inputs), self.code, list(self.outputs))
+        return printer.text[-1]
 
     def files(self, measured: Array, setpoints: Array, commands: Array) -> dict[str, str]:
         """Header, source and the program that replays measurements (K, m), set points (K, s) and commands (K, c) of a
@@ -149,12 +147,6 @@ class PrintedController:
             "MEMORY": tuple(self.law.initial_memory), "MEASUREMENT": self.law.measured_columns,
             "SETPOINT": self.law.setpoints, "COMMAND": self.law.inputs, "PARAMETER": self.paths,
         }  # fmt: skip
-
-    def _enumerations(self) -> str:
-        """The numbers of the elements of the arrays."""
-        rows = {kind: enumerate(make_identifiers(names)) for kind, names in self._kinds.items() if names}
-        words = [[f"{self.name}_{kind}_{word}".upper() + f" = {i}" for i, word in row] for kind, row in rows.items()]
-        return "".join(f"enum {{ {', '.join(each)} }};\n" for each in words)
 
     def replay(self, measured: Array, setpoints: Array, *, single: bool = False) -> Array:
         """The commands (K, c) to measurements (K, m) and set points (K, s), from the printed instructions themselves.

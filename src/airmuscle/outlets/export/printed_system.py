@@ -49,21 +49,17 @@ class ExportedSystem:
         self, language: TargetLanguage, *, implicit: bool = True, extend: Extension | None = None
     ) -> tuple[str, ArraySizes]:
         """The functions `prepare`, `rhs` and `outputs` of arrays; with `implicit` also those of a Rosenbrock step."""
-        language = dataclasses.replace(language, labels=self._labels)  # type: ignore[type-var]
-        return system_module(self.traced, language, extend, implicit=implicit)
-
-    @property
-    def _labels(self) -> Labels:
-        """Names, units and meanings of the elements of the arrays of the printed functions."""
         states, inputs = self.compiled.system.states, self.compiled.system.input_variables
         units, outputs = self.units, self.known.output_names
-        return make_labels({
+        labels = make_labels({
             "x": [(s.name, s.unit, s.meaning) for s in states], "u": [(i.name, i.unit, i.meaning) for i in inputs],
             "o": [(name, units[name], meaning_of(name)) for name in outputs],
             "p": [(leaf.path, leaf.declared.unit, leaf.declared.meaning) for leaf in self.tunable],
             "f": [(f"{s.name}_rate", per_second(s.unit), "") for s in states],
             "w": [(f"{i.name}_slope", per_second(i.unit), "") for i in inputs],
         })  # fmt: skip
+        language = dataclasses.replace(language, labels=labels)  # type: ignore[type-var]
+        return system_module(self.traced, language, extend, implicit=implicit)
 
 
 def meaning_of(output: str) -> str:
