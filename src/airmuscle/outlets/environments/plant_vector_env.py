@@ -96,7 +96,13 @@ class PlantVectorEnv(gymnasium.vector.VectorEnv):  # type: ignore[misc, unused-i
             self._begin(np.flatnonzero(chosen))
             self._over[chosen] = False
             return self._observed()[0], {}
-        self._seed(seed)
+        if seed is not None or not self._generators:
+            first = int(np.random.SeedSequence().generate_state(1)[0]) if seed is None else seed
+            seeds = [first + i for i in range(self.num_envs)] if isinstance(first, int) else list(first)
+            if len(seeds) != self.num_envs:
+                raise ParameterError(f"there are {len(seeds)} seeds for {self.num_envs} plants; give one for each.")
+            self._generators = [seeding.np_random(one)[0] for one in seeds]
+            self._drawn[:] = False
         filling = np.arange(self.num_envs, self._plants.blocks * self._plants.width)  # the last block
         self._place(filling, *self._draw.begin(np.full((1, self._draw.dimension), 0.5)))
         self._begin(np.arange(self.num_envs))
@@ -151,18 +157,6 @@ class PlantVectorEnv(gymnasium.vector.VectorEnv):  # type: ignore[misc, unused-i
     def close_extras(self, **options: Any) -> None:
         """End the threads."""
         self._plants.close()
-
-    def _seed(self, seed: int | list[int | None] | None) -> None:
-        """Generators of all plants."""
-        if seed is None and self._generators:
-            return
-        if seed is None:
-            seed = int(np.random.SeedSequence().generate_state(1)[0])
-        seeds = [seed + i for i in range(self.num_envs)] if isinstance(seed, int) else list(seed)
-        if len(seeds) != self.num_envs:
-            raise ParameterError(f"there are {len(seeds)} seeds for {self.num_envs} plants; give one for each.")
-        self._generators = [seeding.np_random(one)[0] for one in seeds]
-        self._drawn[:] = False
 
     def _begin(self, plants: npt.NDArray[np.intp]) -> None:
         """Begin an episode of these plants, and compute the outputs of all."""

@@ -2,13 +2,13 @@
 
 import abc
 import dataclasses
+import itertools
 import math
 import re
 from collections.abc import Mapping
 from typing import Any, TypeVar
 
 import numpy as np
-import numpy.typing as npt
 
 from ...bench.identify.prediction import PlantUncertainty
 from ...core import Array, ParameterError, ShortRepr, abridged, check_field_types, one_line, suggestion, tree
@@ -17,7 +17,7 @@ from ...engine.run.integrators import RungeKutta4
 from ...files.library.uncertainty import ParameterUncertainty
 from ...files.scenario.plant_uncertainty import SEPARATOR, parameter_uncertainty
 from ...physics.plant import Plant
-from .task import EnvironmentTask, check_actions
+from .task import EnvironmentTask
 
 T = TypeVar("T")
 _LAW = "characteristic"
@@ -64,16 +64,13 @@ class UniformRange(Randomisation):
     def dimension(self) -> int:
         return 1
 
-    def _draw(self, uniform: Array) -> Array:
-        return np.asarray(self.low + (self.high - self.low) * uniform)
-
 
 @dataclasses.dataclass(frozen=True)
 class ValueRange(UniformRange):
     """A value [SI], uniformly distributed from `low` to `high`; all paths take the same value."""
 
     def values(self, nominal: Array, uniform: Array) -> Array:
-        return np.repeat(self._draw(uniform), nominal.size, axis=1)
+        return np.repeat(self.low + (self.high - self.low) * uniform, nominal.size, axis=1)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -81,7 +78,7 @@ class FactorRange(UniformRange):
     """A factor of the nominal values, uniformly distributed from `low` to `high`; all paths take the same factor."""
 
     def values(self, nominal: Array, uniform: Array) -> Array:
-        return nominal * self._draw(uniform)
+        return nominal * (self.low + (self.high - self.low) * uniform)
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
@@ -173,7 +170,7 @@ class EpisodeDraw:
                 f"the randomisation is {one_line(randomisations)}; give a tuple, such as "
                 "(FactorRange(('plant.mechanism.inertia',), 0.8, 1.2),)."
             )
-        check_actions(task.actions)
+        _ = task.actions  # checks them
         leaves = list(tree.leaves(task))
         self.task, self._nominal, self._randomisations = task, tree.flatten(task), randomisations
         self._low, self._high = (np.array([leaf.declared.bounds[i] for leaf in leaves]) for i in (0, 1))
@@ -182,22 +179,19 @@ class EpisodeDraw:
         self._varied = np.concatenate([*self._places, np.empty(0, dtype=np.intp)])
         for index in np.flatnonzero(np.bincount(self._varied, minlength=1) > 1):
             raise ParameterError(f"randomisation: '{leaves[index].path}' is varied twice; name it once.")
-        for r, at in zip(randomisations, self._places, strict=True):
-            if not isinstance(r, FitUncertainty):
-                self._check_limits(r, at, [leaf.path for leaf in leaves])
-        self.dimension = sum(r.dimension for r in randomisations) + len(task.initial_ranges)
-        """Number of uniform numbers D that an episode takes."""
-        self.begin(np.full((1, self.dimension), 0.5))  # raises for an initial state that is impossible
-
-    def _check_limits(self, r: Randomisation, at: npt.NDArray[np.intp], paths: list[str]) -> None:
-        for end in (0.0, 1.0):
+        for (r, at), end in itertools.product(zip(randomisations, self._places, strict=True), (0.0, 1.0)):
+            if isinstance(r, FitUncertainty):
+                continue
             values = r.values(self._nominal[at], np.full((1, r.dimension), end))[0]
             for value, i in zip(values, at, strict=True):
                 if not self._low[i] <= value <= self._high[i]:
                     raise ParameterError(
-                        f"randomisation: '{paths[i]}' would be {value:.4g}; allowed range: {self._low[i]:.4g} to "
+                        f"randomisation: '{leaves[i].path}' would be {value:.4g}; allowed range: {self._low[i]:.4g} to "
                         f"{self._high[i]:.4g}."
                     )
+        self.dimension = sum(r.dimension for r in randomisations) + len(task.initial_ranges)
+        """Number of uniform numbers D that an episode takes."""
+        self.begin(np.full((1, self.dimension), 0.5))  # raises for an initial state that is impossible
 
     def begin(self, uniform: Array) -> tuple[Array, Array]:
         """Parameters (R, P) and initial states (R, n) from uniform numbers (R, D) in [0, 1); a normal draw is limited

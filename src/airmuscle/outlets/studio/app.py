@@ -130,37 +130,33 @@ class Handlers:
 
     def __init__(self, sheets: Sheets, access: Access, opened: tuple[dict[str, Any], ...]) -> None:
         self._sheets, self._access, self._opened = sheets, access, opened
-        self._web, self._page, self._library = web_files(), server_page(), library_list()
+        from starlette import responses
+
+        self._web, self._page, self._library, self._responses = web_files(), server_page(), library_list(), responses
         for sheet in opened:
             sheets.keep(sheet)
 
     async def page(self, request: Any) -> Any:
         """The page; a token in its address becomes a cookie, so that it does not stay in the address."""
-        from starlette.responses import HTMLResponse, RedirectResponse
-
         if cookie := self._access.cookie(request.scope):
-            answer = RedirectResponse("/", status_code=303)
+            answer = self._responses.RedirectResponse("/", status_code=303)
             answer.set_cookie(**cookie)
             return answer
-        return HTMLResponse(self._page)
+        return self._responses.HTMLResponse(self._page)
 
     async def web(self, request: Any) -> Any:
         """A file of the page."""
-        from starlette.responses import Response
-
         kind, text = self._web.get(request.path_params["name"], ("", ""))
         if not kind:
             raise BadRequest("there is no such file.", 404)
-        return Response(text, media_type=kind)
+        return self._responses.Response(text, media_type=kind)
 
     async def program(self, request: Any) -> Any:
         """The printed program of a sheet."""
-        from starlette.responses import Response
-
         sheet = self._sheets.get(request.path_params["name"].removesuffix(".js"))
         if sheet is None:
             raise BadRequest("this program is no longer kept; reload the page.", 404)
-        return Response(sheet["script"], media_type="text/javascript")
+        return self._responses.Response(sheet["script"], media_type="text/javascript")
 
     async def library(self, request: Any) -> Any:
         """Names of the library, and the sheets with which the page begins."""
@@ -193,24 +189,18 @@ class Handlers:
         return json_answer(_without_script(await run_in_threadpool(function, *arguments)))
 
     async def save_page(self, request: Any) -> Any:
-        """One file of what is on the screen: the request names the sheets and the state of the page."""
-        from starlette.responses import Response
-
-        names, state = _page_request(await limited_table(request, MAX_PAGE))
+        """One file of what is on the screen, without fits: the request names the sheets and the state of the page."""
+        wanted = await limited_table(request, MAX_PAGE)
+        names, state = wanted.get("sheets"), wanted.get("state")
+        if not isinstance(state, dict) or not isinstance(names, list) or not all(isinstance(n, str) for n in names):
+            raise BadRequest("the request must contain sheets, a list of identifiers, and a state.")
+        if not 1 <= len(names) <= MAX_PAGE_SHEETS:
+            raise BadRequest(f"{len(names)} sheets are requested; allowed range: 1 to {MAX_PAGE_SHEETS}.")
         sheets = [sheet for sheet in map(self._sheets.get, names) if sheet is not None]
         if len(sheets) < len(names):
             raise BadRequest("a program is no longer kept; reload the page.", 404)
-        return Response(self_contained_page(sheets, state), media_type="text/html")
-
-
-def _page_request(wanted: Mapping[str, Any]) -> tuple[list[str], dict[str, Any]]:
-    """The identifiers of sheets and the state in a request for a page, without that of fits. Raises BadRequest."""
-    names, state = wanted.get("sheets"), wanted.get("state")
-    if not isinstance(state, dict) or not isinstance(names, list) or not all(isinstance(name, str) for name in names):
-        raise BadRequest("the request must contain sheets, a list of identifiers, and a state.")
-    if not 1 <= len(names) <= MAX_PAGE_SHEETS:
-        raise BadRequest(f"{len(names)} sheets are requested; allowed range: 1 to {MAX_PAGE_SHEETS}.")
-    return names, {name: tab for name, tab in state.items() if name != "fit"}
+        shown = {name: tab for name, tab in state.items() if name != "fit"}
+        return self._responses.HTMLResponse(self_contained_page(sheets, shown))
 
 
 def _without_script(sheet: Mapping[str, Any]) -> dict[str, Any]:

@@ -104,24 +104,20 @@ def read_settings(data: Any) -> FitSettings:
     entry, leave_out = (_text(data.get(name, ""), name) for name in ("entry", "leave_out"))
     hysteresis = data.get("hysteresis") is True
     settings = FitSettings(texts, columns, facts, tuple(map(_rule, rules)), entry, leave_out, hysteresis)
-    _check(settings)
-    return settings
-
-
-def _check(settings: FitSettings) -> None:
     for name in QUANTITIES:
-        if settings.texts.get(name):
-            _check_quantity(settings.texts[name], name, name)
+        if texts.get(name):
+            _check_quantity(texts[name], name, name)
     _ = settings.braid  # checks it
-    for file, facts in settings.facts.items():
-        for name in (each for each in facts if each in QUANTITIES):
-            _check_quantity(facts[name], name, f"file:{file}")
-    if settings.entry and settings.entry not in list_laws():
-        raise RequestError(f"the library has no muscle or law '{settings.entry}'.", "entry")
-    if settings.leave_out not in SPLITS:
+    for file, stated in facts.items():
+        for name in (each for each in stated if each in QUANTITIES):
+            _check_quantity(stated[name], name, f"file:{file}")
+    if entry and entry not in list_laws():
+        raise RequestError(f"the library has no muscle or law '{entry}'.", "entry")
+    if leave_out not in SPLITS:
         allowed = ", ".join(filter(None, SPLITS))
-        raise RequestError(f"'{settings.leave_out}' is no group; allowed: {allowed}.", "leave_out")
+        raise RequestError(f"'{leave_out}' is no group; allowed: {allowed}.", "leave_out")
     settings.mapping()
+    return settings
 
 
 def _check_quantity(text: str, name: str, field: str) -> None:
@@ -173,7 +169,12 @@ def _facts(file: str, value: Any) -> dict[str, str]:
 def _rule(value: Any) -> Rule:
     try:
         recordings = tuple(_text(origin, "rules") for origin in value.get("recordings", []))
-        ranges = {_text(name, "rules"): _interval(each) for name, each in value.get("ranges", {}).items()}
+        ranges = {}
+        for name, limits in value.get("ranges", {}).items():
+            low, high = map(float, limits)
+            if not -math.inf < low <= high < math.inf:
+                raise ValueError
+            ranges[_text(name, "rules")] = low, high
         rows = value.get("rows")
         if rows is not None:
             first, stop = rows
@@ -189,40 +190,24 @@ def _rule(value: Any) -> Rule:
         ) from None
 
 
-def _interval(value: Any) -> tuple[float, float]:
-    low, high = (float(limit) for limit in value)
-    if not (math.isfinite(low) and math.isfinite(high) and low <= high):
-        raise ValueError
-    return low, high
-
-
 # What the rules leave of a recording
 
 Mask = npt.NDArray[np.bool_]
-
-
-def inside(rule: Rule, recording: am.Recording) -> Mask:
-    """The rows of a recording that a rule describes, shape (N,)."""
-    mask = np.full(len(recording), rule.rows is None)
-    if rule.rows is not None:
-        mask[slice(*rule.rows)] = True
-        return mask
-    for name, (low, high) in rule.ranges.items():
-        if name not in recording:
-            text = f"{recording.origin}: no column '{name[:40]}', which a selection of rows names."
-            raise RequestError(text, "rules")
-        mask &= (recording[name] >= low) & (recording[name] <= high)
-    return mask
 
 
 def used_rows(recording: am.Recording, rules: Sequence[Rule], outliers: Sequence[Outlier] = ()) -> Mask:
     """The rows of a recording that the rules leave, without outliers, shape (N,). Raises RequestError for an unknown
     column."""
     used = kept_rows(recording, outliers)
-    for rule in rules:
-        if not rule.recordings or recording.origin in rule.recordings:
-            rows = inside(rule, recording)
-            used &= rows if rule.keep else ~rows
+    for rule in (each for each in rules if not each.recordings or recording.origin in each.recordings):
+        inside = np.full(len(recording), rule.rows is None)
+        inside[slice(*(rule.rows or (0, 0)))] = True
+        for name, (low, high) in rule.ranges.items() if rule.rows is None else ():
+            if name not in recording:
+                text = f"{recording.origin}: no column '{name[:40]}', which a selection of rows names."
+                raise RequestError(text, "rules")
+            inside &= (recording[name] >= low) & (recording[name] <= high)
+        used &= inside if rule.keep else ~inside
     return used
 
 

@@ -62,21 +62,19 @@ class UploadStore:
         """The identifier of a new set; idle ones that are not needed make room. Raises BadRequest if none is idle."""
         with self._lock:
             if len(self._used) >= MAX_SETS:
-                self._remove_idle(is_needed)
+                latest = time.monotonic() - MAX_IDLE
+                filled = {name: any((self._top() / name / FILES).iterdir()) for name in self._used}
+                idle = [n for n, used in self._used.items() if (used < latest or not filled[n]) and not is_needed(n)]
+                if not idle:
+                    text = f"the server keeps {MAX_SETS} sets of files, and all are in use; try again later."
+                    raise BadRequest(text, 503)
+                oldest = min(idle, key=lambda name: (filled[name], self._used[name]))
+                shutil.rmtree(self._top() / oldest, ignore_errors=True)
+                del self._used[oldest]
             identifier = secrets.token_urlsafe(16)
-            self._files(identifier).mkdir(parents=True, mode=0o700)
+            (self._top() / identifier / FILES).mkdir(parents=True, mode=0o700)
             self._used[identifier] = time.monotonic()
         return identifier
-
-    def _remove_idle(self, is_needed: IsNeeded) -> None:
-        latest = time.monotonic() - MAX_IDLE
-        filled = {name: any(self._files(name).iterdir()) for name in self._used}
-        idle = [n for n, used in self._used.items() if (used < latest or not filled[n]) and not is_needed(n)]
-        if not idle:
-            raise BadRequest(f"the server keeps {MAX_SETS} sets of files, and all are in use; try again later.", 503)
-        oldest = min(idle, key=lambda name: (filled[name], self._used[name]))
-        shutil.rmtree(self._top() / oldest, ignore_errors=True)
-        del self._used[oldest]
 
     def folder(self, identifier: str) -> Path:
         """The folder of a set. Raises BadRequest if it is not kept."""
@@ -119,9 +117,6 @@ class UploadStore:
         """Remove all files."""
         if self._root is not None:
             shutil.rmtree(self._root, ignore_errors=True)
-
-    def _files(self, identifier: str) -> Path:
-        return self._top() / identifier / FILES
 
     def _top(self) -> Path:
         """A folder that only this user can read; those of servers that were killed are removed before it is made."""

@@ -22,7 +22,7 @@ import numpy as np
 import airmuscle as am
 
 from ...core import ParameterError, leaves, tree
-from ...design.control_benchmark import STANDARD_TASKS, ControlTask
+from ...design.control_benchmark import STANDARD_TASKS
 from ...engine.compile import Printer, compile_system
 from ...engine.compile.kernel_text import JavaScriptKernels
 from ...engine.compile.text.languages import JavaScriptLanguage
@@ -60,15 +60,24 @@ def sheet_of_joint(name: str) -> dict[str, Any]:
     controllers = joint_controllers(plant, statics)
     measured = tuple(dict.fromkeys(column for each in controllers for column in each.law.measured_columns))
     rows = ",\n".join(f"{json.dumps(key)}: {text}" for key, text in _programs(plant, controllers, measured).items())
+    angles = np.linspace(*statics.angle_range, REGION_ANGLES)
+    region = {"angle": angles} | dict(zip(("least", "greatest"), statics.stiffness_limits(angles), strict=True))
+    taut = np.isfinite(list(region.values())).all(axis=0)  # both muscles, without a load
     script, old, valves = sheet.pop("script"), sheet.pop("id"), valve_set(plant)
     script += f'airmusclePrograms["{old}"].joint = {{\n{rows}\n}};\n'
     sheet |= {
         "tab": "joint", **{key: str(tables.get(key, "")) for key in ("provenance", "note", "warning")},
         "parameters": [{**row, "path": row["path"].replace(".inner.", ".")} for row in sheet["parameters"]],
         "measured": list(measured), "pressure_range": list(statics.pressure_range),
-        "controllers": [_controller_row(each) for each in controllers], "region": _reachable_region(statics),
+        "controllers": [_controller_row(each) for each in controllers],
+        "region": {key: values[taut].tolist() for key, values in region.items()},
         "pair": list(PAIR), "offsets": valves.offsets, "regulated": valves.inner is None,
-        "switching": valves.switching, "tasks": [_task_row(task) for task in STANDARD_TASKS if task.stuck is None],
+        "switching": valves.switching, "tasks": [
+            {"name": each.name, "motion": {"kind": type(each.motion).__name__, **dataclasses.asdict(each.motion)},
+             "duration": each.duration, "begin": each.begin, "torque": list(map(list, each.torque)),
+             "stiffening": list(map(list, each.stiffening))}
+            for each in STANDARD_TASKS if each.stuck is None
+        ],
     }  # fmt: skip
     sheet["id"] = identifier_of(sheet, script)
     return {**sheet, "script": script.replace(old, sheet["id"])}
@@ -80,15 +89,6 @@ def joint_tables(tables: Mapping[str, Any]) -> dict[str, Any]:
     plant["mechanism"] = {"model": "JointWithExternalTorque", "inner": plant["mechanism"]}
     kept = {key: tables[key] for key in TABLES if key in tables and key not in ("plant", "input", "run")}
     return {**kept, "plant": plant, "input": {}, "run": {"duration": DURATION, "initial_state": run["initial_state"]}}
-
-
-def _reachable_region(statics: am.physics.JointStatics) -> dict[str, list[float]]:
-    """Minimum and maximum stiffness [N m/rad] at angles [rad] without a load, where both muscles are taut."""
-    angles = np.linspace(*statics.angle_range, REGION_ANGLES)
-    least, greatest = statics.stiffness_limits(angles)
-    inside = np.isfinite(least) & np.isfinite(greatest)
-    return {key: values[inside].tolist() for key, values in
-            (("angle", angles), ("least", least), ("greatest", greatest))}  # fmt: skip
 
 
 def _programs(plant: am.Plant, controllers: tuple[JointController, ...], measured: tuple[str, ...]) -> dict[str, str]:
@@ -122,15 +122,6 @@ def _controller_row(controller: JointController) -> dict[str, Any]:
         "balance": controller.balance, "bias": f"{prefix}{controller.bias}" if controller.bias else "",
         "gains": [{**dataclasses.asdict(gain), "path": f"{prefix}{gain.path}", "bounds": bounds[gain.path]}
                   for gain in controller.gains],
-    }  # fmt: skip
-
-
-def _task_row(task: ControlTask) -> dict[str, Any]:
-    """A task of the control benchmark as plain data."""
-    return {
-        "name": task.name, "motion": {"kind": type(task.motion).__name__, **dataclasses.asdict(task.motion)},
-        "duration": task.duration, "begin": task.begin, "torque": list(map(list, task.torque)),
-        "stiffening": list(map(list, task.stiffening)),
     }  # fmt: skip
 
 

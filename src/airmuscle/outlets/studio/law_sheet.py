@@ -70,12 +70,17 @@ def law_sheet(entry: Entry) -> dict[str, Any]:
     if parameter_model(law, geometry) is not law:
         rows += [(f"geometry.{leaf.path}", leaf) for leaf in leaves(geometry)]
     limits, fixed = validity_range_of(law, entry.validity_range), bool(errors) or len(rows) > MAX_PARAMETERS
+    parameters = [] if fixed else [parameter_row(path, leaf, entry.provenance) for path, leaf in rows]
+    known = entry.uncertainty
+    stated = {} if known is None else dict(zip(known.parameters, known.standard_errors, strict=True))
+    for row in parameters:
+        row["standard_error"] = stated.get(row["path"], stated.get(row["path"].removeprefix("characteristic.")))
     sheet: dict[str, Any] = {
         **{key: getattr(entry, key) for key in ("name", "title", "provenance", "note", "warning")},
         "law": kind.__name__, "formula": (kind.__doc__ or "").strip().partition("\n")[0],
         "kind": next(method for form, method, *_ in FORMS if isinstance(law, form)),
         "functions": functions, "held": held, "limits": [float(limit) for limit in _limits(law)],
-        "values": [leaf.value for _, leaf in rows], "parameters": [] if fixed else _parameter_rows(rows, entry),
+        "values": [leaf.value for _, leaf in rows], "parameters": parameters,
         "resting_length": next((i for i, (path, _) in enumerate(rows) if path.endswith("resting_length")), None),
         "validity_range": None if limits is None else dataclasses.asdict(limits),
         "ratings": {name: getattr(ratings, name) for name in (ratings.stated if ratings else ())},
@@ -128,15 +133,6 @@ def parameter_row(path: str, leaf: Leaf, source: str) -> dict[str, Any]:
         "shown_unit": "" if shown == unit == "1" else shown,
         "factor": 1.0 if shown == unit else conversion(shown, unit).factor, "source": source,
     }  # fmt: skip
-
-
-def _parameter_rows(rows: list[tuple[str, Leaf]], entry: Entry) -> list[dict[str, Any]]:
-    known = entry.uncertainty
-    errors = {} if known is None else dict(zip(known.parameters, known.standard_errors, strict=True))
-    table = [parameter_row(path, leaf, entry.provenance) for path, leaf in rows]
-    for row in table:
-        row["standard_error"] = errors.get(row["path"], errors.get(row["path"].removeprefix("characteristic.")))
-    return table
 
 
 def _geometry_sheet(geometry: am.geometry.Geometry, printed: bool) -> dict[str, Any]:

@@ -91,16 +91,6 @@ def close_one_of(connections: Any) -> None:
     (min(waiting, key=lambda each: each.since) if waiting else max(kept, key=lambda each: each.since)).transport.abort()
 
 
-def check_packages() -> None:
-    """Raise InputError with the install command if a package of the server is missing."""
-    missing = [name for name in PACKAGES if importlib.util.find_spec(name) is None]
-    if missing:
-        raise InputError(
-            f"the studio needs {' and '.join(missing)}. Install them: pip install starlette uvicorn. A page "
-            "without a server needs neither: airmuscle studio NAME --export page.html"
-        )
-
-
 def access_of(host: str) -> Access:
     """The rules of access: a token for all, and the names of this machine alone if the server is reached only there.
 
@@ -175,7 +165,11 @@ def serve(host: str, port: int, opened: tuple[dict[str, Any], ...], started: Cal
 
     Raises InputError if a package is missing or the address cannot be used.
     """
-    check_packages()
+    if missing := [name for name in PACKAGES if importlib.util.find_spec(name) is None]:
+        raise InputError(
+            f"the studio needs {' and '.join(missing)}. Install them: pip install starlette uvicorn. A page "
+            "without a server needs neither: airmuscle studio NAME --export page.html"
+        )
     import uvicorn
 
     access, listening = access_of(host), bound_socket(host, port)

@@ -163,21 +163,15 @@ def read_request(text: str) -> dict[str, str]:
 
 
 def _choice(choice: am.design.MuscleChoice) -> dict[str, Any]:
-    """A choice with its chart and its scenario, or the reason why it has none."""
+    """A choice with its scenario, or the reason why it has none, and its chart: isobars of one muscle, its capacity,
+    the load and both end points; contractions as ratios, forces in N."""
     try:
         scenario, reason = am.design.scenario_text(choice), ""
     except AirmuscleError as error:
         scenario, reason = "", str(error.message)
-    radius = choice.design.radius
+    entry, muscle, design, radius = choice.entry, choice.muscle, choice.design, choice.design.radius
     of_radius = "" if radius is None else f", pulley radius {1e3 * radius:.4g} mm"
     label = f"{choice.total_count} × {product_of(choice)}, {1e3 * choice.length:.4g} mm{of_radius}"
-    name, chart = choice.entry.name, _chart(choice)
-    return {"name": name, "label": label, "chart": chart, "scenario": scenario, "reason": reason}
-
-
-def _chart(choice: am.design.MuscleChoice) -> dict[str, Any]:
-    """Isobars of one muscle, its capacity, the load and both end points; contractions as ratios, forces in N."""
-    entry, muscle, design = choice.entry, choice.muscle, choice.design
     curves = compute_isobars(entry.characteristic, validity_range_of(entry.characteristic, entry.validity_range))
     grid = np.linspace(*muscle.contraction_range, POINTS)
     points = [point._asdict() for point in (design.extended, design.contracted)]
@@ -187,12 +181,13 @@ def _chart(choice: am.design.MuscleChoice) -> dict[str, Any]:
         contractions = design.extended.contraction + displacement / choice.length
         shown = {"contractions": _rounded(contractions), "forces": _rounded(load / choice.count),
                  "factor": choice.conditions.safety_factor}  # fmt: skip
-    return {
+    chart = {
         "pressures": curves.pressures.tolist(), "contractions": _rounded(curves.contractions),
         "forces": [_rounded(row) for row in curves.forces],
         "capacity": {"contractions": _rounded(grid), "forces": _rounded(muscle.capacity(grid))},
         "points": [{key: float(value) for key, value in point.items()} for point in points], "load": shown,
     }  # fmt: skip
+    return {"name": entry.name, "label": label, "chart": chart, "scenario": scenario, "reason": reason}
 
 
 def _rounded(values: Array) -> list[float | None]:

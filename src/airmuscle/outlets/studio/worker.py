@@ -4,13 +4,12 @@ A task that exceeds its limit of time is ended with its process; the next task s
 never read in the process of the server.
 """
 
-import contextlib
 import queue
 import sys
 import threading
 import time
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 from ...core import AirmuscleError, InputError, printable
@@ -18,8 +17,6 @@ from ...engine.processes import START_LIMIT, Report, Worker, WorkerError
 
 MEMORY = 4 * 2**30
 """Largest data memory of a worker [bytes] (chosen); it is not limited on Windows and macOS."""
-
-
 Task = Callable[..., Any]
 
 
@@ -111,11 +108,6 @@ class WorkerPool:
     def call(self, task: Task, *arguments: Any, limit: float) -> Any:
         """The result of a task in a free worker. Raises what it raises, LimitError after `limit` [s]."""
         end = time.monotonic() + limit
-        with self._borrowed(limit) as worker:
-            return worker.call(task, arguments, max(0.1, end - time.monotonic()))
-
-    @contextlib.contextmanager
-    def _borrowed(self, limit: float) -> Iterator[LimitedWorker]:
         if self._free.empty():
             self.prepare()
         try:
@@ -124,7 +116,7 @@ class WorkerPool:
             raise LimitError("all workers of the studio are occupied; try again later.") from None
         self.prepare()
         try:
-            yield worker
+            return worker.call(task, arguments, max(0.1, end - time.monotonic()))
         finally:
             self._free.put(worker)
 
