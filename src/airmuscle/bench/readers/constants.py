@@ -108,10 +108,8 @@ def check_stated(origin: str, stated: Mapping[str, float | str]) -> None:
 
 
 def file_conversion(unit: str, target: str, *, ambient: float = AMBIENT_PRESSURE, where: str = "") -> UnitConversion:
-    """The conversion of a unit in a file to SI; a load in g or kg becomes a force with standard gravity.
-
-    Raises UnitError.
-    """
+    """The conversion of a unit in a file to SI; a load in g or kg becomes a force with standard gravity. Raises
+    UnitError."""
     if target == "N" and is_mass(unit):
         return UnitConversion(conversion(unit, "kg").factor * STANDARD_GRAVITY)
     return conversion(unit, target, ambient=ambient, where=where)
@@ -137,9 +135,7 @@ def held_value(heading: Heading, stated: float | str, ambient: float, where: str
 
 def constant_from_column(table: RawTable, heading: str, unit: str | None, values: Array) -> tuple[str, float] | None:
     """Name and SI value of the constant that a column states in every row; None if the heading names no constant.
-
-    Raises ColumnError if the values differ between rows.
-    """
+    Raises ColumnError if the values differ between rows."""
     parsed = parse_constant_name(heading)
     if parsed is None:
         return None

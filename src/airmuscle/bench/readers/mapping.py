@@ -202,10 +202,8 @@ def _parse_entry(where: str, column: str, value: Any) -> str:
 
 
 def apply_mapping(table: RawTable, mapping: ColumnMapping) -> RawTable:
-    """The table with the headings of a mapping, and a note for each mapped column.
-
-    Raises ColumnError if the mapping names a column that does not exist.
-    """
+    """The table with the headings of a mapping, and a note for each mapped column. Raises ColumnError if the mapping
+    names a column that does not exist."""
     mapped = {_column_index(table, str(column)): heading for column, heading in mapping.columns.items()}
     headings, units = list(table.headings), list(table.units or ("",) * len(table.headings))
     notes = list(table.notes)

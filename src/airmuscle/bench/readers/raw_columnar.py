@@ -92,10 +92,8 @@ def _groups(
     h5py: Any, group: Any, origin: str, downsampling: Downsampling,
     outer: Mapping[str, float | str] = MappingProxyType({}),
 ) -> Iterator[StoredTable]:  # fmt: skip
-    """The table of each group with vectors and of each dataset that is a table; no links are followed.
-
-    The constants of the `outer` groups and of the file count in each group, which may state others.
-    """
+    """The table of each group with vectors and of each dataset that is a table; no links are followed. The constants of
+    the `outer` groups and of the file count in each group, which may state others."""
     vectors: list[Any] = []
     tables: list[Any] = []
     groups: list[Any] = []

@@ -92,10 +92,8 @@ def _with_decimal_point(cell: str, decimal: str | None) -> str:
 
 
 def _check_decimal_sign(origin: str, body: NumberedLines, rows: list[list[str]], decimal: str | None) -> None:
-    """Raise ColumnError where the sign that is not the stated decimal sign cannot separate thousands, as in `0.5`.
-
-    If none is stated, both signs must not occur: next to `0.5`, the comma in `1,234` may separate thousands.
-    """
+    """Raise ColumnError where the sign that is not the stated decimal sign cannot separate thousands, as in `0.5`. If
+    none is stated, both signs must not occur: next to `0.5`, the comma in `1,234` may separate thousands."""
 
     def matching(sign: re.Pattern[str]) -> Iterator[tuple[int, str]]:
         return ((i, cell) for (i, _), row in zip(body, rows, strict=True) for cell in row if sign.fullmatch(cell))

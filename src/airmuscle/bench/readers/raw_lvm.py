@@ -30,10 +30,8 @@ def is_lvm(path: Path) -> bool:
 
 
 def read_lvm_tables(path: Path, group: str | None, text_format: TextFormat) -> tuple[RawTable, ...]:
-    """Read one table from each segment, or from that of the number `group`; the table of any other text file.
-
-    Raises FileError or ColumnError.
-    """
+    """Read one table from each segment, or from that of the number `group`; the table of any other text file. Raises
+    FileError or ColumnError."""
     if not is_lvm(path):
         return (read_csv_table(path, text_format),)
     text = _SPECIAL.sub(lambda block: "\n" * block[0].count("\n"), read_text(path))

@@ -151,10 +151,8 @@ def _no_numbers(value: Any, rows: int) -> str:
 def _of_one_length(
     origin: str, channels: list[Channel], columns: Sequence[str]
 ) -> tuple[list[Channel], tuple[str, ...]]:
-    """The channels of the length of the mapped ones, or of the known quantities, and a note on the others.
-
-    Raises ColumnError where the length remains open.
-    """
+    """The channels of the length of the mapped ones, or of the known quantities, and a note on the others. Raises
+    ColumnError where the length remains open."""
     lengths = sorted({len(channel.values) for channel in channels})
     if len(lengths) < 2:
         return channels, ()

@@ -188,10 +188,8 @@ class Platform:
         return self.folder_2 if fmi == 2 else self.folder_3
 
     def compile(self, sources: Mapping[str, bytes], units: Sequence[str], name: str) -> bytes:
-        """The shared library `name` of the files `units` among `sources`.
-
-        Raises ParameterError where the compiler is missing, FileError where it fails.
-        """
+        """The shared library `name` of the files `units` among `sources`. Raises ParameterError where the compiler is
+        missing, FileError where it fails."""
         command = [*find_cross_compiler(), "-target", self.target] if self.target else None
         return compile_library(sources, units, name + self.suffix, command=command)
 

@@ -90,9 +90,7 @@ def run_arm_fit(
     folder: str, out: str, texts: ArmTexts, report: Callable[[float, str], None], pack: Callable[[Path], list[str]]
 ) -> None:
     """Fit an arm to the episodes of a set, and write its result into `out`; `pack` returns the files that are offered.
-
-    Raises RequestError.
-    """
+    Raises RequestError."""
     report(0.0, "reading the episodes")
     lines: list[str] = []
 

@@ -65,10 +65,8 @@ class FitQueue:
         self._changed, self._stopped = threading.Condition(), False
 
     def submit(self, set_name: str, folder: Path, *arguments: Any) -> str:
-        """The identifier of a new task, which receives `arguments` after the folder of its result.
-
-        Raises BadRequest if too many wait.
-        """
+        """The identifier of a new task, which receives `arguments` after the folder of its result. Raises BadRequest if
+        too many wait."""
         identifier = secrets.token_urlsafe(16)
         out = folder / "tasks" / identifier
         with self._changed:

@@ -57,10 +57,8 @@ MAX_POINTS, MAX_PARITY_POINTS = 2000, 4000
 
 
 def run_fit(folder: str, out: str, settings: FitSettings | ArmTexts, report: Report) -> None:
-    """Fit the selected rows of a set of files, and write result.json, report and muscle into `out`.
-
-    Raises RequestError for input of the page that is not possible.
-    """
+    """Fit the selected rows of a set of files, and write result.json, report and muscle into `out`. Raises RequestError
+    for input of the page that is not possible."""
     if not isinstance(settings, FitSettings):
         run_arm_fit(folder, out, settings, report, _pack)
         return

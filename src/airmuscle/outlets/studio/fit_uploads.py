@@ -89,10 +89,8 @@ class UploadStore:
         return sorted(path.name for path in (self.folder(identifier) / FILES).iterdir())
 
     async def add(self, identifier: str, name: str, parts: AsyncIterator[bytes], is_needed: IsNeeded) -> str:
-        """Add a file, or replace the one of this name; the identifier of the set, of a new one if none is given.
-
-        Raises BadRequest beyond the limits; then there is no new set.
-        """
+        """Add a file, or replace the one of this name; the identifier of the set, of a new one if none is given. Raises
+        BadRequest beyond the limits; then there is no new set."""
         folder = self.folder(identifier) if identifier else None
         others = [path for path in (folder / FILES).iterdir() if path.name != name] if folder else []
         if len(others) >= MAX_FILES:

@@ -166,10 +166,8 @@ def _with_valves(
     valves: ValveSet, limits: tuple[float, float], key: str, law: am.engine.ControlLaw, path: str, inside: str,
     gains: Sequence[Gain], *, bias: bool = True,
 ) -> JointController:  # fmt: skip
-    """A law that commands pressures, with the inner control of the valves.
-
-    `path` leads to the feedback of the angle in the law, `inside` from there to the integrator.
-    """
+    """A law that commands pressures, with the inner control of the valves. `path` leads to the feedback of the angle in
+    the law, `inside` from there to the integrator."""
     rows = tuple(dataclasses.replace(gain, path=f"{path}{gain.path}") for gain in gains)
     ahead = key.endswith("-ahead")
     balance, start = f"{path}{inside}integral", f"{path}{inside}initial_output" if bias and not ahead else ""

@@ -147,10 +147,8 @@ def _law_program(law: am.engine.ControlLaw, *, sample: bool, slopes: bool) -> st
 
 
 def _linear_program(plant: am.Plant, columns: tuple[str, ...]) -> str:
-    """The linearisation of a plant for the columns that control laws measure.
-
-    Raises ParameterError for a column that depends on an input at once.
-    """
+    """The linearisation of a plant for the columns that control laws measure. Raises ParameterError for a column that
+    depends on an input at once."""
     import casadi
 
     compiled = compile_system(plant)

@@ -157,10 +157,8 @@ def sampled_outline(
 
 
 def _toml(entry: Entry, fixed: bool) -> dict[str, Any]:
-    """The file of the entry as it is, and the template of its file with other parameters.
-
-    Standard errors, checks and the validity range of a fit belong to the parameters of the entry alone.
-    """
+    """The file of the entry as it is, and the template of its file with other parameters. Standard errors, checks and
+    the validity range of a fit belong to the parameters of the entry alone."""
     note = f"Parameters of {entry.name} ({entry.provenance}) changed in airmuscle studio. {entry.note}".strip()
     changed = dataclasses.replace(
         entry, title=f"{entry.title}, parameters changed", provenance="chosen", uncertainty=None, checks=(), warning="",

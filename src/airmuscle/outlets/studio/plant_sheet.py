@@ -68,10 +68,8 @@ def sheet_of_plant(tables: Mapping[str, Any], location: Location, name: str) -> 
 
 
 def _parameter_rows(plant: am.Plant, sources: Mapping[str, str]) -> list[dict[str, Any]]:
-    """The parameters of a plant by their paths, with the places of their values; tables of coefficients are left out.
-
-    A geometry that a muscle shares with its law is one parameter at two places.
-    """
+    """The parameters of a plant by their paths, with the places of their values; tables of coefficients are left out. A
+    geometry that a muscle shares with its law is one parameter at two places."""
     known = list(leaves(plant))
     places = {leaf.path: i for i, leaf in enumerate(known)}
     rows = []
@@ -140,9 +138,7 @@ def _mechanism_row(plant: am.Plant) -> dict[str, Any]:
 
 def _loop_row(scenario: Scenario) -> dict[str, Any] | None:
     """Margins, Bode and Nyquist plot of the loop of a scenario, linearised where its run ends; the reason without them.
-
-    Where valves are closed there, whose slopes differ on both sides, they are open by OPENED. None without a loop.
-    """
+    Where valves are closed there, whose slopes differ on both sides, they are open by OPENED. None without a loop."""
     loop = scenario.problem.input
     if not isinstance(loop, am.engine.ControlLoop):
         return None
