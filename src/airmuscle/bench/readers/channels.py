@@ -98,7 +98,6 @@ def merge_channels(
     times, notes = [c.time for c in channels if c.time is not None], tuple[str, ...]()
     time = times[0] if times else None
     if len({len(c.values) for c in channels}) > 1 or not all(np.array_equal(each, times[0]) for each in times):
-        _check_times(origin, channels)
         channels, time, notes = _resampled(origin, channels)
     has_time = any(find_quantity_name(c.name.partition(" ")[0].partition("_")[0]) == "time" for c in channels)
     if time is not None and not has_time:
@@ -112,8 +111,10 @@ def merge_channels(
     return RawTable(origin, headings, units if any(units) else None, columns, rows, row_label, constants, notes, fields)
 
 
-def _check_times(origin: str, channels: Sequence[Channel]) -> None:
-    """Raise ColumnError where a channel has no time, or one that decreases, so that no interpolation is defined."""
+def _resampled(origin: str, channels: Sequence[Channel]) -> tuple[list[Channel], Array, tuple[str, ...]]:
+    """The channels at the times of the longest one, these times, and a note on each that is interpolated. Raises
+    ColumnError where a channel has no time, or one that decreases, so that no interpolation is defined."""
+    times: list[Array] = []
     for channel in channels:
         if channel.time is None:
             sizes = ", ".join(f"{c.name} {len(c.values)}" for c in channels)
@@ -127,33 +128,25 @@ def _check_times(origin: str, channels: Sequence[Channel]) -> None:
                 f"{origin}: the time of channel '{channel.name}' decreases at its row {decreasing[0] + 2}, and the "
                 "channels have different rows. Write each run to a file of its own."
             )
-
-
-def _resampled(origin: str, channels: Sequence[Channel]) -> tuple[list[Channel], Array, tuple[str, ...]]:
-    """The channels at the times of the longest one, these times, and a note on each that is interpolated."""
-    leader, times = max(channels, key=lambda c: len(c.values)), [c.time for c in channels if c.time is not None]
-    assert leader.time is not None
-    low, high, rounding = max(each[0] for each in times), min(each[-1] for each in times), _rounding(leader.time)
-    time = leader.time[(leader.time >= low - rounding) & (leader.time <= high + rounding)]
+        times.append(channel.time)
+    longest = max(range(len(channels)), key=lambda i: len(channels[i].values))
+    name, leading = channels[longest].name, times[longest]
+    low, high, rounding = max(each[0] for each in times), min(each[-1] for each in times), _rounding(leading)
+    time = leading[(leading >= low - rounding) & (leading <= high + rounding)]
     if not len(time):
         raise ColumnError(f"{origin}: the time ranges of the channels do not overlap. Select one group of channels.")
     resampled, notes = [], []
     for channel, own_time in zip(channels, times, strict=True):
-        resampled.append(dataclasses.replace(channel, values=_interpolate(channel, time), time=time))
-        if not np.array_equal(own_time, leader.time):
-            rows = f"its {len(channel.values)} rows are interpolated to the {len(time)} rows of '{leader.name}'"
+        values = np.asarray(channel.values)
+        if values.dtype.kind in "biuUSO":
+            values = values[np.clip(np.searchsorted(own_time, time + _rounding(time), side="right") - 1, 0, None)]
+        else:
+            values = np.interp(time, own_time, values)
+        resampled.append(dataclasses.replace(channel, values=values, time=time))
+        if not np.array_equal(own_time, leading):
+            rows = f"its {len(channel.values)} rows are interpolated to the {len(time)} rows of '{name}'"
             notes.append(f"Channel '{channel.name}' has its own time vector: {rows}.")
     return resampled, time, tuple(notes)
-
-
-def _interpolate(channel: Channel, time: Array) -> Any:
-    """The values at other times: zero-order hold for integers and texts, linear interpolation otherwise."""
-    assert channel.time is not None
-    values = np.asarray(channel.values)
-    if values.dtype.kind in "biuUSO":
-        at_or_before = np.searchsorted(channel.time, time + _rounding(time), side="right") - 1
-        return values[np.clip(at_or_before, 0, None)]
-    return np.interp(time, channel.time, values)
 
 
 def _rounding(time: Array) -> float:

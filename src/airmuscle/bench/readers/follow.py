@@ -16,7 +16,7 @@ from .header import is_number
 from .interpret import interpret, resolve_headings, unit_conversion
 from .mapping import ColumnMapping
 from .plausibility import CONTRACTION_RANGE, MAX_MAGNITUDE
-from .text_format import TextFormat, TextHeader, has_content, is_comment, parse_header, split_cells
+from .text_format import TextFormat, has_content, is_comment, parse_header, split_cells
 
 MAX_UNREADABLE, MAX_HEADER_LINES, MAX_LINE = 100, 1000, 65536
 """Unreadable rows in succession, lines before the first numbers, and characters of a line that are refused (chosen)."""
@@ -64,11 +64,7 @@ class RowReader:
             return None
         header = parse_header(self.origin, self._head, text_format)
         self._delimiter, self._comma = header.delimiter, header.delimiter != ","
-        self._start(header, [float(self._point(cell)) for cell in cells])
-        return self._read_row(line)
-
-    def _start(self, header: TextHeader, first: list[float]) -> None:
-        """Conversions of the columns, from the header and the first row, which is checked as a recording."""
+        first = [float(self._point(cell)) for cell in cells]
         headings = tuple(self._names.get(text, self._names.get(str(i), text))
                          for i, text in enumerate(header.headings, 1))  # fmt: skip
         headings = headings[: len(first)] if not any(headings[len(first) :]) else headings
@@ -82,10 +78,9 @@ class RowReader:
                 f"{self.origin}, line {self._line}: the line must have {len(headings)} cells ({listed(headings)}); "
                 f"it has {len(first)}."
             )
-        cells = tuple(np.array([value]) for value in first)
-        rows = np.array([self._line], dtype=np.int64)
-        table = RawTable(self.origin, headings, header.units, cells, rows, constants=header.constants)
-        recording = interpret(table, self.mapping)
+        columns, rows = tuple(np.array([value]) for value in first), np.array([self._line], dtype=np.int64)
+        table = RawTable(self.origin, headings, header.units, columns, rows, constants=header.constants)
+        recording = interpret(table, self.mapping)  # which checks the first row
         self._first, self.notes = recording, recording.notes
         self._ambient = ambient = float(recording.constants.get("ambient", AMBIENT_PRESSURE))
         held = {find_quantity_name(name) for name in self.mapping.constants}
@@ -93,6 +88,7 @@ class RowReader:
         self._width = len(headings)
         known = ((i, each) for i, each in enumerate(resolve_headings(table, self.mapping.units)) if each.known)
         self._conversions = [(i, each.name, unit_conversion(table, each, ambient)) for i, each in known]
+        return self._read_row(line)
 
     def _read_row(self, line: str) -> dict[str, float] | None:
         try:

@@ -5,7 +5,7 @@ import json
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -14,14 +14,8 @@ from .channels import Channel, RawTable, merge_channels
 from .separate_process import import_lab_package, in_separate_process, reading
 from .time_base import Decimation, Downsampling, Reduction, check_reduced_lengths
 
-
-class StoredTable(NamedTuple):
-    """The channels and constants of a group or a dataset of an HDF5 file, and the reduction of its rows."""
-
-    name: str
-    channels: list[Channel]
-    constants: dict[str, float | str]
-    reduction: Reduction
+StoredTable = tuple[str, list[Channel], dict[str, float | str], Reduction]
+"""Name, channels and constants of a group or a dataset of an HDF5 file, and the reduction of its rows."""
 
 
 @in_separate_process("pyarrow")
@@ -55,15 +49,17 @@ def read_hdf5_tables(
     h5py = import_lab_package("h5py", path)
     with reading(path, "HDF5"), h5py.File(path, "r") as file:
         check_own_values(h5py, file, path)
-        contents = {each.name: each for each in _groups(h5py, file, path.name, downsampling) if each.channels}
+        contents = {each[0]: each for each in _groups(h5py, file, path.name, downsampling) if each[1]}
     if not contents:
         raise FileError(
             f"{path.name}: no dataset is a vector of numbers, a matrix with columns, or a table of records."
         )
     check_known(f"{path.name}: no group", [] if group is None else group, contents, "the groups are", FileError)
     origins = {name: f"{path.name}, group '{name}'" if len(contents) > 1 else path.name for name in contents}
-    selected = [each for name, each in contents.items() if group in (None, name)]
-    return tuple(t.reduction.noted(merge_channels(origins[t.name], t.channels, t.constants)) for t in selected)
+    return tuple(
+        reduction.noted(merge_channels(origins[name], channels, constants))
+        for name, channels, constants, reduction in contents.values() if group in (None, name)
+    )  # fmt: skip
 
 
 def check_own_values(h5py: Any, file: Any, path: Path) -> None:
@@ -107,14 +103,13 @@ def _groups(
             (vectors if _is_vector(item) else tables).append(item)
     constants, numeric = {**outer, **_constants(group.attrs)}, [d for d in vectors if d.dtype.kind in "biuf"]
     reduction = Reduction(downsampling, max((d.size for d in numeric), default=0))
-    channels = [Channel(d.name.rpartition("/")[2], _values(d, reduction), unit=_unit(d.attrs)) for d in numeric]
+    channels = [Channel(d.name.rpartition("/")[2], _values(d, reduction), unit=_unit(d)) for d in numeric]
     place = f"{origin}, group '{group.name}'"
     check_reduced_lengths(place, (d.size for d in numeric), (len(c.values) for c in channels))
-    yield StoredTable(group.name, channels, constants, reduction)
+    yield group.name, channels, constants, reduction
     for dataset in tables:
         reduction = Reduction(downsampling, dataset.shape[0])
-        own = {**constants, **_constants(dataset.attrs)}
-        yield StoredTable(dataset.name, _columns(dataset, reduction), own, reduction)
+        yield dataset.name, _columns(dataset, reduction), {**constants, **_constants(dataset.attrs)}, reduction
     for inner in groups:
         yield from _groups(h5py, inner, origin, downsampling, constants)
 
@@ -150,8 +145,9 @@ def _columns(dataset: Any, reduction: Reduction) -> list[Channel]:
     return [Channel(name, value, unit=unit) for name, value, unit in zip(names, values, units, strict=True)]
 
 
-def _unit(attributes: Mapping[str, Any]) -> str:
-    return next((_text(attributes[key]) for key in ("unit", "units", "Unit", "Units") if key in attributes), "")
+def _unit(dataset: Any) -> str:
+    keys = ("unit", "units", "Unit", "Units")
+    return next((_text(dataset.attrs[key]) for key in keys if key in dataset.attrs), "")
 
 
 def _constants(attributes: Mapping[str, Any]) -> dict[str, float | str]:
