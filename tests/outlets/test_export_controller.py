@@ -43,7 +43,7 @@ from airmuscle.engine.run import prepare_loop
 from airmuscle.errors import FileError, ParameterError
 from airmuscle.outlets import write_controller
 from airmuscle.outlets.export import write
-from airmuscle.outlets.export.compiler import COMPILER, EMULATOR, PROCESSORS, run_in_emulator
+from airmuscle.outlets.export.compiler import COMPILER, EMULATOR, PROCESSORS, build_and_run
 from airmuscle.outlets.export.printed_controller import print_controller
 from airmuscle.physics import linearise
 
@@ -129,7 +129,7 @@ def test_on_a_cortex_m_the_commands_are_the_same(precision, processor, tmp_path)
         printed.require(program)
     law, setpoint = CASES["cascade"]
     paths = write_controller(problem_of(law, setpoint), tmp_path, name="law", precision=precision)
-    built = run_in_emulator(paths, PROCESSORS[processor])
+    built = build_and_run(paths, PROCESSORS[processor])
     assert built.output.startswith("100 samples, 0 commands differ")
     assert 100 < built.code_size < 8000
     assert 0 < built.stack_size < 2000
@@ -146,7 +146,7 @@ def test_a_replay_that_differs_fails_on_a_cortex_m(tmp_path):
         )
     )
     with pytest.raises(FileError, match=r"qemu-system-arm failed with exit code 1: 100 samples, \d+ commands differ"):
-        run_in_emulator(paths, PROCESSORS["cortex-m4"])
+        build_and_run(paths, PROCESSORS["cortex-m4"])
 
 
 def test_without_a_compiler_for_the_processor_the_packages_are_named(tmp_path, monkeypatch):
@@ -155,7 +155,7 @@ def test_without_a_compiler_for_the_processor_the_packages_are_named(tmp_path, m
     with pytest.raises(
         ParameterError, match=r"arm-none-eabi-gcc was not found\..*install the packages gcc-arm-none-eabi"
     ):
-        run_in_emulator(paths, PROCESSORS["cortex-m4"])
+        build_and_run(paths, PROCESSORS["cortex-m4"])
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from ...files.library import load_law, read_toml
 from ...files.scenario.scenario import load_scenario
 from .. import export as outlet
 from ..export import PRECISIONS, OnnxStack, Stack, TorchStack, WarpStack
-from ..export.compiler import PLATFORMS, PROCESSORS, Processor, build_and_run, find_platform, run_in_emulator
+from ..export.compiler import PLATFORMS, PROCESSORS, Processor, build_and_run, find_platform
 from ..export.identifiers import make_identifier
 from ..export.robot_description import WRITERS
 from ..export.targets import C99, JavaScript, Octave, Target
@@ -219,7 +219,7 @@ def _export_program(source: str, out: Path, request: ExportRequest) -> Exported:
     instruction = f"run: {_instruction(request.to, paths, request.law, request.controller)}"
     if not request.build:
         return Exported(paths, [instruction])
-    built = run_in_emulator(paths, request.processor) if request.processor else build_and_run(paths)
+    built = build_and_run(paths, request.processor)
     text, size = built.output.strip(), "unknown" if built.code_size is None else f"{built.code_size} bytes"
     if not request.controller:  # the output of a run is CSV
         text = f"{len(built.output.splitlines()) - 1} rows; {built.messages.strip()}"

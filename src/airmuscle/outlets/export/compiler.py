@@ -79,24 +79,6 @@ class BuiltProgram:
     stack_size: int | None = None
 
 
-def build_and_run(sources: Sequence[Path]) -> BuiltProgram:
-    """Compile exported C sources in a temporary folder and run the program; the folder of the sources is unchanged.
-
-    Raises ParameterError where there is no compiler, and FileError where the compiler or the program fails.
-    """
-    units = [p for p in sources if p.suffix == ".c"]
-    compiler = find_compiler(
-        f". The sources are in {sources[0].parent}; install gcc or clang, or compile them elsewhere: cc -O2 "
-        f"{' '.join(p.name for p in units)} -lm -o program. JavaScript and Octave need no compiler."
-    )
-    with temporary_folder() as folder:
-        program = str(folder / "program")
-        run_command([compiler, "-std=c99", "-O2", "-ffp-contract=off", *map(str, units), "-o", program, "-lm"])
-        done = run_command([program])
-        code, _ = measure_sizes([compiler], shutil.which("size"), sources, folder)
-        return BuiltProgram(done.stdout, done.stderr, code)
-
-
 def measure_sizes(
     command: Sequence[str], size: str | None, sources: Sequence[Path], folder: Path
 ) -> tuple[int | None, int | None]:
@@ -139,33 +121,39 @@ PROCESSORS = {
 """Processors by name: Cortex-M4 with a unit for single precision, Cortex-M7 with one for double precision."""
 
 
-def run_in_emulator(sources: Sequence[Path], processor: Processor) -> BuiltProgram:
-    """Compile exported C for a processor in a temporary folder and run it in QEMU; the output is that of the program.
+def build_and_run(sources: Sequence[Path], processor: Processor | None = None) -> BuiltProgram:
+    """Compile exported C sources in a temporary folder and run the program, for a processor in the emulator QEMU; the
+    folder of the sources is unchanged.
 
-    Raises ParameterError where compiler or emulator are missing, and FileError where one of them or the program fails.
+    Raises ParameterError where a compiler or the emulator is missing, and FileError where one of them or the program
+    fails.
     """
-    for program in (COMPILER, EMULATOR):
-        if shutil.which(program) is None:
+    units, place = [str(p) for p in sources if p.suffix == ".c"], sources[0].parent
+    if processor is None:
+        command = [find_compiler(
+            f". The sources are in {place}; install gcc or clang, or compile them elsewhere: cc -O2 "
+            f"{' '.join(Path(p).name for p in units)} -lm -o program. JavaScript and Octave need no compiler."
+        )]  # fmt: skip
+    else:
+        for name in (each for each in (COMPILER, EMULATOR) if shutil.which(each) is None):
             raise ParameterError(
-                f"{program} was not found. The sources are in {sources[0].parent}; to compile and run them for a "
-                f"microcontroller install the packages {PACKAGES} (names of Debian)."
+                f"{name} was not found. The sources are in {place}; to compile and run them for a microcontroller "
+                f"install the packages {PACKAGES} (names of Debian)."
             )
-    command = [COMPILER, "-mthumb", "-mfloat-abi=hard", *processor.options]
+        command = [COMPILER, "-mthumb", "-mfloat-abi=hard", *processor.options]
     with temporary_folder() as folder:
-        units = [str(p) for p in sources if p.suffix == ".c"]
-        for file in ("cortex_m_startup.c", "cortex_m.ld"):
-            (folder / file).write_text(template(file), encoding="utf-8")
-        run_command([
-            *command, "-std=c99", "-O2", "-ffp-contract=off", "-nostartfiles", "--specs=rdimon.specs", "-T",
-            str(folder / "cortex_m.ld"), str(folder / "cortex_m_startup.c"), *units, "-o", str(folder / "program.elf"),
-            "-lm",
-        ])  # fmt: skip
-        done = run_command([
-            EMULATOR, "-M", processor.board, "-display", "none", "-monitor", "none", "-serial", "none",
-            "-semihosting-config", "enable=on,target=native", "-kernel", str(folder / "program.elf"),
-        ])  # fmt: skip
-        code, stack = measure_sizes(command, shutil.which(SIZE), sources, folder)
-        return BuiltProgram(done.stdout, done.stderr, code, stack)
+        program, start, run = str(folder / "program"), list[str](), list[str]()
+        if processor is not None:
+            startup, script = folder / "cortex_m_startup.c", folder / "cortex_m.ld"
+            for file in (startup, script):
+                file.write_text(template(file.name), encoding="utf-8")
+            start = ["-nostartfiles", "--specs=rdimon.specs", "-T", str(script), str(startup)]
+            run = [EMULATOR, "-M", processor.board, "-display", "none", "-monitor", "none", "-serial", "none",
+                   "-semihosting-config", "enable=on,target=native", "-kernel"]  # fmt: skip
+        run_command([*command, "-std=c99", "-O2", "-ffp-contract=off", *start, *units, "-o", program, "-lm"])
+        done = run_command([*run, program])
+        code, stack = measure_sizes(command, shutil.which(SIZE if processor else "size"), sources, folder)
+        return BuiltProgram(done.stdout, done.stderr, code, stack if processor else None)
 
 
 PACKAGE = "ziglang"
