@@ -199,8 +199,15 @@ def _keep_unknown_column(
     table: RawTable, heading: Heading, cells: Cells, columns: dict[str, Array], unknown: list[str]
 ) -> str:
     """Keep an unknown column without conversion; the note on this column alone, without which it is in `unknown`."""
-    if isinstance(cells, list):
-        return _keep_labels(heading, cells, columns) if any(cells) else ""
+    if isinstance(cells, list) and not any(cells):
+        return ""
+    if isinstance(cells, list):  # a few different texts are kept as their numbers
+        values, numbers, counts = np.unique(fixed.label_texts(cells), return_inverse=True, return_counts=True)
+        if not 2 <= values.size <= MAX_LABELS or counts.min() < MIN_LABEL_ROWS:
+            return f"Column '{heading.text}' contains text and is ignored."
+        columns[heading.text] = (numbers.ravel() + 1).astype(np.float64)
+        texts = ", ".join(f"{i} {value or 'empty'}" for i, value in enumerate(values.tolist(), 1))
+        return f"Column '{heading.text}' contains text and is kept as numbers: {texts}."
     constant = constant_from_column(table, heading.text, heading.unit, cells)
     if constant:
         return f"Column '{heading.text}' is constant and states the {constant[0]}: {constant[1]:.4g} (SI)."
@@ -215,13 +222,3 @@ def _keep_unknown_column(
     if not hint:
         unknown.append(f"'{heading.text}'")
     return hint and f"Column '{heading.text}' is not a known quantity and is kept without conversion.{hint}"
-
-
-def _keep_labels(heading: Heading, cells: list[str], columns: dict[str, Array]) -> str:
-    """Keep a column with a few different texts as their numbers, and return the note on a column of text."""
-    values, numbers, counts = np.unique(fixed.label_texts(cells), return_inverse=True, return_counts=True)
-    if not 2 <= values.size <= MAX_LABELS or counts.min() < MIN_LABEL_ROWS:
-        return f"Column '{heading.text}' contains text and is ignored."
-    columns[heading.text] = (numbers.ravel() + 1).astype(np.float64)
-    texts = ", ".join(f"{i} {value or 'empty'}" for i, value in enumerate(values.tolist(), 1))
-    return f"Column '{heading.text}' contains text and is kept as numbers: {texts}."

@@ -157,7 +157,13 @@ class InterpolateMissing(MissingValues):
                 f"{table.origin}: missing values are interpolated in time, but there is no time column.",
                 hint=Hint("To leave out the rows", "missing", DropMissing(self.codes), "ColumnMapping"),
             )
-        table, cells, time = _with_time(table, cells, timed)
+        kept, table = np.flatnonzero(~timed.missing), _without_rows(table, timed.missing)
+        cells = [dataclasses.replace(c, cells=taken(c.cells, kept), missing=c.missing[kept], bad=c.bad[kept])
+                 for c in cells]  # fmt: skip
+        time = taken(timed.cells, kept)  # [in the unit of the file]
+        if isinstance(time, list):
+            clock = seconds_from_clock(time)
+            time = np.array([float(cell) for cell in time]) if clock is None else clock
         columns, filled, left = list(table.columns), *np.zeros((2, len(time)), dtype=bool)
         for each in cells:
             if each.missing.any():
@@ -209,21 +215,6 @@ def _without_rows(table: RawTable, left_out: Mask) -> RawTable:
 def _row_note(table: RawTable, what: str, rows: Mask) -> RowNote:
     listed = list_rows(table.row_label, table.rows[rows], MAX_LISTED)
     return RowNote(f"{table.origin}: rows {what}: {np.count_nonzero(rows)} of {len(rows)} ({listed}).")
-
-
-def _with_time(
-    table: RawTable, cells: list[ExaminedColumn], timed: ExaminedColumn
-) -> tuple[RawTable, list[ExaminedColumn], Array]:
-    """The rows whose time is known, and their times [in the unit of the file]."""
-    kept = np.flatnonzero(~timed.missing)
-    table = _without_rows(table, timed.missing)
-    cells = [dataclasses.replace(c, cells=taken(c.cells, kept), missing=c.missing[kept], bad=c.bad[kept])
-             for c in cells]  # fmt: skip
-    time = taken(timed.cells, kept)
-    if isinstance(time, list):
-        clock = seconds_from_clock(time)
-        time = np.array([float(cell) for cell in time]) if clock is None else clock
-    return table, cells, time
 
 
 def _interpolated(column: ExaminedColumn, time: Array) -> tuple[Array, Mask]:

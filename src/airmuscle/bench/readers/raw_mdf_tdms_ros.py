@@ -164,27 +164,21 @@ def read_rosbag_tables(path: Path, group: str | None = None) -> tuple[RawTable, 
         raise FileError(f"{path}: there is no metadata.yaml next to it; copy the whole folder of the ROS 2 bag.")
     if path.suffix != ".bag" and path != min(p for p in folder.iterdir() if p.suffix == path.suffix):
         return ()
+    topics: dict[str, list[tuple[float, dict[_Field, float]]]] = {}
     with reading(path, "ROS bag"):
         typestore = import_lab_package("rosbags.typesys", path)
         default = typestore.get_typestore(typestore.Stores.ROS2_HUMBLE)
         with highlevel.AnyReader([folder], default_typestore=default) as bag:
-            topics = _messages(bag, group)
+            chosen = [c for c in bag.connections if group is None or c.topic.strip("/") == group.strip("/")]
+            for connection, stamp, raw in bag.messages(connections=chosen) if chosen else ():
+                numbers = dict(_numbers(bag.deserialize(raw, connection.msgtype), ""))
+                topic = connection.topic.strip("/").replace("/", ".")
+                if numbers:
+                    topics.setdefault(topic, []).append(((stamp - bag.start_time) * 1e-9, numbers))
     channels = [channel for topic, messages in topics.items() for channel in _topic_channels(topic, messages)]
     if not channels:
         raise FileError(f"{path}: no topic contains numbers{f', or there is no topic {group}' if group else ''}.")
     return (merge_channels(folder.name, channels, {}, "message"),)
-
-
-def _messages(bag: Any, group: str | None) -> dict[str, list[tuple[float, dict[_Field, float]]]]:
-    """Time [s] and numbers of every message, by topic."""
-    chosen = [c for c in bag.connections if group is None or c.topic.strip("/") == group.strip("/")]
-    messages: dict[str, list[tuple[float, dict[_Field, float]]]] = {}
-    for connection, stamp, raw in bag.messages(connections=chosen) if chosen else ():
-        numbers = dict(_numbers(bag.deserialize(raw, connection.msgtype), ""))
-        if numbers:
-            topic = connection.topic.strip("/").replace("/", ".")
-            messages.setdefault(topic, []).append(((stamp - bag.start_time) * 1e-9, numbers))
-    return messages
 
 
 def _numbers(value: Any, path: str, unit: str = "") -> Iterator[tuple[_Field, float]]:

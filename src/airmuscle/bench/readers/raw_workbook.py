@@ -52,7 +52,7 @@ def _parse_table(origin: str, rows: Rows, text_format: TextFormat) -> RawTable:
     stated = header.stated_heading_row(texts, text_format.named, text_format.skip_rows)
     if text_format.skip_rows is not None and stated is None:
         raise FileError(f"{origin}: there is no table below the {text_format.skip_rows} rows of skip_rows.")
-    start = _find_heading_row(rows) if stated is None else stated
+    start = _heading_row(rows) if stated is None else stated
     constants = dict(filter(None, (header.parse_constant_cells(_texts(row)) for _, row in rows[:start])))
     first, cells = rows[start]
     used = [j for j, cell in enumerate(cells) if cell not in (None, "")]
@@ -70,7 +70,7 @@ def _parse_table(origin: str, rows: Rows, text_format: TextFormat) -> RawTable:
     return RawTable(origin, tuple(headings), units, columns, np.array([i for i, _ in body]), "row", constants)
 
 
-def _find_heading_row(rows: Rows) -> int:
+def _heading_row(rows: Rows) -> int:
     """The index of the last row above the numbers that is as wide as they are, or of the row above the unit row."""
     numeric = next((i for i, (_, row) in enumerate(rows) if _is_numeric(row)), 0)
     width = header.count_cells(rows[numeric][1])

@@ -54,17 +54,6 @@ class TextFormat:
         cells = line.split()
         return " " if len(cells) > 1 and all(header.is_number(c) and not c.endswith(",") for c in cells) else ","
 
-    def with_blanks(self, body: NumberedLines) -> "TextFormat":
-        """The format with blanks as the delimiter, if none is given and they separate the first numbers of a table."""
-        if self.delimiter is None:
-            for _, line in body:
-                delimiter = self.detect_delimiter(line)
-                if delimiter == " ":
-                    return dataclasses.replace(self, delimiter=delimiter)
-                if delimiter != "," or _is_numeric(split_cells(line, delimiter)):
-                    break
-        return self
-
 
 @dataclasses.dataclass(frozen=True)
 class TextHeader:
@@ -132,7 +121,12 @@ def parse_header(origin: str, lines: NumberedLines, text_format: TextFormat) -> 
         raise FileError(
             f"{origin}: the file contains no table. A table consists of a row of headings and rows of numbers."
         )
-    text_format = text_format.with_blanks(body)
+    for _, line in body if text_format.delimiter is None else ():  # blanks, if they separate the first numbers
+        delimiter = text_format.detect_delimiter(line)
+        if delimiter == " ":
+            text_format = dataclasses.replace(text_format, delimiter=delimiter)
+        if delimiter != "," or _is_numeric(split_cells(line, delimiter)):
+            break
     above = _lines_above_headings(body, text_format)
     if text_format.skip_rows is not None and body[-1][0] <= text_format.skip_rows:
         raise FileError(f"{origin}: there is no table below the {text_format.skip_rows} lines of skip_rows.")

@@ -81,15 +81,13 @@ def _write_parquet(recording: Recording, temporary: Path, path: Path, comments: 
     arrow, parquet = import_lab_package("pyarrow", path), import_lab_package("pyarrow.parquet", path)
     columns = _columns(recording)
     fields = [arrow.field(name, arrow.float64(), metadata={"unit": unit}) for name, unit, _ in columns]
-    schema = arrow.schema(fields, metadata={name: _constant_text(value) for name, value in recording.constants.items()})
+    constants = {}
+    for name, value in recording.constants.items():  # a text that looks like a number, such as `007`, is quoted
+        is_text = isinstance(value, str) and (is_number(value) or value.startswith('"'))
+        constants[name] = json.dumps(value, ensure_ascii=False) if is_text else str(value)
+    schema = arrow.schema(fields, metadata=constants)
     table = arrow.Table.from_arrays([arrow.array(values) for _, _, values in columns], schema=schema)
     parquet.write_table(table, str(temporary))
-
-
-def _constant_text(value: float | str) -> str:
-    """A constant as text; a text that looks like a number, such as the specimen `007`, in quotation marks."""
-    is_text = isinstance(value, str) and (is_number(value) or value.startswith('"'))
-    return json.dumps(value, ensure_ascii=False) if is_text else str(value)
 
 
 def _write_hdf5(recording: Recording, temporary: Path, path: Path, comments: bool) -> None:

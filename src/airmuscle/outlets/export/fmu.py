@@ -3,7 +3,6 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
@@ -90,7 +89,9 @@ def fmu_package(
 
     source = c_files(program.name, program.system, program.integrator, program.provenance, extend)
     starts = _start_pressures(program, derivatives)
-    variables = make_variables(program, indicators.count if fmi == 3 else 0, {s.column: s.pressure for s in starts})
+    variables = make_variables(
+        program, indicators.count if fmi == 3 else 0, {column: pressure for column, (pressure, *_) in starts.items()}
+    )
     token = token_of(*source.values(), *variables, fmi)
     names = program.system.known.state_names
     dependencies: dict[int, list[int]] = {i: [i] for i in range(1, len(names) + 1)}
@@ -105,35 +106,30 @@ def fmu_package(
     )  # fmt: skip
 
 
-class StartPressure(NamedTuple):
-    """The pressure of a muscle [Pa] at the start: its column, its row among rates and outputs, the state of its air."""
-
-    column: str
-    pressure: float
-    row: int
-    air_mass: int
+StartPressures = dict[str, tuple[float, int, int]]
+"""The pressures of muscles [Pa] at the start by their columns, with their rows among rates and outputs, and the states
+of the masses of their air."""
 
 
-def _start_pressures(program: ExportedRun, derivatives: Partials) -> list[StartPressure]:
+def _start_pressures(program: ExportedRun, derivatives: Partials) -> StartPressures:
     """The pressures of the muscles that follow from the mass of their air."""
     known, system = program.system.known, program.system.compiled.system
     plant, states, names = getattr(system, "plant", system), known.state_names, known.output_names
     state = dict(zip(states, program.problem.initial_vector.tolist(), strict=True))
     outputs = system.outputs(state, dict(zip(known.input_names, program.first_inputs, strict=True)))
-    found = []
+    found: StartPressures = {}
     for prefix in plant.prefixes if isinstance(plant, Plant) else ():
         column, mass = f"{prefix}pressure", f"{prefix}air_mass"
         if column in names and mass in states:
             place = len(states) + names.index(column), states.index(mass)
             if place in derivatives.places:
-                found.append(StartPressure(column, float(outputs[column]), *place))
+                found[column] = float(outputs[column]), *place
     return found
 
 
 def _instance(
-    program: ExportedRun, derivatives: Partials, indicators: EventIndicators, token: str,
-    starts: Sequence[StartPressure],
-) -> Mapping[str, str]:  # fmt: skip
+    program: ExportedRun, derivatives: Partials, indicators: EventIndicators, token: str, starts: StartPressures
+) -> Mapping[str, str]:
     """The places of the template of an instance."""
     system, known, problem, name = program.system, program.system.known, program.problem, program.name
     initial, inputs = problem.initial_vector, program.first_inputs
@@ -147,7 +143,7 @@ def _instance(
     bounds = [leaf.declared.bounds for leaf in system.tunable]
     scales = indicators.scales(initial, np.array(inputs), system.defaults, system.compiled.nominal)
     indices = {"rows": [row for row, _ in derivatives.places], "columns": [column for _, column in derivatives.places],
-               "pressure_rows": [each.row for each in starts], "air_masses": [each.air_mass for each in starts],
+               "pressure_rows": [row for _, row, _ in starts.values()], "air_masses": [m for *_, m in starts.values()],
     }  # fmt: skip
     return {
         "file": name, "token": token, "partials": str(len(derivatives.places)), "limits": str(len(limits)),
@@ -157,7 +153,7 @@ def _instance(
         "start_inputs": c_values(inputs, 1), "lowest": c_values([low for low, _ in bounds], 1),
         "highest": c_values([high for _, high in bounds], 1), "scales": c_values(scales, 1),
         **{key: ", ".join(map(str, [*at, 0])) for key, at in indices.items()},
-        "start_pressures": c_values([each.pressure for each in starts], 1),
+        "start_pressures": c_values([pressure for pressure, *_ in starts.values()], 1),
     }  # fmt: skip
 
 

@@ -166,6 +166,11 @@ def _pack(folder: Path) -> list[str]:
 def result_sheet(selection: LawSelection, fit: am.Fit) -> dict[str, Any]:
     """The selection and the recommended fit as plain data."""
     best, (equations, _) = selection.recommended, equation_section(fit)
+    quantity, step = fit.fitted_quantity, max(1, math.ceil(fit.rows_used / MAX_PARITY_POINTS))
+    columns = {
+        "measured": fit.recording[quantity.name], "modelled": fit.modelled, "residual": fit.residuals,
+        "censored": fit.censoring != 0, **{name: fit.recording[name] for name in ("pressure", "contraction", "force")},
+    }  # fmt: skip
     return {
         "recommended": best.candidate.name, "parameters": best.parameter_count, "error": best.cross_validated_rmse,
         "reason": selection.reason,
@@ -179,18 +184,10 @@ def result_sheet(selection: LawSelection, fit: am.Fit) -> dict[str, Any]:
              "sources": dict(each.sources)}
             for each in equations
         ],
-        "parity": _parity(fit), "bands": _bands(fit),
+        "parity": {"quantity": quantity.name, "unit": quantity.unit, "step": step,
+                   **{name: column[::step] for name, column in columns.items()}},
+        "bands": _bands(fit),
     }  # fmt: skip
-
-
-def _parity(fit: am.Fit) -> dict[str, Any]:
-    quantity, step = fit.fitted_quantity, max(1, math.ceil(fit.rows_used / MAX_PARITY_POINTS))
-    columns = {
-        "measured": fit.recording[quantity.name], "modelled": fit.modelled, "residual": fit.residuals,
-        "censored": fit.censoring != 0, **{name: fit.recording[name] for name in ("pressure", "contraction", "force")},
-    }  # fmt: skip
-    shown = {name: column[::step] for name, column in columns.items()}
-    return {"quantity": quantity.name, "unit": quantity.unit, "step": step, **shown}
 
 
 def _bands(fit: am.Fit) -> dict[str, Any] | None:
@@ -261,6 +258,16 @@ def _recording(
     recording: am.Recording, file: str, inspection: Inspection | None, used: Any, outliers: Sequence[Outlier], step: int
 ) -> dict[str, Any]:
     columns, constants, ranges = [name for name in SHOWN if name in recording], {}, {}
+    inspected: dict[str, Any] = {}
+    if inspection is not None:
+        sampling, findings = inspection.sampling, inspection.findings[:MAX_LISTED]
+        inspected = {
+            "runs": [_run(run) for run in inspection.runs[:MAX_LISTED]], "run_count": len(inspection.runs),
+            "branches": len(inspection.branches),
+            "sampling": None if sampling is None else {"rate": sampling.rate, "duration": sampling.duration},
+            "outliers": len({each.row for each in inspection.outliers}),
+            "findings": [{"text": in_page_words(each.text), "serious": each.serious} for each in findings],
+        }  # fmt: skip
     for name, value in recording.constants.items():
         factor, unit = display_scale(CONSTANT_QUANTITIES.get(name, ""))
         constants[name] = f"{value * factor:.5g} {unit}".strip() if isinstance(value, float | int) else str(value)
@@ -270,20 +277,9 @@ def _recording(
     return {
         "origin": recording.origin, "file": file, "rows": len(recording), "used": int(np.count_nonzero(used)),
         "constants": constants, "notes": [in_page_words(note) for note in recording.notes], "ranges": ranges,
-        **({} if inspection is None else _inspected(inspection)),
+        **inspected,
         "left_out": [int(row) for row in np.flatnonzero(~kept_rows(recording, outliers)) if row % step == 0],
         "points": {name: [float(f"{x:.{DIGITS}g}") for x in recording[name][::step]] for name in columns},
-    }  # fmt: skip
-
-
-def _inspected(inspection: Inspection) -> dict[str, Any]:
-    sampling, findings = inspection.sampling, inspection.findings[:MAX_LISTED]
-    return {
-        "runs": [_run(run) for run in inspection.runs[:MAX_LISTED]], "run_count": len(inspection.runs),
-        "branches": len(inspection.branches),
-        "sampling": None if sampling is None else {"rate": sampling.rate, "duration": sampling.duration},
-        "outliers": len({each.row for each in inspection.outliers}),
-        "findings": [{"text": in_page_words(each.text), "serious": each.serious} for each in findings],
     }  # fmt: skip
 
 

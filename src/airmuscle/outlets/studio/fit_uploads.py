@@ -98,7 +98,17 @@ class UploadStore:
         allowed = MAX_SET - sum(path.stat().st_size for path in others)
         unfinished = self._top() / f"{secrets.token_hex(8)}.part"
         try:
-            await _write_parts(unfinished, name, parts, allowed)
+            size = 0
+            with unfinished.open("wb") as file:
+                async for part in parts:
+                    size += len(part)
+                    if size > MAX_FILE:
+                        raise BadRequest(f"{name} is larger than {MAX_FILE // 10**6} MB; export fewer rows.", 413)
+                    if size > allowed:
+                        raise BadRequest(f"all files are larger than {MAX_SET // 10**6} MB; remove some.", 413)
+                    file.write(part)
+            if not size:
+                raise BadRequest(f"{name} is empty.")
             identifier = identifier or self.new_set(is_needed)
             unfinished.replace(self.folder(identifier) / FILES / name)
         finally:
@@ -126,17 +136,3 @@ class UploadStore:
                     shutil.rmtree(old, ignore_errors=True)
             self._root = Path(tempfile.mkdtemp(prefix=f"{_PREFIX}{os.getpid()}-", dir=parent))
         return self._root
-
-
-async def _write_parts(path: Path, name: str, parts: AsyncIterator[bytes], allowed: int) -> None:
-    size = 0
-    with path.open("wb") as file:
-        async for part in parts:
-            size += len(part)
-            if size > MAX_FILE:
-                raise BadRequest(f"{name} is larger than {MAX_FILE // 10**6} MB; export fewer rows.", 413)
-            if size > allowed:
-                raise BadRequest(f"all files are larger than {MAX_SET // 10**6} MB; remove some.", 413)
-            file.write(part)
-    if not size:
-        raise BadRequest(f"{name} is empty.")
