@@ -9,6 +9,7 @@ prepare(p, c)        c, what these need of the parameters
 
 import dataclasses
 import functools
+import itertools
 from collections.abc import Sequence
 from typing import Any
 
@@ -203,24 +204,21 @@ def control_range(controls: Sequence[Input]) -> tuple[float, float]:
 def _stable_step(part: Plant) -> float:
     """The longest step of 1 ms / 2^k that resolves the fastest rate at a few states, with valves open and closed."""
     compiled, fastest = compile_system(part), 1.0
-    for pressure in (2e4, 2e5, 5e5):
-        for contraction in (0.0, 0.1, 0.2):
-            shortening = contraction * part.resting_lengths[0]
-            try:
-                state = open_plant(part, (shortening,)).state_at(pressure=pressure)
-            except ParameterError:
-                continue
-            motion = {SHORTENING: shortening, SHORTENING_SPEED: 0.0}
-            for opening in (0.0, 0.5, 1.0):
-                inputs = [
-                    motion.get(i.name, i.minimum + opening * (min(i.maximum, 1e6) - i.minimum))
-                    for i in part.input_variables
-                ]
-                slopes = derivatives(compiled, list(state.values()), inputs).rates_by_state
-                sizes = compiled.nominal
-                if np.isfinite(slopes).all():
-                    rates = np.linalg.eigvals(slopes * sizes / sizes[:, None])
-                    fastest = max(fastest, float(np.abs(rates).max(initial=0.0)))
+    sizes = compiled.nominal
+    for pressure, contraction, opening in itertools.product((2e4, 2e5, 5e5), (0.0, 0.1, 0.2), (0.0, 0.5, 1.0)):
+        shortening = contraction * part.resting_lengths[0]
+        try:
+            state = open_plant(part, (shortening,)).state_at(pressure=pressure)
+        except ParameterError:
+            continue
+        motion = {SHORTENING: shortening, SHORTENING_SPEED: 0.0}
+        inputs = [
+            motion.get(i.name, i.minimum + opening * (min(i.maximum, 1e6) - i.minimum)) for i in part.input_variables
+        ]
+        slopes = derivatives(compiled, list(state.values()), inputs).rates_by_state
+        if np.isfinite(slopes).all():
+            rates = np.linalg.eigvals(slopes * sizes / sizes[:, None])
+            fastest = max(fastest, float(np.abs(rates).max(initial=0.0)))
     step = MAX_STEP
     while step * fastest > SAFETY:
         step /= 2.0

@@ -36,28 +36,25 @@ class RobotModel:
     frictions: Sequence[float]
     left_out: tuple[str, ...] = ()
 
-
-def robot_model(mechanism: Mechanism) -> RobotModel:
-    """The rigid bodies of a mechanism. Raises ParameterError for one that is no joint or arm with circular pulleys."""
-    model = _robot_model(mechanism)
-    for number, route in enumerate(model.routes, start=1):
-        if any(not isinstance(profile, ConstantRadius) for profile in route.profiles):
-            raise ParameterError(
-                f"the pulley of muscle {number} is not circular; a tendon of a robot description has a constant moment "
-                "arm. Use ConstantRadius, or export the plant with --to fmu."
-            )
-    return model
+    def __post_init__(self) -> None:
+        for number, route in enumerate(self.routes, start=1):
+            if any(not isinstance(profile, ConstantRadius) for profile in route.profiles):
+                raise ParameterError(
+                    f"the pulley of muscle {number} is not circular; a tendon of a robot description has a constant "
+                    "moment arm. Use ConstantRadius, or export the plant with --to fmu."
+                )
 
 
 @functools.singledispatch
-def _robot_model(mechanism: Mechanism) -> RobotModel:
+def robot_model(mechanism: Mechanism) -> RobotModel:
+    """The rigid bodies of a mechanism. Raises ParameterError for one that is no joint or arm with circular pulleys."""
     raise ParameterError(
         f"{type(mechanism).__name__} has no robot description; AntagonisticJoint, PlanarArm and SerialArm have one, "
         "also in WithStickSlip. Export the plant with --to fmu, or one of its muscles with --to mujoco."
     )
 
 
-@_robot_model.register
+@robot_model.register
 def _joint_model(mechanism: AntagonisticJoint) -> RobotModel:
     """One link with the inertia and the weight torque of the joint: half of the inertia is that of the mass at its
     distance from the axis (chosen; only inertia and torque act)."""
@@ -71,7 +68,7 @@ def _joint_model(mechanism: AntagonisticJoint) -> RobotModel:
     return RobotModel(["angle"], [link], routes, STANDARD_GRAVITY, [0.0])
 
 
-@_robot_model.register
+@robot_model.register
 def _planar_model(mechanism: PlanarArm) -> RobotModel:
     links, before = [], 0.0
     for number, link in enumerate(mechanism.links, start=1):
@@ -87,15 +84,15 @@ def _planar_model(mechanism: PlanarArm) -> RobotModel:
     return RobotModel(names, links, mechanism.routes, mechanism.gravity, [0.0] * len(links))
 
 
-@_robot_model.register
+@robot_model.register
 def _spatial_model(mechanism: SerialArm) -> RobotModel:
     names, links = [c.name for c in mechanism.coordinates], mechanism.links
     return RobotModel(names, links, mechanism.routes, mechanism.gravity, [0.0] * len(links))
 
 
-@_robot_model.register
+@robot_model.register
 def _stick_slip_model(mechanism: WithStickSlip) -> RobotModel:
-    inner, elements = _robot_model(mechanism.inner), mechanism.elements
+    inner, elements = robot_model(mechanism.inner), mechanism.elements
     shares = {
         "the friction by the tensions of the muscles": any(any(each.load_arms) for each in elements),
         "the friction by the load of a bearing": any(any(each.bearing_arms) for each in elements),
