@@ -50,20 +50,16 @@ def interpret(table: RawTable, mapping: ColumnMapping, constants: Mapping[str, f
             run_constants = {constant[0]: constant[1], **run_constants} if constant else run_constants
     fixed.check_constants(table.origin, run_constants)
     ambient = float(run_constants.get("ambient", AMBIENT_PRESSURE))
-    columns: dict[str, Array] = {}
-    notes, unknown = [*table.notes, *_override_notes(table, headings)], list[str]()
-    for heading, cells in zip(headings, table.columns, strict=True):
-        if heading.known:
-            columns[heading.name], note = _convert_column(table, heading, cells, ambient)
-        else:
-            note = _keep_unknown_column(table, heading, cells, columns, unknown)
-        notes += [note] if note and note not in notes else []
-    if unknown:
-        one = len(unknown) == 1
-        what = "Column {} is not a known quantity and is" if one else "Columns {} are not known quantities and are"
-        notes.append(f"{what.format(listed(unknown))} kept without conversion.")
-    notes += _standard_atmosphere(table, headings) if "ambient" not in run_constants else []
-    notes += _add_held(table, columns, held, ambient)
+    columns, notes = _converted_columns(table, headings, ambient, "ambient" in run_constants)
+    for text, value in held.items():
+        heading = parse_heading(text)
+        where = f"{table.origin}: {heading.name}"
+        if heading.name in columns:
+            raise ColumnError(f"{where} is stated as a constant, but a column contains it. Omit one of them.")
+        si = fixed.held_value(heading, value, ambient, where)
+        columns[heading.name] = np.full(len(table.rows), si)
+        unit = "" if heading.target == "1" else f" {heading.target}"
+        notes.append(f"The {heading.name} is {si:.6g}{unit} in every row, as specified by the user.")
     columns, displaced = headed.displacement_columns(columns, run_constants)
     notes += displaced
     if "time" in columns:
@@ -75,29 +71,33 @@ def interpret(table: RawTable, mapping: ColumnMapping, constants: Mapping[str, f
     return Recording(columns, table.origin, run_constants, tuple(notes), written)
 
 
-def _standard_atmosphere(table: RawTable, headings: list[Heading]) -> list[str]:
-    """A note where absolute pressures become gauge pressures although the ambient pressure is not stated."""
-    absolute = [h.name for h in headings if h.target == "Pa" and unit_conversion(table, h, AMBIENT_PRESSURE).offset]
-    text = (
-        f"The {' and '.join(absolute)} is absolute, and the ambient pressure is not stated: it is converted to gauge "
-        f"with the standard atmosphere, {AMBIENT_PRESSURE / 1e3:.4g} kPa."
-    )
-    return [text] if absolute else []
-
-
-def _add_held(table: RawTable, columns: dict[str, Array], held: Mapping[str, float | str], ambient: float) -> list[str]:
-    """Add a column for each quantity that the user states for the whole run; returns a note on each."""
-    notes = []
-    for text, value in held.items():
-        heading = parse_heading(text)
-        where = f"{table.origin}: {heading.name}"
-        if heading.name in columns:
-            raise ColumnError(f"{where} is stated as a constant, but a column contains it. Omit one of them.")
-        si = fixed.held_value(heading, value, ambient, where)
-        columns[heading.name] = np.full(len(table.rows), si)
-        unit = "" if heading.target == "1" else f" {heading.target}"
-        notes.append(f"The {heading.name} is {si:.6g}{unit} in every row, as specified by the user.")
-    return notes
+def _converted_columns(
+    table: RawTable, headings: list[Heading], ambient: float, is_stated: bool
+) -> tuple[dict[str, Array], list[str]]:
+    """The columns in SI units, and notes on overridden and assumed units, on unknown columns, and on the ambient
+    pressure of absolute pressures where it is not stated."""
+    columns: dict[str, Array] = {}
+    notes, unknown = [*table.notes], list[str]()
+    for h, below in zip(headings, [*(table.units or ()), *[""] * len(headings)], strict=False):
+        if (unit := below or parse_heading(h.text).unit) and h.unit and unit != h.unit:
+            notes.append(f"The {h.name} is read in {h.unit}, as specified by the user; the file states {unit}.")
+    for heading, cells in zip(headings, table.columns, strict=True):
+        if heading.known:
+            columns[heading.name], note = _convert_column(table, heading, cells, ambient)
+        else:
+            note = _keep_unknown_column(table, heading, cells, columns, unknown)
+        notes += [note] if note and note not in notes else []
+    if unknown:
+        one = len(unknown) == 1
+        what = "Column {} is not a known quantity and is" if one else "Columns {} are not known quantities and are"
+        notes.append(f"{what.format(listed(unknown))} kept without conversion.")
+    absolute = [h.name for h in headings if h.target == "Pa" and unit_conversion(table, h, ambient).offset]
+    if absolute and not is_stated:
+        notes.append(
+            f"The {' and '.join(absolute)} is absolute, and the ambient pressure is not stated: it is converted to "
+            f"gauge with the standard atmosphere, {AMBIENT_PRESSURE / 1e3:.4g} kPa."
+        )
+    return columns, notes
 
 
 def resolve_headings(table: RawTable, units: Mapping[str, str]) -> list[Heading]:
@@ -142,16 +142,6 @@ def _check_unit_row(table: RawTable, heading: Heading, below: str) -> None:
                 f"{below}. Correct one of them.",
                 hint=Hint("To state the unit", "units", {heading.name: ...}, "ColumnMapping"),
             )
-
-
-def _override_notes(table: RawTable, headings: list[Heading]) -> list[str]:
-    """One note for each column whose unit in the file was overridden by the user."""
-    row = [*(table.units or ()), *[""] * len(headings)]
-    return [
-        f"The {h.name} is read in {h.unit}, as specified by the user; the file states {unit}."
-        for h, below in zip(headings, row, strict=False)
-        if (unit := below or parse_heading(h.text).unit) and h.unit and unit != h.unit
-    ]
 
 
 def _convert_column(table: RawTable, heading: Heading, cells: Cells, ambient: float) -> tuple[Array, str]:

@@ -23,8 +23,7 @@ def read_mdf_tables(
 ) -> tuple[RawTable, ...]:
     """Read one table from all channels, or from the named channel group. Raises FileError or ColumnError.
 
-    A channel group with more than `downsampling.max_rows` rows is read by pieces and reduced. The package for this
-    format is native code, therefore a separate process reads the file.
+    A channel group with more than `downsampling.max_rows` rows is read by pieces and reduced.
     """
     with reading(path, "MDF"), import_lab_package("asammdf", path).MDF(path) as file:
         names = [str(getattr(g.channel_group, "acq_name", "") or f"group {i}") for i, g in enumerate(file.groups, 1)]

@@ -26,8 +26,8 @@ def read_workbook_tables(
 
     text_format  the place of the headings; delimiter and decimal sign do not apply
 
-    Of a formula, its stored value is read; a cell with an error is empty, and chart sheets have no cells. The package
-    for these formats is native code, therefore a separate process reads the file. Raises FileError or ColumnError.
+    Of a formula, its stored value is read; a cell with an error is empty, and chart sheets have no cells. Raises
+    FileError or ColumnError.
     """
     calamine = import_lab_package("python_calamine", path)
     with reading(path, "a workbook"), calamine.CalamineWorkbook.from_path(str(path)) as book:

@@ -17,7 +17,7 @@ from .fit_routes import FitService
 from .joint_sheet import joint_names, sheet_of_joint
 from .page import MAX_PAGE_SHEETS, self_contained_page, server_page, web_files
 from .security import Access, Application, BadRequest, json_answer, limited_table, limited_text, secured
-from .worker import LimitError, WorkerPool
+from .worker import LimitError, Task, WorkerPool
 
 WORKERS, LONG_WORKERS = 5, 3
 """Number of worker processes for sheets, some of which are kept ready, and of those for what may take long: measurement
@@ -36,44 +36,6 @@ SHEETS: Mapping[str, tuple[str, Callable[[], Any], Callable[[str], dict[str, Any
     "joint": ("joint", joint_names, sheet_of_joint),
 }
 """Sheets of the library by their address: what they are, their names, and the task that makes one."""
-
-
-class Sheets:
-    """The sheets that were requested last, by their identifier."""
-
-    def __init__(self, pool: WorkerPool, long_pool: WorkerPool) -> None:
-        self._pool, self._long_pool = pool, long_pool
-        self._kept: collections.OrderedDict[str, dict[str, Any]] = collections.OrderedDict()
-        self._of_library: dict[tuple[str, str], str] = {}
-        self._lock = threading.Lock()
-
-    def get(self, identifier: str) -> dict[str, Any] | None:
-        """The sheet of this identifier; None if it is no longer kept."""
-        with self._lock:
-            return self._kept.get(identifier)
-
-    def of_library(self, task: Callable[[str], dict[str, Any]], name: str) -> dict[str, Any]:
-        """The sheet that a task makes of a name of the library."""
-        key = (task.__name__, name)
-        known = self.get(self._of_library.get(key, ""))
-        if known is None:
-            known = self.of_text(task, name, LIBRARY_LIMIT)
-            self._of_library[key] = known["id"]
-        return known
-
-    def of_text(self, task: Callable[[str], dict[str, Any]], text: str, limit: float = TIME_LIMIT) -> dict[str, Any]:
-        """The sheet that a task makes of a text, within a limit of time [s]."""
-        pool = self._long_pool if task in LONG_TASKS else self._pool
-        return self.keep(pool.call(task, text, limit=limit))
-
-    def keep(self, sheet: dict[str, Any]) -> dict[str, Any]:
-        """The sheet, which is kept."""
-        with self._lock:
-            self._kept[sheet["id"]] = sheet
-            self._kept.move_to_end(sheet["id"])
-            if len(self._kept) > MAX_SHEETS:
-                self._kept.popitem(last=False)
-        return sheet
 
 
 def library_list() -> dict[str, Any]:
@@ -102,8 +64,7 @@ def create_app(
     from starlette.routing import Route
 
     pool = pool or WorkerPool(WORKERS)
-    sheets = Sheets(pool, long_pool or pool)
-    handlers = Handlers(sheets, access, opened)
+    handlers = Handlers(pool, long_pool or pool, access, opened)
     routes = [
         Route("/", handlers.page),
         Route("/web/{name:path}", handlers.web),
@@ -126,15 +87,42 @@ def create_app(
 
 
 class Handlers:
-    """The functions that answer requests."""
+    """The functions that answer requests, and the sheets that were requested last, by their identifier."""
 
-    def __init__(self, sheets: Sheets, access: Access, opened: tuple[dict[str, Any], ...]) -> None:
-        self._sheets, self._access, self._opened = sheets, access, opened
+    def __init__(
+        self, pool: WorkerPool, long_pool: WorkerPool, access: Access, opened: tuple[dict[str, Any], ...]
+    ) -> None:
         from starlette import responses
 
+        self._pool, self._long_pool, self._access, self._opened = pool, long_pool, access, opened
+        self._kept: collections.OrderedDict[str, dict[str, Any]] = collections.OrderedDict()
+        self._of_library: dict[tuple[str, str], str] = {}
+        self._lock = threading.Lock()
         self._web, self._page, self._library, self._responses = web_files(), server_page(), library_list(), responses
         for sheet in opened:
-            sheets.keep(sheet)
+            self._keep(sheet)
+
+    def _get(self, identifier: str) -> dict[str, Any] | None:
+        with self._lock:
+            return self._kept.get(identifier)
+
+    def _keep(self, sheet: dict[str, Any]) -> None:
+        with self._lock:
+            self._kept[sheet["id"]] = sheet
+            self._kept.move_to_end(sheet["id"])
+            if len(self._kept) > MAX_SHEETS:
+                self._kept.popitem(last=False)
+
+    def _sheet(self, task: Task, text: str, limit: float, in_library: bool) -> dict[str, Any]:
+        """The sheet that a task makes of a text, within a limit of time [s]; of the library a kept one."""
+        key = (task.__name__, text)
+        sheet = self._get(self._of_library.get(key, "")) if in_library else None
+        if sheet is None:
+            sheet = (self._long_pool if task in LONG_TASKS else self._pool).call(task, text, limit=limit)
+            self._keep(sheet)
+            if in_library:
+                self._of_library[key] = sheet["id"]
+        return sheet
 
     async def page(self, request: Any) -> Any:
         """The page; a token in its address becomes a cookie, so that it does not stay in the address."""
@@ -153,7 +141,7 @@ class Handlers:
 
     async def program(self, request: Any) -> Any:
         """The printed program of a sheet."""
-        sheet = self._sheets.get(request.path_params["name"].removesuffix(".js"))
+        sheet = self._get(request.path_params["name"].removesuffix(".js"))
         if sheet is None:
             raise BadRequest("this program is no longer kept; reload the page.", 404)
         return self._responses.Response(sheet["script"], media_type="text/javascript")
@@ -170,7 +158,7 @@ class Handlers:
             name = request.path_params["name"]
             if name not in names():
                 raise BadRequest(f"the library has no {what} '{name[:80]}'.", 404)
-            return await self._computed(self._sheets.of_library, task, name)
+            return await self._computed(task, name, LIBRARY_LIMIT, True)
 
         return handle
 
@@ -179,14 +167,14 @@ class Handlers:
 
         async def handle(request: Any) -> Any:
             text = await limited_text(request, tasks.MAX_TEXT)
-            return await self._computed(self._sheets.of_text, task, text, limit)
+            return await self._computed(task, text, limit, False)
 
         return handle
 
-    async def _computed(self, function: Callable[..., dict[str, Any]], *arguments: Any) -> Any:
+    async def _computed(self, *arguments: Any) -> Any:
         from starlette.concurrency import run_in_threadpool
 
-        return json_answer(_without_script(await run_in_threadpool(function, *arguments)))
+        return json_answer(_without_script(await run_in_threadpool(self._sheet, *arguments)))
 
     async def save_page(self, request: Any) -> Any:
         """One file of what is on the screen, without fits: the request names the sheets and the state of the page."""
@@ -196,7 +184,7 @@ class Handlers:
             raise BadRequest("the request must contain sheets, a list of identifiers, and a state.")
         if not 1 <= len(names) <= MAX_PAGE_SHEETS:
             raise BadRequest(f"{len(names)} sheets are requested; allowed range: 1 to {MAX_PAGE_SHEETS}.")
-        sheets = [sheet for sheet in map(self._sheets.get, names) if sheet is not None]
+        sheets = [sheet for sheet in map(self._get, names) if sheet is not None]
         if len(sheets) < len(names):
             raise BadRequest("a program is no longer kept; reload the page.", 404)
         shown = {name: tab for name, tab in state.items() if name != "fit"}
