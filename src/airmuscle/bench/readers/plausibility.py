@@ -4,6 +4,7 @@ Two files with similar numbers under different units contradict each other: at l
 """
 
 import itertools
+import operator
 import warnings
 from collections.abc import Mapping, Sequence
 
@@ -34,7 +35,17 @@ def check_plausible(
         _refuse(table, values, np.abs(values) > MAX_MAGNITUDE, f"{name} is {{}} in SI units; {limit}")
         quantity = name.rpartition(".")[2]
         if quantity == "time" and ordered:
-            _check_ordered(table, values)
+            steps = np.diff(values)
+            row = int(np.argmax(steps <= 0)) + 1 if (steps <= 0).any() else 0
+            if row:
+                hints = (WITHOUT_TIME,) if (steps < 0).any() else (UNIFORM, AS_RECORDED, WITHOUT_TIME)
+                relation = "is less than" if steps[row - 1] < 0 else "repeats"
+                message = (
+                    f"{table.location(row)}: time {values[row]:.9g} s {relation} the time of the previous row "
+                    f"({values[row - 1]:.9g} s). Time must increase: sort the rows, delete the repeated one, or write "
+                    "two runs to two files."
+                )
+                raise ColumnError(HintedText(message, *hints))
         elif quantity == "pressure":
             text = (
                 f"a gauge pressure of {{}} kPa is not above absolute vacuum ({-ambient / 1e3:.4g} kPa gauge). Check "
@@ -71,19 +82,6 @@ def _refuse(
         raise ColumnError(f"{table.location(row)}: {text.replace('{}', f'{values[row] / unit:.4g}')}", hint=hint)
 
 
-def _check_ordered(table: RawTable, time: Array) -> None:
-    steps = np.diff(time)
-    if (steps <= 0).any():
-        row = int(np.argmax(steps <= 0)) + 1
-        hints = (WITHOUT_TIME,) if (steps < 0).any() else (UNIFORM, AS_RECORDED, WITHOUT_TIME)
-        relation = "repeats the time" if time[row] == time[row - 1] else "is less than the time"
-        message = (
-            f"{table.location(row)}: time {time[row]:.9g} s {relation} of the previous row ({time[row - 1]:.9g} s). "
-            f"Time must increase: sort the rows, delete the repeated one, or write two runs to two files."
-        )
-        raise ColumnError(HintedText(message, *hints))
-
-
 SAME_MAGNITUDE, DIFFERENT_UNIT = 1.5, 5.0
 """Maximum ratio of numbers of one magnitude, minimum ratio of contradicting units (chosen: psi to kPa is 6.9)."""
 SUSPICIOUS_RATIO = 50.0
@@ -100,17 +98,17 @@ def check_unit_consistency(recordings: Sequence[Recording]) -> None:
     """
     for name in dict.fromkeys(name for recording in recordings for name in recording.units):
         quantity = quantity_of(name)
-        candidates = [r for r in recordings if name in r.units and len(r) and quantity]
-        sizes = {id(each): _magnitude(each, name) for each in candidates}
-        by_unit: dict[str, list[Recording]] = {}
-        for each in candidates:
-            by_unit.setdefault(each.units[name], []).append(each)
-        groups = [sorted(group, key=lambda r: sizes[id(r)]) for group in by_unit.values()]
-        largest = [max(group, key=lambda r: sizes[id(r)]) for group in by_unit.values()]
+        by_unit: dict[str, list[tuple[Recording, float]]] = {}
+        for each in recordings:
+            if name in each.units and len(each) and quantity:
+                by_unit.setdefault(each.units[name], []).append((each, _magnitude(each, name)))
+        size = operator.itemgetter(1)
+        groups = [sorted(group, key=size) for group in by_unit.values()]
         ends = ((group[0], group[-1]) for group in groups if len(group) > 1)
+        largest = [max(group, key=size) for group in by_unit.values()]
         for first, second in (*itertools.combinations(largest, 2), *ends):
-            if quantity and sizes[id(first)] > 0 and sizes[id(second)] > 0:
-                _compare(name, quantity.unit, (first, sizes[id(first)]), (second, sizes[id(second)]))
+            if quantity and size(first) > 0 and size(second) > 0:
+                _compare(name, quantity.unit, first, second)
 
 
 def _compare(name: str, target: str, one: tuple[Recording, float], two: tuple[Recording, float]) -> None:
@@ -161,9 +159,8 @@ def without_repeated_columns(table: RawTable) -> RawTable:
     same: dict[tuple[str, str], list[int]] = {}
 
     def equal(one: Cells, other: Cells) -> bool:
-        if isinstance(one, list) or isinstance(other, list):
-            return isinstance(one, list) and isinstance(other, list) and one == other
-        return bool(np.array_equal(one, other, equal_nan=True))
+        texts = isinstance(one, list)
+        return texts is isinstance(other, list) and bool(one == other if texts else np.array_equal(one, other, True))
 
     for i, pair in enumerate(zip(table.headings, units, strict=True)):
         before = same.setdefault(pair, [])

@@ -17,7 +17,7 @@ from ...engine.run.integrators import RungeKutta4
 from ...files.library.uncertainty import ParameterUncertainty
 from ...files.scenario.plant_uncertainty import SEPARATOR, parameter_uncertainty
 from ...physics.plant import Plant
-from .task import EnvironmentTask
+from .task import EnvironmentTask, check_actions
 
 T = TypeVar("T")
 _LAW = "characteristic"
@@ -170,7 +170,7 @@ class EpisodeDraw:
                 f"the randomisation is {one_line(randomisations)}; give a tuple, such as "
                 "(FactorRange(('plant.mechanism.inertia',), 0.8, 1.2),)."
             )
-        _ = task.actions  # checks them
+        check_actions(task.actions)
         leaves = list(tree.leaves(task))
         self.task, self._nominal, self._randomisations = task, tree.flatten(task), randomisations
         self._low, self._high = (np.array([leaf.declared.bounds[i] for leaf in leaves]) for i in (0, 1))

@@ -35,6 +35,18 @@ class Action(NamedTuple):
         return {only.name: middle + half * action}
 
 
+def check_actions(actions: tuple[Action, ...]) -> None:
+    """Raise ParameterError for a plant without inputs, or an input whose range is infinite."""
+    if not actions:
+        raise ParameterError("the plant of the task has no inputs; an environment needs one action or more.")
+    for variable in (i for action in actions for i in action.inputs):
+        if not (math.isfinite(variable.minimum) and math.isfinite(variable.maximum)):
+            raise ParameterError(
+                f"the input '{variable.name}' has the range {variable.minimum:g} to {variable.maximum:g}; an action "
+                "needs a finite range. Give a plant whose inputs are limited."
+            )
+
+
 TIME = "time"
 """The input that holds the time of an episode [s] at the end of the present period."""
 
@@ -95,10 +107,7 @@ class EnvironmentTask(System):
 
     @functools.cached_property
     def actions(self) -> tuple[Action, ...]:
-        """The actions, in the order of the inputs of the plant; each is between -1 and 1.
-
-        Raises ParameterError for a plant without inputs, or an input whose range is infinite.
-        """
+        """The actions, in the order of the inputs of the plant; each is between -1 and 1."""
         known, actions = {i.name: i for i in self.plant.input_variables}, []
         for name, variable in known.items():
             prefix, dot, own = name.rpartition(".")
@@ -108,14 +117,6 @@ class EnvironmentTask(System):
             elif variable is fill:
                 meaning = "1 fills, -1 discharges, 0 closes both valves"
                 actions.append(Action(prefix or "valve", meaning, (fill, discharge)))
-        if not actions:
-            raise ParameterError("the plant of the task has no inputs; an environment needs one action or more.")
-        for each in known.values():
-            if not (math.isfinite(each.minimum) and math.isfinite(each.maximum)):
-                raise ParameterError(
-                    f"the input '{each.name}' has the range {each.minimum:g} to {each.maximum:g}; an action needs a "
-                    "finite range. Give a plant whose inputs are limited."
-                )
         return tuple(actions)
 
     @property

@@ -12,7 +12,7 @@ from ...engine.compile.functions import ArraySizes, Extension
 from ...engine.compile.kernel_text import CKernels
 from ...engine.compile.text.languages import CLanguage
 from ...recording.recording import column_heading
-from .exported_run import BETWEEN, SHAPES, STEP, TABLEAU, ExportedLoop, ExportedRun, SolverText
+from .exported_run import BETWEEN, SHAPES, STEP, TABLEAU, ExportedRun, SolverText
 from .identifiers import block_comment, c_integers, c_number, c_string, c_strings, c_values, filled, make_identifiers
 from .printed_system import ExportedSystem
 
@@ -106,11 +106,24 @@ def main_program(program: ExportedRun) -> str:
         every = program.system.known.column_names
         places["columns_at"] = ", ".join(str(every.index(each)) for each in columns)
     else:
+        known, table, driven = program.system.known, loop.drivers, len(loop.drivers.kinds) > 0
+        tables = {
+            "kinds": c_integers(list(map(tuple, table.kinds.tolist()))), "settings": c_values(table.settings),
+            "states": c_values(table.kept),
+        }  # fmt: skip
         numbers |= {
             "samples": loop.numbers["samples"], "pieces": loop.prepared.setpoint_signal.ends.size,
-            "drivers": len(loop.drivers.kinds), "capacity": loop.capacity,
+            "drivers": len(table.kinds), "capacity": loop.capacity,
         }  # fmt: skip
-        places |= _loop_places(program, loop)
+        places |= {
+            **{key: c_number(loop.numbers[key]) for key in ("sample_time", "near", "finish")},
+            "columns_at": c_integers(loop.column_at(known, columns)),
+            "measured_at": c_integers(loop.measured_at(known)), "commanded": c_integers(loop.prepared.commanded),
+            **_signal(loop.prepared.setpoint_signal, "setpoint_"),
+            "driver_tables": filled("driver_tables.c", tables, name) if driven else "",
+            "apply_drivers": filled("apply_drivers.c", {}, name) if driven else "",
+            "kernels": CKernels(_shapes(f"{name.upper()}_INPUTS")).text("driven_inputs", loop.kernels),
+        }  # fmt: skip
     places |= {key: str(number) for key, number in numbers.items()}
     places["program"] = filled("program.c", {"failures": filled("not_commanded.c", {}, name) if loop else ""}, name)
     return filled("loop.c" if loop else "main.c", places, name)
@@ -120,25 +133,6 @@ def _signal(signal: PiecewiseLinear, kind: str = "") -> dict[str, str]:
     """The places of the segments of a signal."""
     return {f"{kind}values": c_values(signal.values, 1), f"{kind}slopes": c_values(signal.slopes, 1),
             f"{kind}ends": c_values(signal.ends)}  # fmt: skip
-
-
-def _loop_places(program: ExportedRun, loop: ExportedLoop) -> dict[str, str]:
-    """The places of a control loop; its arrays, which its kernels are given, are not const."""
-    name, known, table = program.name, program.system.known, loop.drivers
-    tables = {
-        "kinds": c_integers(list(map(tuple, table.kinds.tolist()))), "settings": c_values(table.settings),
-        "states": c_values(table.kept),
-    }  # fmt: skip
-    driven = len(table.kinds) > 0
-    return {
-        **{key: c_number(loop.numbers[key]) for key in ("sample_time", "near", "finish")},
-        "columns_at": c_integers(loop.column_at(known, program.columns)),
-        "measured_at": c_integers(loop.measured_at(known)), "commanded": c_integers(loop.prepared.commanded),
-        **_signal(loop.prepared.setpoint_signal, "setpoint_"),
-        "driver_tables": filled("driver_tables.c", tables, name) if driven else "",
-        "apply_drivers": filled("apply_drivers.c", {}, name) if driven else "",
-        "kernels": CKernels(_shapes(f"{name.upper()}_INPUTS")).text("driven_inputs", loop.kernels),
-    }  # fmt: skip
 
 
 def _shapes(inputs: str) -> dict[str, tuple[str, ...]]:

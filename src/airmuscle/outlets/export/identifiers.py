@@ -2,6 +2,7 @@
 where a file comes from."""
 
 import hashlib
+import itertools
 import re
 import textwrap
 import unicodedata
@@ -47,11 +48,10 @@ def make_identifiers(names: Sequence[str]) -> tuple[str, ...]:
     identifiers = []
     for name in names:
         word = _word(name)
-        number = last.get(word, 1)
-        candidate = word if number == 1 else f"{word[: LONGEST - 8]}_{number}"
-        while candidate.casefold() in taken:
-            number += 1
-            candidate = f"{word[: LONGEST - 8]}_{number}"
+        for number in itertools.count(last.get(word, 1)):
+            candidate = word if number == 1 else f"{word[: LONGEST - 8]}_{number}"
+            if candidate.casefold() not in taken:
+                break
         taken.add(candidate.casefold())
         last[word] = number
         identifiers.append(candidate)

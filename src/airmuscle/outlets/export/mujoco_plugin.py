@@ -87,15 +87,15 @@ class MuscleActuator(ShortRepr):
             raise ParameterError(f"the plugin {self.plugin_name} was not built: {self.remark}.")
         if bool(tendon) == bool(joint):
             raise ParameterError("MuscleActuator: give either a tendon or a joint as transmission.")
-        config = {path: _text(path, value) for path, value in (parameters or {}).items()}
-        check_known("MuscleActuator: there is no parameter", config, self.parameters)
-        if rest_length is not None:
-            config[REST_LENGTH] = _text(REST_LENGTH, rest_length)
+        check_known("MuscleActuator: there is no parameter", parameters or {}, self.parameters)
+        config = {**(parameters or {}), **({} if rest_length is None else {REST_LENGTH: rest_length})}
+        for path in (path for path, value in config.items() if not math.isfinite(value)):
+            raise ParameterError(f"MuscleActuator: {path} is {config[path]}; it must be finite.")
         _load(self.plugin_name, self.library)
         if self.plugin_name not in {p.plugin_name for p in spec.plugins}:
             spec.activate_plugin(self.plugin_name)
         instance = spec.add_plugin(name=f"{name}_plugin", plugin_name=self.plugin_name)
-        instance.config = config
+        instance.config = {path: repr(float(value)) for path, value in config.items()}
         actuator = spec.add_actuator(name=name, target=tendon or joint)
         actuator.trntype = mujoco.mjtTrn.mjTRN_TENDON if tendon else mujoco.mjtTrn.mjTRN_JOINT
         actuator.gear[0] = gear
@@ -189,13 +189,6 @@ def _sources(part: Plant, name: str, controls: Sequence[Input], lines: Sequence[
     texts = c_files(name, system, Rodas4(TOLERANCE), lines)
     texts[f"{name}_plugin.c"] = filled("mujoco_plugin.c", values, name)
     return {file: text.encode() for file, text in texts.items()}
-
-
-def _text(name: str, value: float) -> str:
-    """A number as an attribute. Raises ParameterError if it is not finite."""
-    if not math.isfinite(value):
-        raise ParameterError(f"MuscleActuator: {name} is {value}; it must be finite.")
-    return repr(float(value))
 
 
 def _load(plugin: str, library: Path) -> None:
