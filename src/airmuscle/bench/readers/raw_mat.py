@@ -133,19 +133,15 @@ def _make_table(
 ) -> RawTable:
     channels, notes = _of_one_length(origin, list(_channels(origin, fields)), columns)
     table = merge_channels(origin, channels, {**constants, **_scalar_fields(fields)})
-    left_out = [f"{key} ({what})" for key, value in fields.items() if (what := _no_numbers(value, len(table.rows)))]
+    left_out = []
+    for key, value in fields.items():
+        if isinstance(value, np.ndarray | list) and len(value) == len(table.rows) and not _is_array(value):
+            is_complex = isinstance(value, np.ndarray) and value.dtype.kind == "c"
+            kind = "texts" if all(isinstance(each, str) for each in value) else "cells"
+            left_out.append(f"{key} ({'complex numbers' if is_complex else kind})")
     if left_out:
         notes = (*notes, f"Not read, because it contains no real numbers: {', '.join(left_out)}.")
     return table.noted(*notes)
-
-
-def _no_numbers(value: Any, rows: int) -> str:
-    """What a column of `rows` values contains in place of real numbers; empty for any other value."""
-    if not isinstance(value, np.ndarray | list) or len(value) != rows or _is_array(value):
-        return ""
-    if isinstance(value, np.ndarray) and value.dtype.kind == "c":
-        return "complex numbers"
-    return "texts" if all(isinstance(each, str) for each in value) else "cells"
 
 
 def _of_one_length(
@@ -176,22 +172,19 @@ def _of_one_length(
 def _channels(origin: str, fields: Mapping[str, Any]) -> Iterator[Channel]:
     units_field = fields.get("units", fields.get("unit", {}))
     units = units_field if isinstance(units_field, Mapping) else {}
+    lists = (each.tolist() if isinstance(each, np.ndarray) and each.dtype.kind in "UO" else each
+             for each in fields.values())  # fmt: skip
+    columns = [[text.strip() for text in each] for each in lists
+               if isinstance(each, list) and all(isinstance(text, str) for text in each)]  # fmt: skip
     for name, value in fields.items():
         if _is_array(value) and value.ndim == 1:
             yield Channel(name, value, unit=str(units.get(name, "")))
         elif _is_array(value):
-            names = _column_names(name, value.shape[1], fields)
-            yield from (Channel(names[j], value[:, j]) for j in range(value.shape[1]))
+            width = value.shape[1]  # without a list of texts next to the matrix, expressions of MATLAB: `data(:,1)`
+            indexed = [f"{name}(:,{j})" for j in range(1, width + 1)]
+            names = next((each for each in columns if len(each) == width), indexed)
+            yield from (Channel(names[j], value[:, j]) for j in range(width))
         elif isinstance(value, np.ndarray) and value.ndim > 2:
             raise ColumnError(
                 f"{origin}: '{name}' has {value.ndim} dimensions; a table has two. Save its columns separately."
             )
-
-
-def _column_names(name: str, width: int, fields: Mapping[str, Any]) -> list[str]:
-    """The column names from a list of texts next to the matrix, otherwise MATLAB index expressions: `data(:,1)`."""
-    for value in fields.values():
-        texts = value.tolist() if isinstance(value, np.ndarray) and value.dtype.kind in "UO" else value
-        if isinstance(texts, list) and len(texts) == width and all(isinstance(t, str) for t in texts):
-            return [t.strip() for t in texts]
-    return [f"{name}(:,{j})" for j in range(1, width + 1)]

@@ -205,20 +205,22 @@ def export_loop(problem: Problem, name: str, title: str, tunable: Sequence[str] 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class ExportedRun:
-    """A problem ready for a target, with its control loop if it has one; `columns` are written after time."""
+    """A problem ready for a target, with its control loop if it has one.
+
+    segments   of the inputs, whose drivers are resolved; in a loop, of those that are not commanded
+    times      (N,) of the rows [s]
+    columns    what is written after time
+    """
 
     name: str
     system: ExportedSystem
     problem: Problem
+    integrator: Integrator
+    segments: PiecewiseLinear
+    times: Array
     provenance: Sequence[str]
     columns: Sequence[str]
-    loop: ExportedLoop | None = None
-
-    @property
-    def integrator(self) -> Integrator:
-        """The integrator."""
-        assert self.problem.integrator is not None
-        return self.problem.integrator
+    loop: ExportedLoop | None
 
     @property
     def tolerance(self) -> float | None:
@@ -226,19 +228,9 @@ class ExportedRun:
         return self.integrator.rtol if isinstance(self.integrator, Rodas4) else None
 
     @property
-    def segments(self) -> PiecewiseLinear:
-        """The segments of the inputs, whose drivers are resolved; in a loop, of those that are not commanded."""
-        return self.problem.segments if self.loop is None else self.loop.others
-
-    @property
     def first_inputs(self) -> list[float]:
         """The inputs at the beginning of the run."""
         return list(map(float, self.segments.values[0]))
-
-    @property
-    def times(self) -> Array:
-        """The times (N,) of the rows [s]."""
-        return self.problem.times if self.loop is None else self.loop.prepared.times
 
     def data(self) -> dict[str, Any]:
         """What a program states of its system and run: names in tuples, numbers in arrays."""

@@ -175,7 +175,9 @@ def make_run(
     known = sum(loop.added_columns if loop else (), system.known.column_names)
     check_known("the run has no column", columns, known)
     lines = provenance(title, problem.system, (integrator,), notes)
-    return ExportedRun(name, system, problem, lines, tuple(c for c in columns if c != "time") or known, loop)
+    segments, times = (loop.others, loop.prepared.times) if loop else (problem.segments, problem.times)
+    written = tuple(c for c in columns if c != "time") or known
+    return ExportedRun(name, system, problem, integrator, segments, times, lines, written, loop)
 
 
 def write_law(
