@@ -12,7 +12,7 @@ from ...engine.compile.functions import ArraySizes, Extension
 from ...engine.compile.kernel_text import CKernels
 from ...engine.compile.text.languages import CLanguage
 from ...recording.recording import column_heading
-from .exported_run import BETWEEN, SHAPES, STEP, TABLEAU, ExportedRun, SolverText
+from .exported_run import BETWEEN, SHAPES, STEP, TABLEAU, ExportedRun, solver_text
 from .identifiers import block_comment, c_integers, c_number, c_string, c_strings, c_values, filled, make_identifiers
 from .printed_system import ExportedSystem
 
@@ -39,7 +39,7 @@ def c_files(
     fields |= {"c": "c", "nominal": f"{name}_nominal"} | {key: key.upper() for key in TABLEAU}
     lengths = {size: f"{upper}_{size}{'' if size in {'STATES', 'STAGES'} else ' + 1'}"
                for each in SHAPES.values() for size in each}  # fmt: skip
-    solver = SolverText(CKernels(shapes, f"{name}_"), integrator, fields, lengths)
+    solver = solver_text(CKernels(shapes, f"{name}_"), integrator, fields, lengths)
     functions, sizes = system.printed(CLanguage("double", f"{name}_", PUBLIC), implicit=solver.implicit, extend=extend)
     numbers = {
         "states": sizes.states, "inputs": sizes.inputs, "parameters": len(system.tunable), "held": sizes.held,

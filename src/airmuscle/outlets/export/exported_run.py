@@ -1,15 +1,13 @@
 """Run of an exported program: its signals and times as numbers, its solver as text, and its control loop."""
 
 import dataclasses
-import functools
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ...core import Array, ParameterError
 from ...engine.compile.kernel_text.printer import KernelPrinter
-from ...engine.compile.kernel_text.types import TypedKernel
 from ...engine.compile.program import Description
 from ...engine.loop import COMMAND, MEASURED, SETPOINT, PiecewiseLinear
 from ...engine.run import ExplicitRungeKutta, Integrator, Problem, Rodas4
@@ -47,58 +45,42 @@ RESULTS = ("result", "reached", "taken", "following", "rejections")
 """Results of `single_step`."""
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class SolverText:
+class SolverText(NamedTuple):
     """The step of an integrator in a language.
 
-    fields   the text of each field of the solver that STEP and BETWEEN name
-    sizes    the text of each size in SHAPES
-    work     what stands before the names of arrays of the workspace
+    places     printed functions, and their calls with their workspace, for a template
+    constants  first step (0: to be found), distance within which a time belongs to a step, relative tolerance, tableau
+    implicit   whether the step needs the Jacobian
     """
 
-    printer: KernelPrinter
-    integrator: Integrator
-    fields: Mapping[str, str]
-    sizes: Mapping[str, str]
-    work: str = ""
+    places: dict[str, str]
+    constants: dict[str, Any]
+    implicit: bool
 
-    @functools.cached_property
-    def _kernels(self) -> dict[str, TypedKernel]:
-        return self.printer.typed(self.integrator.printed_step, ("single_step", "state_between"))
 
-    @property
-    def implicit(self) -> bool:
-        """Whether the step needs the Jacobian."""
-        return "jac" in self._kernels["single_step"].called
-
-    @property
-    def constants(self) -> dict[str, Any]:
-        """First step (0: to be found), distance within which a time belongs to a step, relative tolerance, and the
-        tableau that the step reads."""
-        own = self.integrator
-        if not isinstance(own, ExplicitRungeKutta):
-            return {"FIRST_STEP": 0.0, "CLOSE": 0.0, "RTOL": own.rtol if isinstance(own, Rodas4) else 0.0}
-        read, (rows, weights) = self._kernels["single_step"].arguments, own.tableau()
+def solver_text(
+    printer: KernelPrinter, integrator: Integrator, fields: Mapping[str, str], sizes: Mapping[str, str], work: str = ""
+) -> SolverText:
+    """The step of an integrator, with the texts of the fields of the solver that STEP and BETWEEN name, of the sizes in
+    SHAPES, and of what stands before the names of arrays of the workspace."""
+    kernels = printer.typed(integrator.printed_step, ("single_step", "state_between"))
+    step, tolerance = kernels["single_step"], integrator.rtol if isinstance(integrator, Rodas4) else 0.0
+    constants: dict[str, Any] = {"FIRST_STEP": 0.0, "CLOSE": 0.0, "RTOL": tolerance}
+    if isinstance(integrator, ExplicitRungeKutta):
+        rows, weights = integrator.tableau()
         table = np.zeros((len(weights), len(weights)))
         for i, row in enumerate(rows, 1):
             table[i, : len(row)] = row
         arrays = table, np.array(weights), np.array([0.0, *map(sum, rows)])
-        tableau = {key.upper(): value for key, value in zip(TABLEAU, arrays, strict=True) if key in read}
-        return {"FIRST_STEP": own.step, "CLOSE": 1e-9 * own.step, "RTOL": 0.0, **tableau}
-
-    @functools.cached_property
-    def places(self) -> dict[str, str]:
-        """The printed functions, and their calls with their workspace, for a template."""
-        result = {"steps": self.printer.printed(self._kernels)}
-        for name, fields, results in (("single_step", STEP, RESULTS), ("state_between", BETWEEN, ())):
-            kernel = self._kernels[name]
-            given = {key: self.fields[field] for key, field in fields.items()}
-            own = [key for key in kernel.arguments if key in SHAPES and key not in {*given, "between"}]
-            work = {key: [self.sizes[size] for size in SHAPES[key]] for key in own}
-            result[f"{name}_work"] = self.printer.workspace(work)
-            given |= {key: f"{self.work}{key}" for key in own}
-            result[name] = self.printer.bound_call(kernel, given, results)
-        return result
+        constants |= {"FIRST_STEP": integrator.step, "CLOSE": 1e-9 * integrator.step}
+        constants |= {key.upper(): each for key, each in zip(TABLEAU, arrays, strict=True) if key in step.arguments}
+    places = {"steps": printer.printed(kernels)}
+    for name, known, results in (("single_step", STEP, RESULTS), ("state_between", BETWEEN, ())):
+        kernel, given = kernels[name], {key: fields[field] for key, field in known.items()}
+        own = [key for key in kernel.arguments if key in SHAPES and key not in {*given, "between"}]
+        places[f"{name}_work"] = printer.workspace({key: [sizes[size] for size in SHAPES[key]] for key in own})
+        places[name] = printer.bound_call(kernel, given | {key: f"{work}{key}" for key in own}, results)
+    return SolverText(places, constants, "jac" in step.called)
 
 
 CONTROLLER = "controller."

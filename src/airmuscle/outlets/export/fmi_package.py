@@ -25,16 +25,6 @@ CATEGORIES = ("logStatusWarning", "logStatusError")
 """Categories of messages: a validity range that was left, and a failure."""
 
 
-@dataclasses.dataclass(frozen=True)
-class FmuExperiment:
-    """The default experiment: times [s], relative tolerance, and the step of a sampled controller [s]; 0: none."""
-
-    start: float
-    stop: float
-    tolerance: float = 0.0
-    step: float = 0.0
-
-
 def xml_text(root: Element) -> str:
     """An element as the text of a file, indented."""
     indent(root)
@@ -86,6 +76,7 @@ class FmuPackage:
     token         text that an importer passes on, so that description and binary belong together
     dependencies  the value references of the states and inputs on which an unknown depends, by its value reference
     indicators    number of event indicators
+    experiment    the default one: startTime and stopTime [s], tolerance or stepSize of a sampled controller [s]
     sources       C sources and headers by name, without those of the standard and of its functions
     has_states    whether it has states with derivatives, also adjoint ones, and can be used in Model Exchange
     related       inputs.csv and results.csv, data of run.exp and the manifest of FMI-LS-REF 1.0.0-alpha.1; or none
@@ -97,14 +88,14 @@ class FmuPackage:
     variables: Sequence[Variable]
     dependencies: Mapping[int, Sequence[int]]
     indicators: int
-    experiment: FmuExperiment
+    experiment: Mapping[str, float]
     sources: Mapping[str, str]
     has_states: bool = True
     related: Mapping[str, str] = dataclasses.field(default_factory=dict)
 
     def description(self, fmi: int) -> str:
         """The file modelDescription.xml."""
-        given, structured = self.experiment, all(_STRUCTURED.fullmatch(v.name) for v in self.variables)
+        structured = all(_STRUCTURED.fullmatch(v.name) for v in self.variables)
         tokens = {2: {"guid": self.token, "numberOfEventIndicators": str(self.indicators)},
                   3: {"instantiationToken": self.token}}  # fmt: skip
         root = Element("fmiModelDescription", {
@@ -117,9 +108,7 @@ class FmuPackage:
         categories = SubElement(root, "LogCategories")
         for name in CATEGORIES:
             SubElement(categories, "Category", name=name)
-        attributes = {"startTime": given.start, "stopTime": given.stop}
-        attributes |= {key: x for key, x in (("tolerance", given.tolerance), ("stepSize", given.step)) if x}
-        SubElement(root, "DefaultExperiment", {key: repr(float(x)) for key, x in attributes.items()})
+        SubElement(root, "DefaultExperiment", {key: repr(float(x)) for key, x in self.experiment.items()})
         variables = SubElement(root, "ModelVariables")
         for v in self.variables:
             numbers = _numbers(v)
@@ -210,7 +199,7 @@ class FmuPackage:
         texts[f"fmi{fmi}.c"] = filled(f"fmi{fmi}.c", places, name)
         files |= {f"sources/{file}": text for file, text in texts.items()}
         if self.related:
-            span = {key: repr(value) for key, value in dataclasses.asdict(self.experiment).items()}
+            span = {key.removesuffix("Time"): repr(value) for key, value in self.experiment.items()}
             run = filled("run.exp", {**span, "title": html.escape(self.provenance[0])}, name)
             texts = {**self.related, "run.exp": run, "fmi-ls-manifest.xml": template("fmi-ls-manifest.xml")}
             files |= {f"extra/org.fmi-standard.fmi-ls-ref/{file}": text for file, text in texts.items()}

@@ -14,7 +14,7 @@ from ...physics.plant.plant import Plant
 from .c_source import c_files, csv_text
 from .compiler import Platform
 from .exported_run import ExportedRun
-from .fmi_package import FmuExperiment, FmuPackage, WrittenFmu, check_target, token_of, write_archive
+from .fmi_package import FmuPackage, WrittenFmu, check_target, token_of, write_archive
 from .fmi_variables import has_unit, make_variables, references_of
 from .identifiers import c_number, c_string, c_strings, c_values, filled
 from .printed_system import acting_parameters
@@ -98,7 +98,8 @@ def fmu_package(
     for place in derivatives.places:
         unknown, known = references_of(program.system.known, place)
         dependencies.setdefault(unknown, []).append(known)
-    experiment = FmuExperiment(problem.start_time, float(program.times[-1]), program.tolerance or 1e-6)
+    experiment = {"startTime": problem.start_time, "stopTime": float(program.times[-1])}
+    experiment["tolerance"] = program.tolerance or 1e-6
     instance = filled("instance.h", _instance(program, derivatives, indicators, token, starts), program.name)
     return FmuPackage(
         program.name, program.provenance, token, variables, dependencies, indicators.count, experiment,

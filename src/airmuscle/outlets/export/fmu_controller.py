@@ -13,7 +13,7 @@ from ...engine.run.sampled_loop import SampledLoop, prepare_loop
 from ...recording.columns import column_units
 from . import fmi_package
 from .compiler import Platform
-from .fmi_package import FmuExperiment, FmuPackage, WrittenFmu, archive, check_target, token_of
+from .fmi_package import FmuPackage, WrittenFmu, archive, check_target, token_of
 from .fmi_variables import Variable, Variables, base_powers, has_unit
 from .fmu import fmu_package
 from .identifiers import block_comment, c_number, c_values, filled, program_name
@@ -53,7 +53,8 @@ def controller_package(problem: Problem, fmi: int, name: str = "", title: str = 
     token = token_of(*variables, *printed.source_files().values(), fmi)
     outputs = [v.reference for v in variables if v.causality == "output"]
     known = [v.reference for v in variables if v.causality == "input"]
-    experiment = FmuExperiment(problem.start_time, float(prepared.instants[-1]), step=loop.sample_time)
+    experiment = {"startTime": problem.start_time, "stopTime": float(prepared.instants[-1])}
+    experiment["stepSize"] = loop.sample_time
     bounds = [leaf.declared.bounds for leaf in printed.tunable]
     places = printed.places | {
         "provenance": block_comment(printed.provenance), "token": token, "period": c_number(loop.sample_time),
@@ -161,7 +162,7 @@ def _structure(name: str, parts: dict[str, FmuPackage]) -> str:
         powers = {base: str(power) for base, power in (base_powers(unit) or {}).items()}
         SubElement(SubElement(units, "ssc:Unit", name=unit), "ssc:BaseUnit", powers)
     experiment = parts["controller"].experiment
-    SubElement(root, "ssd:DefaultExperiment", startTime=repr(experiment.start), stopTime=repr(experiment.stop))
+    SubElement(root, "ssd:DefaultExperiment", {key: repr(experiment[key]) for key in ("startTime", "stopTime")})
     return fmi_package.xml_text(root)
 
 

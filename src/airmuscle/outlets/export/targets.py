@@ -19,7 +19,7 @@ from ...engine.compile.text.languages import DEFINITION, CLanguage, JavaScriptLa
 from ...engine.run import Integrator
 from ...physics.muscle.characteristic import Characteristic, ContractionLaw, ForceLaw, PressureLaw
 from .c_source import c_files, csv_header, main_program
-from .exported_run import BETWEEN, SHAPES, STEP, TABLEAU, ExportedRun, SolverText
+from .exported_run import BETWEEN, SHAPES, STEP, TABLEAU, ExportedRun, SolverText, solver_text
 from .identifiers import block_comment, c_strings, c_values, filled, line_comment, provenance, template, with_cmake
 
 FORMS: tuple[tuple[type[Characteristic], str, tuple[str, str], tuple[str, str, str]], ...] = (
@@ -169,7 +169,7 @@ class Octave(Target):
         name, loop, system = program.name, program.loop, program.system
         fields = {key: f"s.{key}" for key in {*STEP.values(), *BETWEEN.values()}} | {"end": "s.finish"}
         sizes = {"STATES": "s.n", "INPUTS": "numel(s.u)", "STAGES": "numel(s.weights)", "JACOBIAN": "0", "FACTORS": "0"}
-        solver = SolverText(MatlabKernels(SHAPES), program.integrator, fields, sizes)
+        solver = solver_text(MatlabKernels(SHAPES), program.integrator, fields, sizes)
         functions, _ = system.printed(MatlabLanguage(), implicit=solver.implicit)
         method, data = solver.constants, program.data()
         steps = {key.lower(): m_number(method.pop(key)) for key in ("FIRST_STEP", "CLOSE")}
@@ -208,7 +208,7 @@ def _javascript_solver(integrator: Integrator) -> SolverText:
     fields |= {"nominal": "nominal"} | {key: key.upper() for key in TABLEAU}
     lengths = {"STATES": "states.length", "INPUTS": "inputs.length", "STAGES": "WEIGHTS.length",
                "JACOBIAN": "SIZES.jacobian", "FACTORS": "SIZES.factors"}  # fmt: skip
-    return SolverText(JavaScriptKernels(), integrator, fields, lengths, "work.")
+    return solver_text(JavaScriptKernels(), integrator, fields, lengths, "work.")
 
 
 def _types(program: ExportedRun) -> dict[str, str]:
