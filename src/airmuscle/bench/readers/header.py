@@ -42,12 +42,8 @@ def bare_heading(text: str) -> str:
 def stated_heading_row(
     rows: Iterable[tuple[int, Sequence[str]]], named: Sequence[str], skip_rows: int | None
 ) -> int | None:
-    """The index of the row of headings that the user states; None if nothing is stated or found.
-
-    rows       numbers in the file, counted from 1, and cells
-    named      headings that the row contains, complete or without unit: the row with most of them
-    skip_rows  number of rows of the file above the headings
-    """
+    """The index of the row of headings that the user states, by the number of rows of the file above it or by headings
+    that it contains, complete or without unit; None if nothing is stated or found. `rows` have numbers from 1 on."""
     best, most = None, 0
     for index, (number, cells) in enumerate(itertools.islice(rows, None if skip_rows else MAX_PREAMBLE)):
         if skip_rows is not None:

@@ -29,9 +29,7 @@ def read_mat_tables(
     """Read one table from each struct with vectors, or from the named struct. Raises FileError or ColumnError.
 
     If the vectors of a struct differ in length, those of the length of the mapped `columns` are read, or without any
-    those of the length of the known quantities.
-
-    A file with a variable of more than `downsampling.max_rows` rows is reduced while it is read.
+    those of the length of the known quantities. A long variable is reduced while it is read.
     """
     if is_plain_hdf5(path):
         plain: tuple[RawTable, ...] = inspect.unwrap(read_hdf5_tables)(path, group, downsampling)

@@ -40,8 +40,7 @@ def seconds_from_clock(cells: Sequence[str]) -> Array | None:
 def _parse_time(cell: str) -> float | None:
     """The time in a cell [us], counted from midnight or, with a date, from 1970; None if it is not a clock time.
 
-    Microseconds since 1970 are exact as floating-point numbers, seconds with a fraction are not.
-    A time that states its offset from UTC is converted to UTC, so that the change to summer time is no gap.
+    Microseconds are exact as floating-point numbers. A time that states its offset from UTC is converted to UTC.
     """
     clock = _TIME_OF_DAY.fullmatch(cell)
     if clock:

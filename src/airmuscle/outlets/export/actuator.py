@@ -151,10 +151,7 @@ class ActuatorModel:
 
 
 def actuator_model(plant: Plant, *, muscle: str = "", step: float | None = None) -> ActuatorModel:
-    """One muscle of a plant with its circuit, without the load.
-
-    muscle  its name, if the plant has several, each with a circuit of its own
-    step    the longest step of the integrator [s]; by default 1 ms, or less where the plant is faster
+    """One muscle of a plant with its circuit, without the load; arguments as for `write_actuator`.
 
     Raises ParameterError for a plant that has not one command, and a step that is not positive.
     """

@@ -25,10 +25,8 @@ def compile_library(
     sources: Mapping[str, bytes], units: Sequence[str], name: str, more: Sequence[str] = (),
     command: Sequence[str] | None = None,
 ) -> bytes:  # fmt: skip
-    """The shared library `name` of the files `units` among `sources`, compiled in a fresh folder.
-
-    more     further arguments of the compiler
-    command  compiler with its first arguments; by default that of this machine
+    """The shared library `name` of the files `units` among `sources`, compiled in a fresh folder by a compiler with its
+    first and `more` arguments, by default that of this machine.
 
     Raises ParameterError where there is no compiler, FileError where it fails.
     """
@@ -63,14 +61,10 @@ def run_command(command: Sequence[str], folder: Path | None = None) -> subproces
 
 @dataclasses.dataclass(frozen=True)
 class BuiltProgram:
-    """Output of an exported program, and the bytes of its code and stack with optimisation for size.
+    """Standard output and error of an exported program, and the bytes of its sources without `main.c`, compiled small.
 
-    output      standard output
-    messages    standard error
-    code_size   [bytes] machine code and constants of the sources without `main.c`; None where the program `size` is
-                missing
-    stack_size  [bytes] of the functions of the sources without `main.c` together, without those of the C library; None
-                where it is not known
+    code_size   [bytes] machine code and constants; None where the program `size` is missing
+    stack_size  [bytes] of all functions together, without those of the C library; None where it is not known
     """
 
     output: str
@@ -82,11 +76,8 @@ class BuiltProgram:
 def measure_sizes(
     command: Sequence[str], size: str | None, sources: Sequence[Path], folder: Path
 ) -> tuple[int | None, int | None]:
-    """The bytes of machine code and constants, and of the stack, of sources without `main.c`, optimised for size.
-
-    command  compiler and its options
-    size     the program `size` of the compiler
-    """
+    """The bytes of machine code and constants, and of the stack, of sources without `main.c`, optimised for size by a
+    compiler with its options; `size` is the program of this name."""
     units = [p for p in sources if p.suffix == ".c" and p.name != "main.c"]
     if not units:
         return None, None

@@ -149,9 +149,7 @@ def _places(names: Iterable[str], groups: Sequence[Sequence[str]]) -> list[tuple
 
 
 def export_loop(problem: Problem, name: str, title: str, tunable: Sequence[str] | None) -> ExportedLoop:
-    """The control loop of a problem, ready for a target; `name` is that of the printed controller.
-
-    tunable  paths of the parameters of the controller that can be changed, without `controller.`; None: all
+    """The control loop of a problem, ready for a target, with the name and the tunable parameters of its controller.
 
     Raises ParameterError for what cannot be printed, by its name: a controller in Python, a driver of another kind, and
     a run that continues another.

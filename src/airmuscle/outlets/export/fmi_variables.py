@@ -71,12 +71,8 @@ class Variables(list[Variable]):
 
 
 def make_variables(program: ExportedRun, indicators: int, starts: Mapping[str, float]) -> list[Variable]:
-    """The variables of an FMU, by increasing value reference, with so many event indicators at the end.
-
-    starts  pressures of muscles [Pa] at the start by their columns
-
-    Raises ParameterError for two variables of one name.
-    """
+    """The variables of an FMU, by increasing value reference, with the pressures of muscles [Pa] at the start by their
+    columns, and so many event indicators at the end. Raises ParameterError for two variables of one name."""
     variables, units, known = Variables(), program.system.units, program.system.compiled.system
     for state, start in zip(known.states, program.problem.initial_vector.tolist(), strict=True):
         given = {"unit": state.unit, "nominal": state.nominal}

@@ -157,12 +157,8 @@ WIDTH = 112
 
 
 def provenance(title: str, model: Any, further: Iterable[Any] = (), notes: Sequence[str] = ()) -> list[str]:
-    """The lines that state where an exported file comes from; they depend on their arguments and the version alone.
-
-    model    the plant, law or controller
-    further  other objects whose references belong to the file, such as the integrator
-    notes    further paragraphs
-    """
+    """The lines that state where a file comes from, by its model, `further` objects with references, such as the
+    integrator, and paragraphs of notes; they depend on these and the version alone."""
     version = metadata.version("airmuscle")
     lines = [title, f"Exported by airmuscle {version}.", f"SHA-256 of the model: {fingerprint(model)}", *LICENCE]
     for note in notes:

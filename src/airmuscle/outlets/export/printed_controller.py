@@ -108,11 +108,8 @@ class PrintedController:
         return with_cmake(self.name, {**self.source_files(), "main.c": filled("replay.c", places, self.name)})
 
     def arduino_files(self, sample_time: float, setpoints: Sequence[float]) -> dict[str, str]:
-        """An Arduino library: properties, header and source in `src`, and an example sketch, by path.
-
-        sample_time  [s]
-        setpoints    (s,) at the beginning of the run
-        """
+        """An Arduino library: properties, header and source in `src`, and an example sketch with the sample time [s]
+        and the set points (s,) at the beginning of the run, by path."""
         name = self.name
         measured, points, commands = (
             [f"[{name}_{kind}_{word}]".upper() for word in make_identifiers(self._kinds[kind])]
@@ -196,11 +193,8 @@ def print_controller(
     prepared: SampledLoop, name: str, title: str = "", tunable: Sequence[str] | None = (), number: str = "double",
     notes: Sequence[str] = (),
 ) -> PrintedController:  # fmt: skip
-    """The control law of a prepared loop, with its sample time, ranges and fixed parameters as constants.
-
-    tunable  paths of the parameters that remain variables; None: all
-    notes    further lines of the comment at the beginning
-    """
+    """The control law of a prepared loop, with its sample time, ranges and fixed parameters as constants; the tunable
+    ones (None: all) remain variables, and `notes` are further lines of the comment at the beginning."""
     import casadi
 
     loop, law = prepared.loop, prepared.loop.controller

@@ -90,13 +90,8 @@ def per_second(unit: str) -> str:
 
 
 def export_system(compiled: CompiledSystem, tunable: Sequence[str] | None = None) -> ExportedSystem:
-    """A compiled system ready for printing.
-
-    tunable  paths of the parameters that can be changed in the printed program, such as `mechanism.mass`; all by
-             default. The others are constants of it, which makes it smaller.
-
-    Raises ParameterError for a path that is not a parameter of the system.
-    """
+    """A compiled system ready for printing, with the paths of its tunable parameters, all by default; the others are
+    constants, which makes it smaller. Raises ParameterError for a path that is not a parameter of the system."""
     traced, known = compiled.program.traced, list(leaves(compiled.system))
     if tunable is None:
         return ExportedSystem(compiled, traced, tuple(known))

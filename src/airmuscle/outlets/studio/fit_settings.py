@@ -214,11 +214,8 @@ def used_rows(recording: am.Recording, rules: Sequence[Rule], outliers: Sequence
 def selected(
     recordings: Sequence[am.Recording], rules: Sequence[Rule], outliers: Sequence[Sequence[Outlier]]
 ) -> list[am.Recording]:
-    """The recordings reduced to the selected rows, with a note on what was left out; without those that are empty.
-
-    The rows of the rules and of the outliers of each recording are those of the file. Raises RequestError if no row is
-    left.
-    """
+    """The recordings reduced to the selected rows of their files, with a note on what was left out; without those that
+    are empty. Raises RequestError if no row is left."""
     kept = []
     for complete, found in zip(recordings, outliers, strict=True):
         recording = leave_out(complete, found)

@@ -58,11 +58,8 @@ _UNTRACEABLE = (AirmuscleError, RuntimeError, TypeError, ValueError)
 
 
 def law_sheet(entry: Entry) -> dict[str, Any]:
-    """The sheet of an entry, with the text of its program under "script".
-
-    A law without a closed form is approximated on its validity range, and the sheet states the error. Raises
-    TraceError for one without a validity range.
-    """
+    """The sheet of an entry, with the text of its program under "script"; of a law without a closed form, that of its
+    approximation on its validity range, with the error. Raises TraceError for one without a validity range."""
     law, errors = _in_closed_form(entry)
     geometry, kind, ratings = entry.geometry, type(entry.characteristic), entry.ratings
     text, functions, held = print_law(law, geometry)
@@ -194,11 +191,7 @@ def toml_template(write: Callable[[Any], str], model: Any) -> Template:
 
 def print_law(law: Law, geometry: am.geometry.Geometry | None) -> tuple[str, list[str], int]:
     """The program of a traceable law, and of the outline where the geometry is in closed form, as JavaScript text; the
-    names of its functions, and the length of `c`.
-
-    Parameters are the leaves of the law, then those of the geometry unless it is part of the law. Raises TraceError
-    for a law without a closed form.
-    """
+    names of its functions, and the length of `c`. Raises TraceError for a law without a closed form."""
     model, p = autodiff.symbolic(parameter_model(law, geometry))
     model, shape = law_and_geometry(model, geometry)
     printer, names = Printer(JavaScriptLanguage(exported=False)), []

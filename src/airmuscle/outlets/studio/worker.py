@@ -74,11 +74,8 @@ SPARE = 2
 
 
 class WorkerPool:
-    """Some workers, which are started when they are needed; with `warm`, SPARE more than are occupied are kept ready.
-
-    `warm` is a task without arguments that a new worker runs once, so that its imports delay nobody. One worker is
-    started at a time, so that the first one is ready soon.
-    """
+    """Some workers, which are started when they are needed, one at a time, so that the first one is ready soon; with
+    `warm`, a task that a new worker runs once for its imports, SPARE more than are occupied are kept ready."""
 
     def __init__(self, count: int, warm: Callable[[], Any] | None = None) -> None:
         self._all = [LimitedWorker() for _ in range(count)]
