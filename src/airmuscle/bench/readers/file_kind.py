@@ -35,10 +35,8 @@ _DEEP_KEY = re.compile(r"(?<![\w-])(?:[\w-]+[ \t]*\.[ \t]*)" + f"{{{MAX_KEYS}}}"
 
 
 def check_regular_file(path: Path) -> None:
-    """Raise FileError unless the path is a regular file that is not empty; the file is not opened.
-
-    The files of the system, such as those in /proc, have a size of zero, and may have no end.
-    """
+    """Raise FileError unless the path is a regular file that is not empty; the file is not opened. The files of the
+    system, such as those in /proc, have a size of zero, and may have no end."""
     try:
         state = os.stat(path)
     except (OSError, ValueError) as reason:  # ValueError: a null character in the name

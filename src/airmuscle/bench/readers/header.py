@@ -88,10 +88,8 @@ def parse_headings(
 
 
 def parse_unit_row(headings: Sequence[str], cells: Sequence[str]) -> tuple[str, ...] | None:
-    """The units in the row below the headings; None if the row is not a unit row.
-
-    A unit row contains at least one unit and no number except 1.
-    """
+    """The units in the row below the headings; None if the row is not a unit row. A unit row contains at least one unit
+    and no number except 1."""
     bare = [re.sub(r"^\[(.*)\]$|^\((.*)\)$", r"\1\2", cell) for cell in cells]
     if any(is_number(cell) and cell != "1" for cell in bare):
         return None
@@ -122,10 +120,8 @@ def _is_unit(heading: str, cell: str) -> bool:
 
 
 def parse_constant_comment(line: str) -> tuple[str, float | str] | None:
-    """Name and value in `# resting_length [mm] = 300` or `# resting_length: 300 mm`; None for any other comment.
-
-    Any number or quoted text (JSON) after one word is a constant of the run; another text only after a known name.
-    """
+    """Name and value in `# resting_length [mm] = 300` or `# resting_length: 300 mm`; None for any other comment. Any
+    number or quoted text (JSON) after one word is a constant of the run; another text only after a known name."""
     match = _CONSTANT_COMMENT.fullmatch(line.strip())
     if not match:
         return None

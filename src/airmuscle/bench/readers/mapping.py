@@ -141,10 +141,8 @@ def read_mapping(path: str | Path, base: ColumnMapping = ColumnMapping()) -> Col
 
 
 def mapping_of_tables(content: Mapping[str, Any], where: str, base: ColumnMapping = ColumnMapping()) -> ColumnMapping:
-    """The mapping `base` with what the keys of a TOML table state; tables are merged, and None states nothing.
-
-    `where` begins the messages. Raises as `read_mapping`.
-    """
+    """The mapping `base` with what the keys of a TOML table state; tables are merged, and None states nothing. `where`
+    begins the messages. Raises as `read_mapping`."""
     given = {key: value for key, value in content.items() if value is not None}
     for key, value in given.items():
         _check_entry(key, value, where)

@@ -267,10 +267,8 @@ def _hdf5_objects(path: Path) -> Iterator[MatlabObject]:
 
 
 def read_objects(path: Path, objects: Sequence[MatlabObject]) -> dict[str, Mapping[str, Any]]:
-    """The numeric columns of the tables and timetables, by variable; with their units in `units`, if stated.
-
-    Empty without the package mat-io. A timetable has the column `time`, in seconds from its first row.
-    """
+    """The numeric columns of the tables and timetables, by variable; with their units in `units`, if stated. Empty
+    without the package mat-io. A timetable has the column `time`, in seconds from its first row."""
     names = [each.name for each in objects if each.class_name in READABLE]
     if not names or not is_installed(_PACKAGE):
         return {}

@@ -20,10 +20,8 @@ StoredTable = tuple[str, list[Channel], dict[str, float | str], Reduction]
 
 @in_separate_process("pyarrow")
 def read_parquet_tables(path: Path, group: str | None = None) -> tuple[RawTable, ...]:
-    """Read the table of a Parquet file; the metadata `unit` of a column states its unit, that of the file constants.
-
-    A Parquet file has no groups; `group` is not used. Raises FileError or ColumnError.
-    """
+    """Read the table of a Parquet file; the metadata `unit` of a column states its unit, that of the file constants. A
+    Parquet file has no groups; `group` is not used. Raises FileError or ColumnError."""
     parquet = import_lab_package("pyarrow.parquet", path)
     with reading(path, "Parquet"):
         table = parquet.read_table(str(path))

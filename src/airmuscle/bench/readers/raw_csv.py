@@ -135,10 +135,8 @@ def is_large_file(path: Path) -> bool:
 def read_large_csv(
     path: Path, text_format: TextFormat, downsampling: Downsampling, progress: Progress | None = None
 ) -> RawTable:
-    """The table in a large text file, with at most `downsampling.max_rows` rows; a note reports a reduction.
-
-    With Decimation, the lines between the kept rows are not parsed. Raises FileError or ColumnError.
-    """
+    """The table in a large text file, with at most `downsampling.max_rows` rows; a note reports a reduction. With
+    Decimation, the lines between the kept rows are not parsed. Raises FileError or ColumnError."""
     with path.open("rb") as file:
         beginning = file.read(_HEADER_BYTES)
     encoding = form.detect_encoding(beginning)
@@ -160,10 +158,8 @@ def read_large_csv(
 def read_text_stream(
     stream: BinaryIO, origin: str, text_format: TextFormat = TextFormat(), downsampling: Downsampling = Decimation()
 ) -> RawTable:
-    """The table in a stream, such as a pipe, which is read once to its end and has an unknown length.
-
-    With Decimation, one row in 2, 4, 8, ... is kept as soon as there are more. Raises FileError or ColumnError.
-    """
+    """The table in a stream, such as a pipe, which is read once to its end and has an unknown length. With Decimation,
+    one row in 2, 4, 8, ... is kept as soon as there are more. Raises FileError or ColumnError."""
     beginning = stream.read(_HEADER_BYTES)
     if not beginning.strip():
         raise FileError(f"{origin}: it contains nothing. Check the program that writes to it.")

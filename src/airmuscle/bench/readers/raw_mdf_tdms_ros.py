@@ -21,10 +21,8 @@ _TIME_MASTER = 1
 def read_mdf_tables(
     path: Path, group: str | None = None, downsampling: Downsampling = Decimation()
 ) -> tuple[RawTable, ...]:
-    """Read one table from all channels, or from the named channel group. Raises FileError or ColumnError.
-
-    A channel group with more than `downsampling.max_rows` rows is read by pieces and reduced.
-    """
+    """Read one table from all channels, or from the named channel group. Raises FileError or ColumnError. A channel
+    group with more than `downsampling.max_rows` rows is read by pieces and reduced."""
     with reading(path, "MDF"), import_lab_package("asammdf", path).MDF(path) as file:
         names = [str(getattr(g.channel_group, "acq_name", "") or f"group {i}") for i, g in enumerate(file.groups, 1)]
         check_known(f"{path.name}: no group", [] if group is None else group, names, "the groups are", FileError)

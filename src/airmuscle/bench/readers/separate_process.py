@@ -69,10 +69,8 @@ _lock = threading.Lock()
 
 
 def in_separate_process(package: str) -> Callable[[Callable[Given, Result]], Callable[Given, Result]]:
-    """A decorator of a reader in native code, which the separate process evaluates, from a regular file.
-
-    It raises FileError if the package that the reader needs is not installed, or if the file is not regular.
-    """
+    """A decorator of a reader in native code, which the separate process evaluates, from a regular file. It raises
+    FileError if the package that the reader needs is not installed, or if the file is not regular."""
 
     def decorated(read: Callable[Given, Result]) -> Callable[Given, Result]:
         @functools.wraps(read)
@@ -90,10 +88,8 @@ def in_separate_process(package: str) -> Callable[[Callable[Given, Result]], Cal
 
 
 def call_in_separate_process(module: str, function: str, path: Path, *arguments: Any) -> Any:
-    """Return `function(path, *arguments)` of a module, evaluated in the separate process.
-
-    An exception of the function is raised here. Raises FileError if the process ends or exceeds the time limit.
-    """
+    """Return `function(path, *arguments)` of a module, evaluated in the separate process. An exception of the function
+    is raised here. Raises FileError if the process ends or exceeds the time limit."""
     path = Path(path).absolute()
     limit, seconds = (each * (1.0 + path.stat().st_size / 1e8) for each in (TIME_LIMIT, CPU_LIMIT))
     try:
@@ -112,9 +108,7 @@ def call_in_separate_process(module: str, function: str, path: Path, *arguments:
 
 def call_function(seconds: float, module: str, function: str, path: Path, *arguments: Any) -> Any:
     """The result of a function of a module, which is imported only in the separate process, within its limits.
-
-    `seconds` of the processor limit the time.
-    """
+    `seconds` of the processor limit the time."""
     if resource is not None:
         size = path.stat().st_size
         _limit(resource.RLIMIT_CPU, time.process_time() + seconds)

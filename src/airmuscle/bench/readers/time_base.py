@@ -23,10 +23,8 @@ _TIME_OF_DAY = re.compile(r"(\d{1,3}):([0-5]\d):([0-5]\d(?:\.\d+)?)")
 
 
 def seconds_from_clock(cells: Sequence[str]) -> Array | None:
-    """Time since the first cell [s], shape (N,); None if any cell is not a clock time.
-
-    For times without a date, a decrease by more than half a day is taken as the passing of midnight.
-    """
+    """Time since the first cell [s], shape (N,); None if any cell is not a clock time. For times without a date, a
+    decrease by more than half a day is taken as the passing of midnight."""
     texts = [cell.strip().replace(",", ".") for cell in cells]
     times = [_parse_time(text) for text in texts]
     if not times or any(time is None for time in times):
@@ -39,9 +37,7 @@ def seconds_from_clock(cells: Sequence[str]) -> Array | None:
 
 def _parse_time(cell: str) -> float | None:
     """The time in a cell [us], counted from midnight or, with a date, from 1970; None if it is not a clock time.
-
-    Microseconds are exact as floating-point numbers. A time that states its offset from UTC is converted to UTC.
-    """
+    Microseconds are exact as floating-point numbers. A time that states its offset from UTC is converted to UTC."""
     clock = _TIME_OF_DAY.fullmatch(cell)
     if clock:
         return 3600e6 * float(clock[1]) + 60e6 * float(clock[2]) + 1e6 * float(clock[3])

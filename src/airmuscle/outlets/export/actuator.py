@@ -151,10 +151,8 @@ class ActuatorModel:
 
 
 def actuator_model(plant: Plant, *, muscle: str = "", step: float | None = None) -> ActuatorModel:
-    """One muscle of a plant with its circuit, without the load; arguments as for `write_actuator`.
-
-    Raises ParameterError for a plant that has not one command, and a step that is not positive.
-    """
+    """One muscle of a plant with its circuit, without the load; arguments as for `write_actuator`. Raises
+    ParameterError for a plant that has not one command, and a step that is not positive."""
     part = open_plant(single_muscle(plant, muscle))
     controls, step = controls_of(part), _stable_step(part) if step is None else step
     if not 0.0 < step < 1.0:

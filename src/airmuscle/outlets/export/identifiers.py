@@ -64,10 +64,8 @@ def make_identifier(name: str) -> str:
 
 
 def program_name(given: str, title: str) -> str:
-    """The name of a program that the user has given, or else one from a title, in lower case.
-
-    Raises ParameterError, with a name that is possible, if the given one is not an identifier.
-    """
+    """The name of a program that the user has given, or else one from a title, in lower case. Raises ParameterError,
+    with a name that is possible, if the given one is not an identifier."""
     if given and make_identifier(given) != given:
         raise ParameterError(
             f"'{given[:80]}' cannot be the name of an exported program: it must consist of ASCII letters, digits and "

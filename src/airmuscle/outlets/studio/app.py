@@ -56,9 +56,7 @@ def create_app(
     fits: FitService | None = None, long_pool: WorkerPool | None = None,
 ) -> Application:  # fmt: skip
     """The ASGI application. `opened` are sheets with which the page begins. Raises ImportError without starlette.
-
-    `long_pool` computes joints and sizings, by default `pool`.
-    """
+    `long_pool` computes joints and sizings, by default `pool`."""
     from starlette.applications import Starlette
     from starlette.requests import ClientDisconnect
     from starlette.routing import Route

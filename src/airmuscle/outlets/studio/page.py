@@ -49,10 +49,8 @@ def server_page() -> str:
 
 
 def self_contained_page(sheets: Sequence[Mapping[str, Any]], state: Mapping[str, Any]) -> str:
-    """One file without server and network: sheets with their programs, and the state of the page.
-
-    Its policy allows the scripts and styles in it by their digests, and nothing else.
-    """
+    """One file without server and network: sheets with their programs, and the state of the page. Its policy allows the
+    scripts and styles in it by their digests, and nothing else."""
     data = {"state": state, "sheets": [{k: v for k, v in s.items() if k != "script"} for s in sheets]}
     embedded = json.dumps(data).replace("<", "\\u003c").replace(">", "\\u003e").replace("&", "\\u0026")
     scripts = [web_file(name) for name in SCRIPTS[:-1] if not name.startswith(SERVER_ONLY)]

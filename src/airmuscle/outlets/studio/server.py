@@ -93,9 +93,7 @@ def close_one_of(connections: Any) -> None:
 
 def access_of(host: str) -> Access:
     """The rules of access: a token for all, and the names of this machine alone if the server is reached only there.
-
-    Other users of this machine reach a loopback address as well, so it has a token too.
-    """
+    Other users of this machine reach a loopback address as well, so it has a token too."""
     return Access((*LOOPBACK, _bracketed(host).lower()) if is_loopback(host) else (), secrets.token_urlsafe(32))
 
 

@@ -25,10 +25,8 @@ class LimitError(InputError):
 
 
 class LimitedWorker:
-    """A process that runs one task at a time, with limits of time and memory and messages for a page.
-
-    `kill` ends it from another thread, and the call that waits for it raises LimitError; `stop` ends it between calls.
-    """
+    """A process that runs one task at a time, with limits of time and memory and messages for a page. `kill` ends it
+    from another thread, and the call that waits for it raises LimitError; `stop` ends it between calls."""
 
     def __init__(self) -> None:
         self._worker = Worker(_prepare)
