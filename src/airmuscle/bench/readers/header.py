@@ -29,11 +29,6 @@ def is_number(cell: str) -> bool:
     return True
 
 
-def are_headings(cells: Sequence[str]) -> bool:
-    """Whether a row of cells contains headings: at least one cell is not a number."""
-    return not all(is_number(cell) for cell in cells if cell)
-
-
 def bare_heading(text: str) -> str:
     """A heading without the unit in brackets, `force` of `force [N]`."""
     return text.partition("[")[0].partition("(")[0].strip()
@@ -67,9 +62,9 @@ def parse_headings(
     without headings, unless `headerless`, and FileError without a row of numbers.
     """
     cells = rows[0]
-    if are_headings(cells):
+    if not all(map(is_number, filter(None, cells))):
         headings, count = list(cells), 1
-    elif len(above) == len(cells) and are_headings(above):
+    elif len(above) == len(cells) and not all(map(is_number, filter(None, above))):
         headings, count = list(above), 0
     elif headerless:
         headings, count = [str(i) for i in range(1, len(cells) + 1)], 0

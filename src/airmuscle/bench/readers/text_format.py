@@ -15,8 +15,8 @@ from .channels import Cells, RawTable
 NumberedLines = list[tuple[int, str]]
 """Lines of a file with their numbers, counted from 1."""
 
-_DELIMITERS = ("\t", ";", ",", "|", " ")
-_DECIMALS = (".", ",")
+_SIGNS = {"delimiter": (("\t", ";", ",", "|", " "), "a comma, semicolon, tab, blank or '|'"),
+          "decimal": ((".", ","), "'.' or ','")}  # fmt: skip
 
 
 @dataclasses.dataclass(frozen=True)
@@ -34,15 +34,12 @@ class TextFormat:
     skip_rows: int | None = None
 
     def __post_init__(self) -> None:
-        if self.delimiter is not None and self.delimiter not in _DELIMITERS:
-            raise ParameterError(
-                f"delimiter is {abridged(self.delimiter)}; it must be a comma, semicolon, tab, blank or '|'. Omit it "
-                "for automatic detection."
-            )
-        if self.decimal is not None and self.decimal not in _DECIMALS:
-            raise ParameterError(
-                f"decimal is {abridged(self.decimal)}; it must be '.' or ','. Omit it for automatic detection."
-            )
+        for name, (signs, text) in _SIGNS.items():
+            given = getattr(self, name)
+            if given is not None and given not in signs:
+                raise ParameterError(
+                    f"{name} is {abridged(given)}; it must be {text}. Omit it for automatic detection."
+                )
         if self.delimiter == self.decimal == ",":
             raise ParameterError("delimiter and decimal are both ','; they must differ. Export the table with ';'.")
 

@@ -141,14 +141,6 @@ class ActuatorModel:
             printer.add(name, inputs, {output: casadi.cse(casadi.densify(result))}, ["h"] if "h" in inputs else ())
         return printer.module(), printer.held
 
-    @property
-    def command_meaning(self) -> str:
-        """What the command sets."""
-        names = [control.name for control in self.controls]
-        if len(names) == 2:
-            return f"{names[0]} where positive, {names[1]} where negative"
-        return f"{names[0]}: {self.controls[0].meaning}" if names else "without effect"
-
 
 def actuator_model(plant: Plant, *, muscle: str = "", step: float | None = None) -> ActuatorModel:
     """One muscle of a plant with its circuit, without the load; arguments as for `write_actuator`. Raises

@@ -10,17 +10,8 @@ from ...core import Array, ParameterError
 from ...engine.compile.kernel_text.printer import KernelPrinter
 from ...engine.compile.program import Description
 from ...engine.loop import COMMAND, MEASURED, SETPOINT, PiecewiseLinear
-from ...engine.run import ExplicitRungeKutta, Integrator, Problem, Rodas4
-from ...engine.run.sampled_loop import (
-    CLOSE,
-    KINDS,
-    MAX_CAPACITY,
-    DriverTable,
-    SampledLoop,
-    greatest_capacity,
-    prepare_loop,
-    snapped,
-)
+from ...engine.run import ExplicitRungeKutta, Integrator, Problem, Rodas4, sampled_loop
+from ...engine.run.sampled_loop import CLOSE, KINDS, MAX_CAPACITY, DriverTable, SampledLoop, prepare_loop, snapped
 from .printed_controller import PrintedController, check_control_law, print_controller
 from .printed_system import ExportedSystem
 
@@ -169,7 +160,7 @@ def export_loop(problem: Problem, name: str, title: str, tunable: Sequence[str] 
                     "input signals."
                 )
     prepared = prepare_loop(problem, loop.init(problem.start_time))
-    capacity = greatest_capacity(prepared)
+    capacity = sampled_loop.greatest_capacity(prepared)
     if capacity > MAX_CAPACITY:
         raise ParameterError(
             f"the drivers make up to {capacity} segments of an input between two samples; {MAX_CAPACITY} are allowed. "

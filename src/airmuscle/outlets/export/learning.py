@@ -103,12 +103,16 @@ class ExportedActuator:
         """The filled templates, by the ends of the names of their files."""
         model, (low, high) = self.model, self.model.command_range
         functions, held = model.print_functions(language)
+        controls = model.controls
+        command = f"{controls[0].name}: {controls[0].meaning}" if controls else "without effect"
+        if len(controls) == 2:
+            command = f"{controls[0].name} where positive, {controls[1].name} where negative"
         bounds = np.array([leaf.declared.bounds for leaf in model.parameters], dtype=float).reshape(-1, 2)
         places = more | {
             "provenance": line_comment(self.provenance).replace("%", "#"), "title": self.title,
             "class": "".join(word[:1].upper() + word[1:] for word in self.name.split("_")),
             "file": self.name, "functions": functions, "held": str(max(held, 1)),
-            "unit": model.controls[0].unit if model.controls else "1", "command": model.command_meaning,
+            "unit": controls[0].unit if controls else "1", "command": command,
             "length": repr(float(model.part.resting_lengths[0])), "low": repr(float(low)), "high": repr(float(high)),
             "step": repr(float(model.step)), "states": _tuple(s.name for s in model.part.states),
             "parameters": _tuple(leaf.path for leaf in model.parameters),

@@ -3,6 +3,7 @@
 import dataclasses
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -74,9 +75,17 @@ class PrintedPredictive(PrintedController):
 
         single  the operations of the program itself, each rounded to single precision
         """
+        law, memory, rows = self.law, self.law.init(), list[Any]()
         if single:
-            return self._in_single_precision(measured, setpoints)
-        law, memory, rows = self.law, self.law.init(), []
+            sample, known = plain_kernels("predictive")["predictive_sample"], {**law.arrays(), **self._given}
+            arrays = {name: each if each.dtype == np.int64 else each.astype(np.float32) for name, each in known.items()}
+            at, to = law.model.measured.astype(np.float32), law.model.controlled.astype(np.float32)
+            sizes, operating = law.model.input_sizes.astype(np.float32), law.model.inputs.astype(np.float32)
+            for values, points in zip(measured.astype(np.float32), setpoints.astype(np.float32), strict=True):
+                arrays |= {"y": values - at, "r": points - to}
+                sample(*arrays.values())
+                rows.append(operating + sizes * arrays["inputs"])
+            return np.array(rows, dtype=float)
         ranges = dict(zip(law.inputs, self.ranges, strict=True))
         for values, points in zip(measured.tolist(), setpoints.tolist(), strict=True):
             seen = Measurement(
@@ -85,18 +94,6 @@ class PrintedPredictive(PrintedController):
             commands, memory = law.step(memory, seen, 0.0)
             rows.append([commands[name] for name in law.inputs])
         return np.array(rows)
-
-    def _in_single_precision(self, measured: Array, setpoints: Array) -> Array:
-        law, sample, rows = self.law, plain_kernels("predictive")["predictive_sample"], []
-        single, known = np.float32, {**law.arrays(), **self._given}
-        arrays = {name: array if array.dtype == np.int64 else array.astype(single) for name, array in known.items()}
-        at, to = law.model.measured.astype(single), law.model.controlled.astype(single)
-        sizes, operating = law.model.input_sizes.astype(single), law.model.inputs.astype(single)
-        for values, points in zip(measured.astype(single), setpoints.astype(single), strict=True):
-            arrays |= {"y": values - at, "r": points - to}
-            sample(*arrays.values())
-            rows.append(operating + sizes * arrays["inputs"])
-        return np.array(rows, dtype=float)
 
 
 def print_predictive(prepared: SampledLoop, name: str, title: str, number: str) -> PrintedPredictive:
