@@ -31,6 +31,10 @@ STARTS = {
         "app(['evaluate', 'chou-hannaford', '--pressure', '3 bar', '--force', '100 N'], standalone_mode=False)",
         (HEAVY | {"llvmlite", "airmuscle.bench.identify"}) - {"typer", "rich"},
     ),
+    "airmuscle convert": (
+        "from airmuscle.outlets.cli import app\napp(['convert', '--help'], standalone_mode=False)",
+        (HEAVY | {"casadi", "airmuscle.bench.identify", "airmuscle.physics"}) - {"typer", "rich"},
+    ),
 }
 
 

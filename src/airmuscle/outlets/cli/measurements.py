@@ -9,12 +9,13 @@ from typing import Annotated
 
 import typer
 
+import airmuscle as am
+
 from ...bench.readers import ColumnMapping, Decimation, RecordedTime, read, write
 from ...bench.readers.reader import find_files
 from ...bench.readers.writer import EXTENSIONS
 from ...bench.segment import check_contents, inspect_all, inspection_chapters
 from ...core import FileError, ParameterError
-from ...files.library import load_data
 from ...recording import Recording
 from ...recording.recording import row_notes
 from ...report.chapter import Chapter
@@ -57,7 +58,7 @@ def read_recordings(files: list[Path], reading: ReadingRequest) -> list[Recordin
         recordings = read(paths, mapping, progress=progress) if paths else ()
     check_contents(recordings)
     print_row_notes(recordings)
-    return [*recordings, *(load_data(str(name)) for name in names)]
+    return [*recordings, *(am.load_data(str(name)) for name in names)]
 
 
 def reading_chapters(recordings: Iterable[Recording]) -> list[Chapter]:
