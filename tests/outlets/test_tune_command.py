@@ -164,13 +164,13 @@ def test_every_case_starts_at_the_pressure_of_the_scenario(scenario):
 def test_an_interruption_writes_the_best_gains_so_far(scenario, monkeypatch):
     @contextlib.contextmanager
     def stopped(label):
-        def show(fraction):
+        def show(name, fraction):
             if fraction > 0.4:
                 raise KeyboardInterrupt
 
         yield show
 
-    monkeypatch.setattr(command, "computation_progress", stopped)
+    monkeypatch.setattr(command, "progress_bars", stopped)
     result = run("tune", scenario, "--budget", "128", "--draws", "0", "--out", scenario.parent / "out")
     assert result.exit_code == 130
     assert "the best gains so far are written" in result.stderr

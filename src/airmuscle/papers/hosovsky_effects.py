@@ -277,14 +277,16 @@ def ratio_ranges(parameters: UnpublishedParameters, suspected: SuspectedCauses) 
 
 def range_table(ranges: tuple[RatioRange, ...]) -> Table:
     """Return the ratios of filling to discharging over the ranges of the parameters."""
-    places = ("low end", "chosen value", "high end")
-    return titled("hosovsky_effect_ranges", {
+    columns: dict[str, list[Any]] = {
         "parameter": [r.meaning for r in ranges],
         "unit": [format_unit(r.unit) for r in ranges],
-        **{place: [r.values[i] for r in ranges] for i, place in enumerate(places)},
-        **{f"ratio at the {place} [1]": [None if math.isnan(r.ratios[i]) else _round(r.ratios[i]) for r in ranges]
-           for i, place in enumerate(places)},
-    })  # fmt: skip
+    }
+    places = ("low end", "chosen value", "high end")
+    columns |= {place: [r.values[i] for r in ranges] for i, place in enumerate(places)}
+    for i, place in enumerate(places):
+        ratios = [r.ratios[i] for r in ranges]
+        columns[f"ratio at the {place} [1]"] = [None if math.isnan(each) else _round(each) for each in ratios]
+    return titled("hosovsky_effect_ranges", columns)
 
 
 def describe_ranges(ranges: tuple[RatioRange, ...]) -> str:

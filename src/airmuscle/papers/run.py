@@ -19,11 +19,7 @@ from ..report.chapter import Chapter, Plot, Table
 from ..report.claims import AtLeast, AtMost, Claim, ClaimRow, Equal, Kind, PublishedValue
 from ..report.write import rendered_figure, write_report
 
-PAPERS: dict[str, str] = {
-    "saga2007": "airmuscle.papers.saga2007",
-    "borzikova": "airmuscle.papers.borzikova",
-    "hosovsky": "airmuscle.papers.hosovsky",
-}
+PAPERS = {name: f"airmuscle.papers.{name}" for name in ("saga2007", "borzikova", "hosovsky")}
 """The papers in the order of the report, each with the module whose function `chapter()` reproduces it."""
 
 TITLE = "Reproduction of three papers on pneumatic artificial muscles"

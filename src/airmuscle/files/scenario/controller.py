@@ -61,7 +61,10 @@ class PlantSignals:
 
     def make(self, cls: type[Any], parts: Mapping[str, Any], numbers: Mapping[str, Any], location: Location) -> Any:
         """The model of a class; its numbers are read in the units of the signals that its parts name."""
-        outline = _outline(cls, parts)
+        outline = object.__new__(cls)  # not validated: numbers are defaults or 0
+        for field in dataclasses.fields(cls):
+            default = 0.0 if field.default is dataclasses.MISSING else field.default
+            object.__setattr__(outline, field.name, parts.get(field.name, default))
         if self.units is None:
             return outline
         hints = typing.get_type_hints(cls)
@@ -108,15 +111,6 @@ def _read(value: Any, declared: Parameter, unit: str, hint: Any, location: Locat
             f"({declared.symbol}, {declared.meaning})."
         )
     return read_parameter(value, dataclasses.replace(declared, unit=unit), hint, location)
-
-
-def _outline(cls: type[Any], parts: Mapping[str, Any]) -> Any:
-    """A model with its structural fields, whose numbers are defaults or 0; it is not validated."""
-    outline = object.__new__(cls)
-    for field in dataclasses.fields(cls):
-        default = 0.0 if field.default is dataclasses.MISSING else field.default
-        object.__setattr__(outline, field.name, parts.get(field.name, default))
-    return outline
 
 
 def plant_fields(cls: type[Any]) -> tuple[str, ...]:

@@ -66,7 +66,12 @@ def run_chapter(scenario: Scenario, recording: Recording) -> Chapter:
 def _range_table(scenario: Scenario, recording: Recording) -> Table:
     """Return the minimum, maximum and last value of each column, in the unit in which it is displayed."""
     names, declared = list(recording), run_column_units(scenario.problem)
-    scales = [_scale(name, declared.get(name)) for name in names]
+    scales = []
+    for name in names:
+        quantity, own = quantity_of(name), declared.get(name)
+        factor, unit = display_scale(name)
+        is_usual = quantity is not None and own in (None, quantity.unit)  # a unit that a model declares stays
+        scales.append((factor, unit.removesuffix("-")) if is_usual else (1.0, own or ""))
     values = [factor * recording[name] for name, (factor, _) in zip(names, scales, strict=True)]
     columns: dict[str, Any] = {
         "column": names,
@@ -76,15 +81,6 @@ def _range_table(scenario: Scenario, recording: Recording) -> Table:
         "unit": [unit for _, unit in scales],
     }
     return Table("ranges", "Columns", columns, brief=MAX_BRIEF)
-
-
-def _scale(name: str, declared: str | None) -> tuple[float, str]:
-    """Factor and unit in which a column is displayed; a unit that a model declares in place of the usual one stays."""
-    quantity = quantity_of(name)
-    if quantity is None or declared not in (None, quantity.unit):
-        return 1.0, declared or ""
-    factor, unit = display_scale(name)
-    return factor, unit.removesuffix("-")
 
 
 def _input_plot(scenario: Scenario, recording: Recording) -> Plot:

@@ -32,7 +32,7 @@ from ..requests import ReadingRequest, braid_of_length, check_one_length, many, 
 from .delivery import Execution, deliver
 from .measurements import print_row_notes, reading_chapters
 from .options import Folder, Json, argument, with_requests
-from .terminal import computation_progress, echo, in_options, reading_progress
+from .terminal import echo, in_options, progress_bars
 
 OMITTED_ROOMS = ("outlets", "papers", "report", "design", "files", "control")
 """Rooms of the program that do not affect the stages of a campaign."""
@@ -142,7 +142,12 @@ def campaign(
     if scenarios and not any(scenario.text for scenario in scenarios):
         notes.append(f"scenarios: not written: {'; '.join(dict.fromkeys(each.reason for each in scenarios))}")
     chapters[0] = dataclasses.replace(chapters[0], notes=(*chapters[0].notes, *notes))
-    contents = {**_muscles(result, entry), **{f"{SCENARIOS}/{s.name}": s.text for s in scenarios if s.text}}
+    contents = {f"{SCENARIOS}/{s.name}": s.text for s in scenarios if s.text}
+    if entry is not None:  # and the muscles of the other resting lengths
+        lengths = {r.resting_length for r in result.records if r.kind.is_static and r.resting_length is not None}
+        others = {length: _entry(result, length) for length in sorted(lengths - {result.resting_length})}
+        named_muscles = {f"muscle-{1e3 * length:.0f}mm.toml": to_toml(each) for length, each in others.items() if each}
+        contents = {"muscle.toml": to_toml(entry), **named_muscles, **contents}
     chapters += reading_chapters(complete)
     writes = writes or execution.takes_over(out)
     deliver("campaign", chapters, json=json, out=out, title="Bench campaign", files=contents, writes=writes)
@@ -151,7 +156,7 @@ def campaign(
 def _read_each(files: Sequence[Path], mapping: ColumnMapping) -> tuple[list[Recording], list[tuple[str, str]]]:
     """The recordings, and the files that cannot be read with the reason. Raises FileError if none can be read."""
     recordings, unread = list[Recording](), list[tuple[str, str]]()
-    with reading_progress("reading") as show:
+    with progress_bars("reading") as show:
         for i, path in enumerate(files):
             show("files", i / len(files))
             try:
@@ -181,9 +186,9 @@ def _identify(
             with atomic_folder(out) as folder:
                 (folder / STAGES_FILE).write_text(as_json(stages), encoding="utf-8")
 
-    with execution.executor(alone=True) as workers, computation_progress("campaign") as show:
+    with execution.executor(alone=True) as workers, progress_bars("campaign") as show:
         result = identify_campaign(
-            recordings, geometry=geometry, progress=lambda _, fraction: show(fraction), finished=keep, known=known,
+            recordings, geometry=geometry, progress=lambda _, fraction: show("", fraction), finished=keep, known=known,
             workers=workers,
         )  # fmt: skip
     kept.remove(names)
@@ -213,13 +218,3 @@ def _entry(result: Campaign, length: float | None = None) -> Entry | None:
         return campaign_entry(result, f"Muscle identified from {len(result.records)} records{text}", length)
     except IdentificationError:
         return None  # the overview of the report states why
-
-
-def _muscles(result: Campaign, entry: Entry | None) -> dict[str, str]:
-    """The file of the muscle, and those of the other resting lengths."""
-    if entry is None:
-        return {}
-    lengths = {r.resting_length for r in result.records if r.kind.is_static and r.resting_length is not None}
-    others = {length: _entry(result, length) for length in sorted(lengths - {result.resting_length})}
-    named = {f"muscle-{1e3 * length:.0f}mm.toml": to_toml(other) for length, other in others.items() if other}
-    return {"muscle.toml": to_toml(entry), **named}

@@ -15,7 +15,7 @@ from typer.core import TyperGroup
 from ...core import AirmuscleError, AirmuscleWarning, exclusive_folders, quotable, suggestion
 from .interruption import INTERRUPTED, check_interrupted, deferred_sigint
 from .options import install_completion_classes, print_completion_script
-from .terminal import echo, in_options, show_warning
+from .terminal import echo, in_options, warned
 
 SETTINGS: dict[str, Any] = {
     "add_completion": False,
@@ -110,7 +110,8 @@ class LazyCommands(TyperGroup):
         def show(message: Warning | str, category: type[Warning], *location: Any, **options: Any) -> None:
             if issubclass(category, AirmuscleWarning):  # one line, the others with their location in the code
                 text = message.args[0] if isinstance(message, Warning) else message
-                show_warning(in_options(text, ctx.invoked_subcommand))
+                warned.add(worded := in_options(text, ctx.invoked_subcommand))
+                echo(f"warning: {worded}", err=True)
             else:
                 show_other(message, category, *location, **options)
 

@@ -88,11 +88,6 @@ class Execution:
                 "Dask cluster has its own workers."
             )
 
-    @property
-    def requested(self) -> bool:
-        """Whether other processes than this one are asked for."""
-        return (self.workers, self.dask, self.join) != (None, None, None)
-
     @contextlib.contextmanager
     def executor(self, tasks: int | None = None, *, alone: bool = False) -> Iterator[Workers]:
         """Yield the executor, or the number of local processes; `tasks` limits the latter, which is by default the

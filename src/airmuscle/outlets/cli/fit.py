@@ -18,7 +18,7 @@ from ..requests.declaration import RequestError, option, optional, request
 from .delivery import Execution, deliver, print_result
 from .measurements import Files, read_recordings, reading_chapters
 from .options import Folder, Json, Name, argument, complete_law, with_requests
-from .terminal import computation_progress
+from .terminal import progress_bars
 
 
 @with_requests
@@ -46,15 +46,16 @@ def fit(
       airmuscle fit log_held*.csv --file-name "held{length [mm]}mm" --time uniform --resting-length "200 mm" --compare
       airmuscle evaluate fit/muscle.toml --pressure "3 bar" --force "100 N"
     """
-    if execution.requested and not (request.compare or request.bootstrap):
+    processes = (execution.workers, execution.dask, execution.join)
+    if processes != (None, None, None) and not (request.compare or request.bootstrap):
         raise RequestError(
             "--workers, --dask and --join distribute the candidates of --compare and the refits of --bootstrap"
         )
     recordings = read_recordings(files, reading)
     writes = execution.writes(out)
-    progress = computation_progress("comparison" if request.compare else "fit")
+    progress = progress_bars("comparison" if request.compare else "fit")
     with execution.executor() as executor, progress as show:
-        found = fit_requested(request, files, recordings, lambda _, fraction: show(fraction), executor)
+        found = fit_requested(request, files, recordings, lambda _, fraction: show("", fraction), executor)
     muscle = {"muscle.toml": to_toml(found.entry)}
     writes = writes or execution.takes_over(out)
     deliver("fit", found.chapters, json=json, out=out, title="Fit", files=muscle, writes=writes)

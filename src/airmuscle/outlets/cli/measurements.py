@@ -22,7 +22,7 @@ from ...report.chapter import Chapter
 from ..requests import ReadingRequest, option, optional, request
 from .delivery import deliver
 from .options import Json, OptionalFolder, argument, complete_data, with_requests
-from .terminal import echo, print_json, reading_progress
+from .terminal import echo, print_json, progress_bars
 
 MEASURED = "CSV, LVM, Excel, MAT, TDMS or MDF files with pressure, contraction or length, and force."
 Files = Annotated[list[Path], argument("FILES", MEASURED, complete_data)]
@@ -54,7 +54,7 @@ def read_recordings(files: list[Path], reading: ReadingRequest) -> list[Recordin
         raise ParameterError(
             f"{names[0]}: a data set of the library contains its units and constants; omit {', '.join(set_options)}."
         )
-    with reading_progress() as progress:
+    with progress_bars() as progress:
         recordings = read(paths, mapping, progress=progress) if paths else ()
     check_contents(recordings)
     print_row_notes(recordings)
@@ -89,7 +89,7 @@ def inspect(files: AnyFiles, reading: ReadingRequest, json: Json = False, out: O
       airmuscle inspect runs/*.tdms --mapping rig.toml --json
     """
     unordered = ColumnMapping(time=RecordedTime(ordered=False))  # stamps that repeat or decrease are shown
-    with reading_progress() as progress:
+    with progress_bars() as progress:
         recordings = read(files, reading.column_mapping(unordered), progress=progress)
     deliver("inspect", inspection_chapters(inspect_all(recordings)), json=json, out=out, title="Inspection")
 

@@ -36,11 +36,6 @@ class PredictRequest:
         if self.start_margin is not None and not self.start_margin > 0.0:
             raise RequestError(f"{where('start_margin')} is {self.start_margin:g} s; it must be greater than zero")
 
-    @property
-    def given(self) -> list[str]:
-        """The options that are given."""
-        return [f"--{name.replace('_', '-')}" for name in ("start_time", "start_margin", "own") if getattr(self, name)]
-
 
 @with_requests
 def predict(
@@ -74,8 +69,9 @@ def predict(
         predictions = [loaded.predict_recording(each, request.start_time or 0.0, own) for each in recordings]
         predictions += (each for path in tables for each in loaded.predict_file(path))
         thing = loaded.scenario.plant
-    elif request.given:
-        raise RequestError(f"{', '.join(request.given)} is for a scenario; MODEL is a muscle or a law")
+    elif given := [name for name in ("start_time", "start_margin", "own") if getattr(request, name)]:
+        options = ", ".join(f"--{name.replace('_', '-')}" for name in given)
+        raise RequestError(f"{options} is for a scenario; MODEL is a muscle or a law")
     else:
         thing = load_law(model)
         if tables:

@@ -6,7 +6,7 @@ from ...design.sizing.scenario import sizing_scenario
 from ..requests.size import SizeRequest
 from .delivery import deliver
 from .options import Json, OptionalFolder, with_requests
-from .terminal import computation_progress
+from .terminal import progress_bars
 
 SCENARIO_FILE = "scenario.toml"
 
@@ -29,8 +29,8 @@ def size(request: SizeRequest, out: OptionalFolder = None, json: Json = False) -
     """
     if out is not None:
         check_writable(out)
-    with computation_progress("sizing") as progress:
-        result = request.evaluate(progress)
+    with progress_bars("sizing") as show:
+        result = request.evaluate(lambda fraction: show("", fraction))
     scenario = sizing_scenario(result.choices, SCENARIO_FILE if out is not None else "scenario.toml of --out")
     files = {SCENARIO_FILE: scenario.text} if scenario.text else {}
     deliver("size", [sizing_chapter(result, scenario)], json=json, out=out, title="Sizing", files=files)

@@ -112,13 +112,7 @@ def echo(text: str = "", *, err: bool = False) -> None:
 
 
 warned: set[str] = set()
-"""Texts of the warnings that this process has printed."""
-
-
-def show_warning(text: str) -> None:
-    """Print a warning, which the notes of a result on the same screen do not repeat."""
-    warned.add(text)
-    echo(f"warning: {text}", err=True)
+"""Texts of the warnings that this process has printed; the notes of a result on the same screen do not repeat them."""
 
 
 def on_one_screen() -> bool:
@@ -153,7 +147,7 @@ def _display(*columns: Any) -> Any:
 
 
 @contextlib.contextmanager
-def reading_progress(label: str = "reading") -> Iterator[Callable[[str, float], None]]:
+def progress_bars(label: str = "reading") -> Iterator[Callable[[str, float], None]]:
     """Yield a callback (name, fraction done), such as `read(progress=...)` takes, which draws one bar per name."""
     from rich.markup import escape
     from rich.progress import TaskID
@@ -168,13 +162,6 @@ def reading_progress(label: str = "reading") -> Iterator[Callable[[str, float], 
             display.update(task, completed=fraction)
 
         yield show
-
-
-@contextlib.contextmanager
-def computation_progress(label: str) -> Iterator[Callable[[float], None]]:
-    """Yield a callback (fraction done) that draws one bar."""
-    with reading_progress(label) as show:
-        yield lambda fraction: show("", fraction)
 
 
 @contextlib.contextmanager

@@ -20,7 +20,7 @@ from ..requests.declaration import RequestError, many, option, request
 from .delivery import Execution, deliver
 from .interruption import check_interrupted
 from .options import Folder, Json, argument, with_requests
-from .terminal import computation_progress, echo
+from .terminal import echo, progress_bars
 
 INDICES: dict[str, type[TrackingIndex]] = {
     "rmse": RootMeanSquareError,
@@ -131,10 +131,10 @@ def _search(
     if request.rules:
         experiment = step_experiment(family.cases[0], problem.duration, integrator=problem.integrator)
         rules = rule_settings(experiment.model)
-    with computation_progress("tuning") as show:
+    with progress_bars("tuning") as show:
         tuning = find_gains(
             family.cases, ranges, duration=problem.duration, index=request.index(), objective=objective,
             budget=request.budget, seed=request.seed, start=rule_starts(rules, ranges), start_time=problem.start_time,
-            integrator=problem.integrator, progress=lambda done, total: show(done / total), workers=workers,
+            integrator=problem.integrator, progress=lambda done, total: show("", done / total), workers=workers,
         )  # fmt: skip
     return tuning, family.notes, rules

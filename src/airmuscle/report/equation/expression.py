@@ -6,7 +6,7 @@ import operator
 from collections import Counter, defaultdict
 from collections.abc import Callable, Collection, Iterator, Mapping
 from fractions import Fraction
-from typing import TypeVar
+from typing import Any, TypeVar
 
 Result = TypeVar("Result")
 
@@ -17,24 +17,20 @@ FUNCTIONS = ("sqrt", "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", 
 
 
 class Node:
-    """One operation of an expression, a number or a symbol. Nodes of one `Expressions` are equal if identical."""
+    """One operation of an expression, a number or a symbol. Nodes of one `Expressions` are equal if identical.
+
+    `value` is that of a number, or the name of a symbol.
+    """
 
     __slots__ = ("arguments", "kind", "value")
 
-    def __init__(self, kind: str, arguments: "tuple[Node, ...]", value: float | str | None) -> None:
+    def __init__(self, kind: str, arguments: "tuple[Node, ...]", value: Any) -> None:
         self.kind, self.arguments, self.value = kind, arguments, value
-
-    @property
-    def number(self) -> float:
-        """The value of a number."""
-        assert isinstance(self.value, float)
-        return self.value
 
     @property
     def name(self) -> str:
         """The name of a symbol."""
-        assert isinstance(self.value, str)
-        return self.value
+        return str(self.value)
 
 
 def is_number(node: Node, value: float | None = None) -> bool:
@@ -92,7 +88,7 @@ class Expressions:
     def add(self, a: Node, b: Node) -> Node:
         """The sum a + b; the selection of one of two summands is one node."""
         if is_number(a) and is_number(b):
-            return self.number(a.number + b.number)
+            return self.number(a.value + b.value)
         if is_number(a, 0.0) or is_number(b, 0.0):
             return b if is_number(a, 0.0) else a
         if self.negative(a) is b:
@@ -104,17 +100,17 @@ class Expressions:
     def negative(self, a: Node) -> Node:
         """The negative -a."""
         if is_number(a):
-            return self.number(-a.number)
+            return self.number(-a.value)
         return a.arguments[0] if a.kind == NEGATIVE else self.node(NEGATIVE, a)
 
     def product(self, a: Node, b: Node) -> Node:
         """The product a b; powers of one base are collected, and a sign is moved outside."""
         if is_number(a) and is_number(b):
-            return self.number(a.number * b.number)
+            return self.number(a.value * b.value)
         for one, other in ((a, b), (b, a)):
             if is_number(one, 0.0) or is_number(one, 1.0):
                 return other if is_number(one, 1.0) else one
-            if one.kind == NEGATIVE or (is_number(one) and one.number < 0):
+            if one.kind == NEGATIVE or (is_number(one) and one.value < 0):
                 return self.negative(self.product(self.negative(one), other))
         (base, m), (other_base, n) = _as_power(a), _as_power(b)
         if base is other_base:
@@ -123,8 +119,8 @@ class Expressions:
 
     def quotient(self, a: Node, b: Node) -> Node:
         """The quotient a/b."""
-        if is_number(a) and is_number(b) and b.number != 0.0:
-            return self.number(a.number / b.number)
+        if is_number(a) and is_number(b) and b.value != 0.0:
+            return self.number(a.value / b.value)
         if is_number(b, 1.0) or is_number(a, 0.0):
             return a
         if a.kind == NEGATIVE:
@@ -137,14 +133,14 @@ class Expressions:
             return self.number(1.0)
         if is_number(exponent, 1.0):
             return a
-        if is_number(a) and is_number(exponent) and (a.number > 0 or exponent.number == int(exponent.number) > 0):
-            return self.number(a.number**exponent.number)
+        if is_number(a) and is_number(exponent) and (a.value > 0 or exponent.value == int(exponent.value) > 0):
+            return self.number(a.value**exponent.value)
         return self.node(POWER, a, exponent)
 
     def negation(self, condition: Node) -> Node:
         """The logical negation of a condition."""
         if is_number(condition):
-            return self.number(float(condition.number == 0.0))
+            return self.number(float(condition.value == 0.0))
         return condition.arguments[0] if condition.kind == "not" else self.node("not", condition)
 
     def where(self, condition: Node, a: Node, b: Node) -> Node:
@@ -152,7 +148,7 @@ class Expressions:
         if a is b:
             return a
         if is_number(condition):
-            return a if condition.number != 0.0 else b
+            return a if condition.value != 0.0 else b
         if condition.kind == "not":
             return self.where(condition.arguments[0], b, a)
         if condition.kind in ("lt", "le"):
@@ -170,15 +166,15 @@ class Expressions:
         if kind in self._simplified:
             return self._simplified[kind](*arguments)
         if kind == "if" and is_number(arguments[0]):
-            return arguments[1] if arguments[0].number != 0.0 else self.number(0.0)
+            return arguments[1] if arguments[0].value != 0.0 else self.number(0.0)
         if kind in COMPARISONS and all(map(is_number, arguments)):
-            return self.number(float(getattr(operator, kind)(*(each.number for each in arguments))))
+            return self.number(float(getattr(operator, kind)(*(each.value for each in arguments))))
         return self.node(kind, *arguments)
 
 
 def _as_power(node: Node) -> tuple[Node, float]:
-    if node.kind == POWER and is_number(node.arguments[1]) and math.isfinite(node.arguments[1].number):
-        return node.arguments[0], node.arguments[1].number
+    if node.kind == POWER and is_number(node.arguments[1]) and math.isfinite(node.arguments[1].value):
+        return node.arguments[0], node.arguments[1].value
     return node, 1.0
 
 
@@ -195,7 +191,7 @@ def expand(root: Node, atoms: Collection[Node]) -> Polynomial | None:
         if node in atoms:
             return {((node, 1),): Fraction(1)}
         if is_number(node):
-            return {(): Fraction(node.number)} if node.number else {}
+            return {(): Fraction(node.value)} if node.value else {}
         if node.kind not in (ADD, NEGATIVE, PRODUCT, QUOTIENT, POWER) or inner[0] is None or inner[-1] is None:
             return None
         found = _combined(node.kind, inner[0], inner[-1])

@@ -103,7 +103,7 @@ def _at_most(low: Bounds, high: Bounds) -> bool:
 def _bounds_of(node: Node, bounds: Mapping[Node, Bounds], ranges: Mapping[Node, Bounds]) -> Bounds:
     """The range of a node from those of its arguments, which are taken as independent."""
     if is_number(node):
-        return node.number, node.number
+        return node.value, node.value
     if not node.arguments:
         return ranges.get(node, UNKNOWN)
     sides = [bounds[each] for each in node.arguments]

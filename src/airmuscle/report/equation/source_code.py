@@ -40,7 +40,7 @@ class Notation:
         texts = [text for text, _ in inner]
         match node.kind:
             case "number":
-                return self.number(node.number), ATOM if node.number >= 0 else SUM
+                return self.number(node.value), ATOM if node.value >= 0 else SUM
             case "symbol":
                 return self._names.get(node, node.name), ATOM
             case "add":
@@ -157,8 +157,8 @@ class Latex(Notation):
     def _write(self, node: Node, inner: list[tuple[str, int]]) -> tuple[str, int]:
         if node.kind == "symbol" and node not in self._names:
             return latex_symbol(node.name), ATOM
-        if node.kind == "number" and ("cdot" in self.number(node.number) or r"\," in self.number(node.number)):
-            return self.number(node.number), TERM if node.number > 0 else SUM
+        if node.kind == "number" and ("cdot" in self.number(node.value) or r"\," in self.number(node.value)):
+            return self.number(node.value), TERM if node.value > 0 else SUM
         if node.kind == "sqrt":
             return rf"\sqrt{{{inner[0][0]}}}", ATOM
         if node.kind == "abs":
