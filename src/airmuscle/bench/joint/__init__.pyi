@@ -11,10 +11,10 @@ from .episode_inspection import inspect_episodes as inspect_episodes
 from .episodes import Episode as Episode
 from .episodes import Episodes as Episodes
 from .fit import fit_joint as fit_joint
+from .free_run import RegulatorLag as RegulatorLag
 from .free_run import ResidualGain as ResidualGain
+from .free_run import fit_regulator_lags as fit_regulator_lags
 from .free_run import fit_residual as fit_residual
 from .known_joint import fit_known_joint as fit_known_joint
-from .pressures import RegulatorLag as RegulatorLag
-from .pressures import fit_regulator_lags as fit_regulator_lags
 from .result import ArmFit as ArmFit
 from .result import ArmParameter as ArmParameter

@@ -6,8 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...core import Array, IdentificationError, counted
-from .episodes import ROWS, Episodes, long_enough, speed_of
-from .pressures import saturated
+from .episodes import HISTORY, ROWS, Episodes, Windows, long_enough, speed_of
 
 MAX_DELAY = 8
 """Greatest delay of the pressure sensors that is looked for [rows] (chosen)."""
@@ -25,6 +24,10 @@ JUMP = np.pi
 """Change of an angle between two rows [rad] that no arm makes."""
 SPEED_RATIO, TRAVEL = 1.15, 5
 """Ratio of the motion to that of the speeds, or its inverse, that a wrong sample time explains; rows of it (chosen)."""
+SATURATED = 0.02
+"""Share of rows exactly at an end of the range of a reading that counts as saturation (chosen)."""
+SETTLED, LEAST = 3, 0.2
+"""Rows after which a wrong reading is forgotten before the start of a window; least share of rows of a fit (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -249,3 +252,34 @@ def _exchanged(actions: Sequence[PressureAction], pairs: Sequence[tuple[int, int
         for muscle, joint, sign in said
         if muscle in certain and (certain[muscle].joint, certain[muscle].sign) != (joint, sign)
     ]
+
+
+def saturated(episodes: Episodes) -> tuple[Array, list[str]]:
+    """Upper ends (M,) of the readings at which they saturate, infinite without one, and remarks on both ends."""
+    top, remarks = np.full(episodes.muscles, np.inf), []
+    for i, values in enumerate(episodes.rows("pressure").T):
+        ends = ((values.min(), "the muscle is empty"), (values.max(), "it has the pressure of its supply"))
+        for edge, cause in ends if np.ptp(values) > 0.0 else ():
+            count = int(np.sum(values == edge))
+            if count > SATURATED * len(values):
+                remarks.append(
+                    f"pressure {i + 1} is {edge:.4g} Pa in {count} of {len(values)} rows "
+                    f"({100 * count / len(values):.0f} %): its reading saturates there, or {cause}"
+                )
+                top[i] = edge if edge == values.max() else np.inf
+    return top, remarks
+
+
+def without_saturated(windows: Windows, episodes: Episodes) -> tuple[Windows, list[str]]:
+    """The windows of a fit, in which rows after a reading at an upper end at which it saturates do not count, and a
+    remark on these; all rows count where less than LEAST would be left."""
+    ends = np.any(windows.pressure[:, HISTORY - SETTLED :] >= saturated(episodes)[0], axis=-1)
+    hit = np.cumsum(ends, axis=1)[:, SETTLED:] > 0
+    few = hit[:, 1:].mean() <= 1.0 - LEAST
+    text = (
+        f"{hit[:, 1:].sum()} of {hit[:, 1:].size} rows of the fit follow a pressure reading at its upper end, whose "
+        "true value is unknown: they "
+        + ("do not count, except in the errors of the report" if few else "are too many to leave out")
+    )
+    counts = np.concatenate([windows.counts[:, :HISTORY], ~hit], axis=1)
+    return dataclasses.replace(windows, counts=counts) if few else windows, [text] if hit.any() else []

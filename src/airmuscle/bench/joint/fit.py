@@ -11,10 +11,9 @@ from ...core import Array, ParameterError, one_thread, tree
 from ...physics import Braid, Muscle, MuscleRoute, PressureDriven, SerialArm, SpatialLink, StickSlip, WithStickSlip
 from ...physics.muscle.characteristic.linear_in_pressure import LinearInPressure
 from .descent import CLIP, Descent, SearchStage, gradients, joint_errors, typical_size, with_values
-from .episode_inspection import checked_inspection
+from .episode_inspection import checked_inspection, without_saturated
 from .episodes import ROWS, Episodes, Windows, band, count_fitted, cut, in_pairs, long_enough, rms
-from .free_run import baseline_errors, free_errors, judged_residual, run_errors
-from .pressures import fit_regulator_lags, from_commands, unexplained, without_saturated
+from .free_run import baseline_errors, fit_regulator_lags, free_errors, from_commands, judged_residual, run_errors
 from .result import ArmFit, ArmParameter
 
 STRENGTHS = (1.0, 6.0)
@@ -73,8 +72,8 @@ def fit_joint(
         remarks.append(words)
     errors = run_errors(arm, judge)
     regulators = fit_regulator_lags(fitted, rows)
-    commanded = from_commands(regulators, left, delay, rows) if regulators else None
-    remarks += _contacts(ordered, errors, judge, split) + (unexplained(commanded, judge, found) if commanded else [])
+    commanded, unlike = from_commands(regulators, left, delay, rows, found) if regulators else (None, [])
+    remarks += _contacts(ordered, errors, judge, split) + unlike
     return ArmFit(
         arm, inspection, found, errors, judge.episode, baseline_errors(fitted, left, rows), band(errors),
         tuple(e for each, _, _ in separated for e in each), tuple(dict.fromkeys(remarks)), split, regulators,

@@ -1,17 +1,19 @@
-"""Free run of an arm over windows: its baselines, and the residual that physics leaves in it."""
+"""Free run of an arm over windows: its baselines, regulators that lead to it from commands, and the residual that
+physics leaves in it."""
 
 import dataclasses
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import cast
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from ...core import Array, tree
 from ...physics import GaussianResidual, PressureDriven, WithStickSlip
 from ..baselines import ARX, DEPTH, PERSISTENCE, fit_arx
 from .descent import Descent, SearchStage, with_slopes
+from .episode_inspection import without_saturated
 from .episodes import HISTORY, ROWS, Episodes, Windows, cut, rms, start_of
-from .pressures import without_saturated
 
 
 def free_run(arm: PressureDriven, windows: Windows) -> Array:
@@ -49,6 +51,126 @@ def baseline_errors(train: Episodes, judge: Episodes, rows: int) -> Mapping[str,
     predicted = arx.free_run(windows.angle[:, begin : HISTORY + 1], windows.pressure[:, begin:])
     by_name = {PERSISTENCE: windows.angle[:, HISTORY : HISTORY + 1], ARX: predicted}
     return {name: angle - windows.angle[:, HISTORY + 1 :] for name, angle in by_name.items()}
+
+
+# Pressures from commands: a proportional regulator for each muscle, identified from its command and its pressure
+
+DELAYS = (0, 1, 2, 3)
+"""Delays of the command [rows] that are tried; longer ones, up to HISTORY, where the longest is the best."""
+UNEXPLAINED = 0.5
+"""Error of the pressures from commands, relative to their changes, that is named (chosen)."""
+START, LOW, HIGH = (0.6, 0.6, 0.3, 0.3), (0.05, 0.05, 0.0, 0.0), (1.0, 1.0, 2.0, 2.0)
+"""First values and limits of both shares and both corrections (chosen)."""
+UNIT, LEVEL, ROBUST, SAMPLE = 1e5, 3e5, 0.1, 400
+"""Unit of the pressures in the search and a high one [Pa], errors that count less, number of its windows (chosen)."""
+TRIED, REFINED = 20, 40
+"""Evaluations for each delay and kind of the commands, and for the best of them (chosen)."""
+
+
+@dataclasses.dataclass(frozen=True)
+class RegulatorLag:
+    """Two first-order lags in series behind a limited level, row by row, for one muscle.
+
+    c = clip(c + K u, c_min, c_max) where commands u are increments, c = clip(c_0 + K u, ...) where they are levels;
+    x += a_1 (c - x),   p += a_2 (x - p). While the pressure is measured, its error e corrects c and x by k_c e and
+    k_x e, and p is the reading. `values`: K, a_1, a_2, k_c, k_x, c_min, c_max [1e5 Pa], and c_0; `delay` of the command
+    in rows. The form is chosen.
+    """
+
+    values: tuple[float, ...]
+    delay: int
+    increments: bool
+
+    def pressures(self, pressure: Array, command: Array) -> Array:
+        """Pressures (N, R) [Pa] whose first HISTORY + 1 rows are the readings, and the others follow from commands."""
+        gain, first, second, to_level, to_pilot, low, high, zero = self.values
+        found, step = pressure / UNIT, gain * command
+        level, pilot, p = found[:, 0], found[:, 0], found[:, 0]
+        for k in range(1, found.shape[1]):
+            aim = (level if self.increments else zero) + step[:, max(k - self.delay, 0)]
+            level = np.minimum(np.maximum(aim, low), high)  # np.clip takes ten times as long
+            pilot = pilot + first * (level - pilot)
+            p = p + second * (pilot - p)
+            if k <= HISTORY:
+                error, p = found[:, k] - p, found[:, k]
+                level, pilot = level + to_level * error, pilot + to_pilot * error
+            else:
+                found[:, k] = p
+        return found * UNIT
+
+
+def fit_regulator_lags(episodes: Episodes, rows: int = ROWS) -> tuple[RegulatorLag, ...]:
+    """The regulator of each muscle whose pressures over `rows` further rows are nearest to the measured ones.
+
+    Empty if an episode has no commands.
+    """
+    if any(run.command is None for run in episodes.runs):
+        return ()
+    pressure, command = cut(episodes, 0, rows).pressure, _commands(episodes, rows)
+    some = np.linspace(0, len(pressure) - 1, min(SAMPLE, len(pressure))).astype(int)
+    columns = zip(pressure[some].transpose(2, 0, 1), command[some].transpose(2, 0, 1), strict=True)
+    return tuple(_fit(p, u) for p, u in columns)
+
+
+def _fit(p: Array, u: Array) -> RegulatorLag:
+    """The regulator of readings (N, R) in any unit; a high one is LEVEL, the deviation of commands 1 in the search."""
+    scale, unit = (float(np.quantile(np.abs(p), 0.99)) or LEVEL) / LEVEL, float(np.std(u)) or 1.0
+    p, u = p / scale, u / unit
+    low, high = np.quantile(p, (0.01, 0.99)) / UNIT
+    spread = high - low + 1e-6
+
+    def search(model: RegulatorLag, evaluations: int) -> tuple[float, RegulatorLag]:
+        def errors(values: Array) -> Array:
+            found = dataclasses.replace(model, values=tuple(values.tolist())).pressures(p, u)
+            return (found - p)[:, HISTORY + 1 :].ravel() / UNIT
+
+        fit = least_squares(
+            errors, model.values, loss="soft_l1", f_scale=ROBUST, max_nfev=evaluations,
+            bounds=([-np.inf, *LOW, low - spread, high - spread / 2, -np.inf],
+                    [np.inf, *HIGH, low + spread / 2, high + spread, np.inf]),
+            x_scale=np.maximum(np.abs(model.values), 0.1),
+        )  # fmt: skip
+        return float(fit.cost), dataclasses.replace(model, values=tuple(fit.x.tolist()))
+
+    gains = np.array([np.std(np.diff(p)), np.std(p)]) / UNIT / max(float(np.std(u)), 1e-12)
+    first = [
+        RegulatorLag((gain, *START, low, high, float(np.mean(p / UNIT - gain * u))), delay, increments)
+        for gain, increments in zip(gains.tolist(), (True, False), strict=True)
+        for delay in DELAYS
+    ]
+    best, longest = min((search(model, TRIED) for model in first), key=lambda trial: trial[0]), DELAYS[-1]
+    while best[1].delay == longest < HISTORY:
+        longest += 1
+        best = min(best, search(dataclasses.replace(best[1], delay=longest), TRIED), key=lambda trial: trial[0])
+    found = search(best[1], REFINED)[1]
+    gain, *shares = found.values[:5]
+    return dataclasses.replace(found, values=(gain * scale / unit, *shares, *(scale * v for v in found.values[5:])))
+
+
+def from_commands(
+    regulators: Sequence[RegulatorLag], episodes: Episodes, delay: int, rows: int, pairs: Sequence[tuple[int, int]]
+) -> tuple[Windows, list[str]]:
+    """The windows of `cut`, in which the pressures after the start follow from the commands, and a remark on muscles
+    whose pressures hardly do."""
+    windows, command = cut(episodes, 0, rows), _commands(episodes, rows)
+    found = [r.pressures(windows.pressure[:, :, i], command[:, :, i]) for i, r in enumerate(regulators)]
+    later = np.minimum(np.arange(HISTORY + 1 + rows) + delay, HISTORY + rows)
+    commanded, true = np.stack(found, axis=-1)[:, later], windows.pressure[:, later]
+    errors = rms((commanded - true)[:, HISTORY + 1 :])
+    changes = rms(true[:, HISTORY + 1 :] - true[:, HISTORY : HISTORY + 1])
+    muscles = zip((str(muscle) for pair in pairs for muscle in pair), errors > UNEXPLAINED * changes, strict=True)
+    names = ", ".join(name for name, wrong in muscles if wrong)
+    text = (
+        f"the commands hardly explain the pressures of muscle {names}: they never vary, are of another muscle, or "
+        f"act after more than {HISTORY} rows"
+    )
+    return dataclasses.replace(windows, pressure=commanded), [text] if names else []
+
+
+def _commands(episodes: Episodes, rows: int) -> Array:
+    """Commands (N, R, M) in the windows of `cut`."""
+    runs = [dataclasses.replace(run, pressure=cast(Array, run.command)) for run in episodes.runs]
+    return cut(dataclasses.replace(episodes, runs=tuple(runs)), 0, rows).pressure
 
 
 # Hybrid law: what physics leaves in the free run, fitted as a residual and judged on episodes held back

@@ -8,11 +8,10 @@ import numpy as np
 from ...core import Array, ParameterError, StateVariable, System, Value, Values, model, parameter, suggestion, tree
 from ...physics import PressureDriven
 from .descent import CLIP, OUTLIER, with_slopes, with_values
-from .episode_inspection import checked_inspection
+from .episode_inspection import checked_inspection, without_saturated
 from .episodes import HISTORY, ROWS, Episodes, Windows, band, count_fitted, cut, lagged, long_enough
 from .fit import not_separated, separated
 from .free_run import baseline_errors
-from .pressures import without_saturated
 from .result import ArmFit, ArmParameter
 
 FIELDS = ("inertia", "damping", "offset", "weight_torque", "coulomb_torque")

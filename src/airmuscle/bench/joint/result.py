@@ -14,8 +14,7 @@ from ..identify.prediction import PlantUncertainty
 from ..reported import Reported
 from .episode_inspection import EpisodeInspection
 from .episodes import ENOUGH, coverage, rms
-from .free_run import ResidualGain
-from .pressures import RegulatorLag
+from .free_run import RegulatorLag, ResidualGain
 
 SUPPLY = 6e5
 """Gauge pressure [Pa] of the supply of the plant (chosen)."""
