@@ -12,6 +12,7 @@ from .creep_stage import fit_held_creep as fit_held_creep
 from .fill_records import valve_commands as valve_commands
 from .fill_stage import FillStage as FillStage
 from .fill_stage import fit_fill_stage as fit_fill_stage
+from .fill_stage import relate_volumes as relate_volumes
 from .friction_and_release import FrictionStage as FrictionStage
 from .friction_and_release import ReleaseStage as ReleaseStage
 from .friction_and_release import creep_force as creep_force
@@ -27,13 +28,12 @@ from .record import RecordKind as RecordKind
 from .record import classify_records as classify_records
 from .static_stage import ErrorBand as ErrorBand
 from .static_stage import StaticStage as StaticStage
+from .static_stage import VolumeChange as VolumeChange
 from .static_stage import fit_static_stage as fit_static_stage
+from .static_stage import volume_change as volume_change
 from .transient import LeftOutStage as LeftOutStage
 from .transient import count_pulses as count_pulses
 from .transient import find_motion as find_motion
 from .transient import find_pressure_steps as find_pressure_steps
 from .transient import held_steady as held_steady
 from .transient import with_force as with_force
-from .volume import VolumeChange as VolumeChange
-from .volume import relate_volumes as relate_volumes
-from .volume import volume_change as volume_change

@@ -17,9 +17,8 @@ from .fill_stage import FillStage, fit_fill_stage
 from .friction_and_release import FrictionStage, ReleaseStage, fit_friction_stage, fit_release_stage, predicted_force
 from .next_experiment import NextExperiment, check_one_rig, plan_next
 from .record import CampaignRecord, RecordKind, classify_records
-from .static_stage import StaticStage, fit_static_stage, force_limit
+from .static_stage import StaticStage, VolumeChange, fit_static_stage, force_limit, volume_change
 from .transient import LeftOutStage, named
-from .volume import VolumeChange, volume_change
 
 STAGES = ("records", "creep", "hysteresis", "static characteristic", "fills and volume", "release", "plan")
 """The stages in their order; each is fitted with the results of those before it."""

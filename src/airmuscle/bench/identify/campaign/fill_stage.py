@@ -12,8 +12,8 @@ from ..dynamic import DynamicFit, Experiment, cross_predict, fit_tube
 from ..dynamic.experiment import describe_ambient
 from . import fill_records as fills
 from .record import CampaignRecord
+from .static_stage import VolumeChange
 from .transient import LeftOutStage
-from .volume import VolumeChange, VolumeEstimate, relate_volumes
 
 Fitted = Callable[[Sequence[Experiment]], DynamicFit]
 NAME = "fills and volume"
@@ -30,6 +30,47 @@ MAX_VOLUME_ERROR, MAX_TUBE_VOLUME = 0.3, 1.5
 muscle at rest (chosen)."""
 MIN_MISFIT = 0.01
 """Minimum residual that is reported, as a fraction of the greatest change of the pressure (chosen)."""
+MIN_RANGE = 0.02
+"""Minimum range of the contractions of the fills from which the volume follows (chosen)."""
+
+
+@dataclasses.dataclass(frozen=True)
+class VolumeEstimate:
+    """Factor s of the volumes that a fit found for an assumed conductance, and the volume at rest [m3].
+
+    s v_i = V(0) + dV(eps_i): a fill determines the ratio of volume and conductance, and fills at several lengths, whose
+    change of volume is known, determine both.
+    """
+
+    scale: float
+    scale_stderr: float
+    volume_at_rest: float
+    volume_stderr: float
+    residual: float
+    """Root mean square residual of the volumes [m3]; 0 for two fills."""
+
+
+def relate_volumes(
+    relative: Array, standard_errors: Array, contractions: Array, change: VolumeChange
+) -> VolumeEstimate | None:
+    """The volume at rest and the scale of the relative volumes; None unless the contractions differ enough."""
+    if relative.size < 2 or float(np.ptp(contractions)) < MIN_RANGE:
+        return None
+    matrix = np.column_stack([relative, -np.ones(relative.size)])
+    target = np.asarray(change(contractions))
+    inverse = np.linalg.pinv(matrix)
+    scale, volume = inverse @ target
+    if not (scale > 0 and volume > 0):
+        return None
+    residuals = matrix @ np.array([scale, volume]) - target
+    freedom = relative.size - 2
+    variance = (scale * standard_errors) ** 2
+    if freedom:  # what the fills do not explain is an error of the curve, equal for all of them
+        explained = float(variance @ (1.0 - np.sum(matrix * inverse.T, axis=1)))
+        variance = variance + max(float(residuals @ residuals) - explained, 0.0) / freedom
+    errors = np.sqrt(np.square(inverse) @ variance)
+    rms = float(np.sqrt(np.mean(residuals**2))) if freedom else 0.0
+    return VolumeEstimate(float(scale), float(errors[0]), float(volume), float(errors[1]), rms)
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)

@@ -1,13 +1,15 @@
-"""Static characteristic of a campaign: model selection on rows freed of friction and creep, and its error bands."""
+"""Static characteristic of a campaign: model selection on rows freed of friction and creep, its error bands, and the
+change of the enclosed volume by virtual work."""
 
 import dataclasses
 from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
+from typing import Any
 
 import numpy as np
 
-from ....core import AirmuscleError, Array, ShortRepr, counted
-from ....physics import CreepElements, Friction
+from ....core import AirmuscleError, Array, PhysicsError, ShortRepr, counted
+from ....physics import ChebyshevGeometry, CreepElements, ForceLaw, Friction
 from ....recording import Recording
 from ..compared_points import FORCE_MARGIN, force_residuals
 from ..data_checks import check_data
@@ -220,3 +222,65 @@ def freed_rows(record: CampaignRecord, friction: Friction, creep: CreepElements)
     if record.resting_length is None or record.inspection.static_points is not None:
         return measured.rows(rows)
     return with_force(measured, creep_force(creep, measured) + friction_along(friction, measured)).rows(rows)
+
+
+GRID, MIN_FORCE = 25, 0.02
+"""Number of contractions, and of pressures, at which the slope of the force is evaluated, and minimum force of a point
+for the slope, as a fraction of the maximum force (chosen)."""
+DEGREE = 4
+"""Degree of the polynomial of the volume (chosen)."""
+
+
+@dataclasses.dataclass(frozen=True, eq=False)
+class VolumeChange:
+    """Change of the enclosed volume [m3] from zero contraction, as a polynomial of the contraction.
+
+    By virtual work the part of the force that is proportional to the pressure is -dV/dL, so that
+    V(eps) = V(0) + L0 Int dF/dp deps (Chou and Hannaford, IEEE Trans. Robot. Autom. 12:90 (1996)).
+    """
+
+    coefficients: tuple[float, ...]
+    """Of the powers of the contraction from 1 on [m3]."""
+    resting_length: float
+    max_contraction: float
+    min_contraction: float = -0.02
+
+    def __call__(self, contraction: Any) -> Any:
+        """The change at a contraction, shape of the contraction [m3]."""
+        eps = np.asarray(contraction, dtype=float)
+        return sum(c * eps**power for power, c in enumerate(self.coefficients, 1))
+
+    def geometry(self, volume_at_rest: float) -> ChebyshevGeometry:
+        """The geometry with this volume at zero contraction [m3]."""
+        low, high, degree = self.min_contraction, self.max_contraction, len(self.coefficients)
+        middle, half = (low + high) / 2, (high - low) / 2
+        values = np.polynomial.chebyshev.chebinterpolate(lambda x: volume_at_rest + self(middle + half * x), degree)
+        return ChebyshevGeometry(tuple(values.tolist()), low, high, self.resting_length)
+
+
+def volume_change(
+    law: ForceLaw, resting_length: float, pressure: tuple[float, float], contraction: tuple[float, float]
+) -> VolumeChange | None:
+    """The change of volume of a muscle with this law in a range of pressure [Pa] and contraction; None if the force
+    does not increase with the pressure there."""
+    pressures = np.linspace(*pressure, GRID)
+    contractions, slopes = [], []
+    greatest = _force(law, np.array([pressure[1]]), max(contraction[0], 0.0))[0]
+    for eps in np.linspace(max(contraction[0], 0.0), contraction[1], GRID).tolist():
+        force = _force(law, pressures, eps)
+        taut = force > MIN_FORCE * greatest
+        if np.count_nonzero(taut) >= GRID // 3:
+            contractions.append(eps)
+            slopes.append(float(np.polyfit(pressures[taut], force[taut], 1)[0]))
+    if len(slopes) < DEGREE or not min(slopes) > 0:
+        return None
+    slope = np.polynomial.polynomial.polyfit(contractions, slopes, DEGREE - 1)
+    coefficients = tuple(float(resting_length * c / (k + 1)) for k, c in enumerate(slope))
+    return VolumeChange(coefficients, resting_length, contractions[-1])
+
+
+def _force(law: ForceLaw, pressures: Array, contraction: float) -> Array:
+    try:
+        return np.asarray(law.force(pressures, np.full(pressures.size, contraction)), dtype=float)
+    except PhysicsError:
+        return np.zeros(pressures.size)
