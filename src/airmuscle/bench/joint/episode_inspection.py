@@ -32,10 +32,8 @@ SETTLED, LEAST = 3, 0.2
 
 @dataclasses.dataclass(frozen=True)
 class PressureAction:
-    """Muscle (from 1) and the joint (from 1) on whose acceleration its pressure acts most.
-
-    `sign` of the action, t-value of its regression coefficient, and that of the next joint.
-    """
+    """Muscle (from 1) and the joint (from 1) on whose acceleration its pressure acts most. `sign` of the action,
+    t-value of its regression coefficient, and that of the next joint."""
 
     muscle: int
     joint: int

@@ -186,10 +186,8 @@ def long_enough(episodes: Episodes, rows: int) -> tuple[Episodes, list[str]]:
 
 def cut(episodes: Episodes, delay: int = 0, rows: int = ROWS, stride: int = ROWS) -> Windows:
     """The windows that begin at rows HISTORY, HISTORY + stride, ... of every episode while `rows` further rows follow.
-
     Pressures are read `delay` rows later, because their sensors lag; the last reading is held. Raises
-    IdentificationError if no episode is long enough.
-    """
+    IdentificationError if no episode is long enough."""
     found = [(n, k) for n, run in enumerate(episodes.runs) for k in range(HISTORY, len(run) - rows - 1, stride)]
     if not found:
         long_enough(episodes, rows)  # raises

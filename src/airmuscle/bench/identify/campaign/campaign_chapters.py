@@ -71,11 +71,8 @@ def campaign_chapters(
     campaign: Campaign, entry: MuscleDescription | None, *, unread: Sequence[tuple[str, str]] = (),
     scenarios: Sequence[tuple[str, str]] = (), validation: Sequence[ValidationRow] = (),
 ) -> list[Chapter]:  # fmt: skip
-    """Return the chapters of a campaign.
-
-    `unread` are pairs of a file that could not be read and the reason, `scenarios` of a record and its scenario file or
-    the reason.
-    """
+    """Return the chapters of a campaign. `unread` are pairs of a file that could not be read and the reason,
+    `scenarios` of a record and its scenario file or the reason."""
     plots = (plot(campaign) for plot in (characteristic_plot, prediction_plot, residual_plot, fill_plot))
     summary = "The predicted force is that of the static law minus friction and creep along the recorded motion."
     muscle = Chapter("campaign-muscle", "Muscle and prediction error", summary, plots=tuple(filter(None, plots)))

@@ -89,11 +89,9 @@ class HeldRows:
 
 
 def fit_creep_stage(records: Sequence[CampaignRecord]) -> CreepStage | LeftOutStage:
-    """Fit Maxwell elements to the holds at constant length and pressure.
-
-    The number of elements is the largest that the F test justifies in a hold. Relaxation times and stiffnesses are
-    common to all holds, each hold has its own initial force.
-    """
+    """Fit Maxwell elements to the holds at constant length and pressure. The number of elements is the largest that the
+    F test justifies in a hold. Relaxation times and stiffnesses are common to all holds, each hold has its own initial
+    force."""
     if not records:
         remedy = (
             "move the muscle by a few per cent of its length within a second at constant pressure, hold the length for "

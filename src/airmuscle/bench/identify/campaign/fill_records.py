@@ -101,9 +101,8 @@ def sensor_of(plant: Plant) -> str:
 @dataclasses.dataclass(frozen=True)
 class ValveUnknowns:
     """The valves that the steps of the records show, and the reason for a common critical ratio, empty without one.
-
-    `sinks`: the supply has a volume (`Tank`), so that its pressure sinks. `tube`: one lies between valves and muscle.
-    """
+    `sinks`: the supply has a volume (`Tank`), so that its pressure sinks. `tube`: one lies between valves and
+    muscle."""
 
     fill: bool
     discharge: bool

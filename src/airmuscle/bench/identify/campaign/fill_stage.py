@@ -76,9 +76,7 @@ def relate_volumes(
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class FillStage(ShortRepr):
     """The joint fit of all fills with common valves and one volume curve, and the prediction of each from the others.
-
-    `estimate` is None where the geometry was given.
-    """
+    `estimate` is None where the geometry was given."""
 
     fit: DynamicFit
     records: tuple[CampaignRecord, ...]

@@ -62,11 +62,9 @@ class ReleaseStage(ShortRepr):
 
 
 def fit_release_stage(records: Sequence[CampaignRecord], muscle: Muscle | None) -> ReleaseStage | LeftOutStage:
-    """Fit the damping of the muscle to the position and the pressure after the release of a hanging mass.
-
-    The muscle has its static law, friction and volume. The mass is the constant `mass` [kg] of the file, or follows
-    from the force at the end of the record.
-    """
+    """Fit the damping of the muscle to the position and the pressure after the release of a hanging mass. The muscle
+    has its static law, friction and volume. The mass is the constant `mass` [kg] of the file, or follows from the force
+    at the end of the record."""
     if not records:
         return LeftOutStage("release", "no record is a release", REMEDY)
     if muscle is None:
@@ -161,11 +159,9 @@ def fit_friction_stage(
     records: Sequence[CampaignRecord], creep: CreepElements, progress: Callable[[float], None],
     executor: Executor | None = None,
 ) -> FrictionStage | LeftOutStage:  # fmt: skip
-    """Fit every friction law to the loops at constant pressure of all specimens together.
-
-    The force of the creep elements is added before, so that it is not taken for friction. Each loop has its own static
-    curve, a polynomial in the contraction.
-    """
+    """Fit every friction law to the loops at constant pressure of all specimens together. The force of the creep
+    elements is added before, so that it is not taken for friction. Each loop has its own static curve, a polynomial in
+    the contraction."""
     loops, failed = _find_loops(records, creep)
     if not loops:
         reason = failed[0] if failed else "no record at constant pressure has a rising and a falling branch"
@@ -211,11 +207,9 @@ def _find_loops(
 
 
 def friction_along(friction: Friction, recording: Recording) -> Array:
-    """Friction force against contraction [N] along the motion of a recording, relaxed at its start; shape (N,).
-
-    It is computed at rows whose steps are beyond the noise of the displacement, and interpolated between them. The
-    motion is that outside a dead band of the noise, so that a held length keeps its friction.
-    """
+    """Friction force against contraction [N] along the motion of a recording, relaxed at its start; shape (N,). It is
+    computed at rows whose steps are beyond the noise of the displacement, and interpolated between them. The motion is
+    that outside a dead band of the noise, so that a held length keeps its friction."""
     if isinstance(friction, NoFriction):
         return np.zeros(len(recording))
     rows = path_rows(recording, PREDICTED_ROWS)
@@ -264,10 +258,8 @@ def predicted_force(
     law: Any, recording: Recording, friction: Friction, creep: CreepElements, max_force: float
 ) -> Array:
     """The force [N] along the pressure and the motion of a recording, negative where the muscle is slack; shape (N,).
-
     Friction and creep, relaxed at the first row, are left out without the constant `resting_length`. `max_force` [N]
-    limits the force of laws that give contraction or pressure. Raises ColumnError.
-    """
+    limits the force of laws that give contraction or pressure. Raises ColumnError."""
     force = evaluate_force(law, recording["pressure"], recording["contraction"], max_force)
     if recording.constants.get("resting_length") is None:
         return force

@@ -68,10 +68,8 @@ def calibrate(
 ) -> tuple[tuple[ErrorBand, ...], ErrorBand | None]:
     """The band for further runs of the measured muscles, and that for other lengths if there are three or more; the
     band for further isometric runs, which are left out at once, where there are some and the others determine the law.
-
     A ramp of the pressure at a held length has no friction, and another history of creep than a sweep of the length, so
-    that its residuals are of one sign.
-    """
+    that its residuals are of one sign."""
     bands, lengths = list[ErrorBand](), [run.constants.get("resting_length") for run in points]
     isometric = [("kind", 0) if record.kind is RecordKind.ISOMETRIC else None for record in records]
     for purpose, levels in (
@@ -186,11 +184,9 @@ def fit_static_stage(
     records: Sequence[CampaignRecord], friction: Friction, creep: CreepElements, progress: Callable[[float], None],
     executor: Executor | None = None,
 ) -> StaticStage | LeftOutStage:  # fmt: skip
-    """Select and fit the static characteristic to the quasi-static rows of all records.
-
-    The friction and creep forces along the motion of each record are added to the measured force, so that the law is
-    that of the muscle without them.
-    """
+    """Select and fit the static characteristic to the quasi-static rows of all records. The friction and creep forces
+    along the motion of each record are added to the measured force, so that the law is that of the muscle without
+    them."""
     used = [record for record in records if record.kind.is_static]
     if not used:
         remedy = "record the force while the length changes slowly at constant pressure, at three pressures or more"

@@ -58,11 +58,8 @@ def path_rows(recording: Recording, max_rows: int = MAX_ROWS) -> Array:
 
 def held_steady(path: Array, noise: float) -> Array:
     """The motion without its noise: the output of a play operator, which rests while the path [m] stays within a dead
-    band of `DEAD_BAND` standard deviations of the noise [m]; shape (N,).
-
-    The noise of a held length would otherwise unload the friction: cycles within the presliding distance relax the
-    force of most friction laws towards zero.
-    """
+    band of `DEAD_BAND` standard deviations of the noise [m]; shape (N,). The noise of a held length would otherwise
+    unload the friction: cycles within the presliding distance relax the force of most friction laws towards zero."""
     if noise == 0.0:
         return path
     half, output, current = DEAD_BAND * noise, np.empty(path.size), float(path[0])
@@ -136,11 +133,8 @@ class Motion:
 
 
 def find_pressure_steps(recording: Recording, sensors: Mapping[str, Sensor]) -> tuple[PressureStep, ...]:
-    """The steps of the pressure through a valve; empty for a slow or a linear change of the pressure.
-
-    Each step approaches its final value with a decreasing rate, so that half of the change takes less than half of the
-    time.
-    """
+    """The steps of the pressure through a valve; empty for a slow or a linear change of the pressure. Each step
+    approaches its final value with a decreasing rate, so that half of the change takes less than half of the time."""
     time, pressure = recording["time"], running_median(recording["pressure"], MEDIAN_ROWS)
     low, high = float(pressure.min()), float(pressure.max())
     if high - low < MIN_STEP or not (np.diff(time) > 0).all():

@@ -24,9 +24,8 @@ def dynamic_chapters(
     cross: Sequence[CrossPrediction] = (),
 ) -> list[Chapter]:  # fmt: skip
     """Return the chapters of a dynamic fit: estimates and identifiability, profiles, and one chapter per record.
-
-    `remarks` are sentences about the records, `cross` the predictions of each record by the others, which stand first.
-    """
+    `remarks` are sentences about the records, `cross` the predictions of each record by the others, which stand
+    first."""
     first, records = _estimates(fit, title, remarks, cross), range(len(fit.problem.record_models))
     return [first, *([_profiles(profiles)] if profiles else []), *(_record(fit, i) for i in records)]
 

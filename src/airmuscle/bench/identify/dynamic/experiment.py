@@ -91,10 +91,8 @@ RecordUnknown = ParameterPaths | StartTime | InitialValue | CommandInstants
 
 @dataclasses.dataclass(frozen=True)
 class Unknown:
-    """One unknown number: parameters with a common value, a start time or an initial value.
-
-    `record` is the index of the record it belongs to, None for all records. Value and bounds are SI.
-    """
+    """One unknown number: parameters with a common value, a start time or an initial value. `record` is the index of
+    the record it belongs to, None for all records. Value and bounds are SI."""
 
     name: str
     target: tuple[str, ...] | Nuisance

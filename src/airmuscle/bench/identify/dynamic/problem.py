@@ -51,10 +51,8 @@ def _normal_equations(evaluated: tuple[Array, Array] | None, count: int) -> tupl
 
 class LevenbergMarquardt:
     """A search from one initial guess, which can be interrupted and continued: unknowns `x` (P,), sum of squares there,
-    `cost`, and whether it is `finished`.
-
-    The sum of squares is infinite where the residuals cannot be computed at the initial guess.
-    """
+    `cost`, and whether it is `finished`. The sum of squares is infinite where the residuals cannot be computed at the
+    initial guess."""
 
     def __init__(self, residuals: Residuals, start: Array, low: Array, high: Array) -> None:
         self._residuals, self._low, self._high = residuals, low, high
@@ -215,9 +213,8 @@ class DynamicFitProblem:
 
     def search(self, scaled: Array, free: Sequence[int]) -> LevenbergMarquardt:
         """The search over the free unknowns from an initial guess (P,), which can be interrupted and continued.
-
-        Simulations with far more steps than the best one so far, which occur far from physical parameters, are aborted.
-        """
+        Simulations with far more steps than the best one so far, which occur far from physical parameters, are
+        aborted."""
         min_cost, max_steps, tried = np.inf, MAX_STEPS, scaled.copy()
 
         def guarded(x: Array) -> tuple[Array, Array] | None:

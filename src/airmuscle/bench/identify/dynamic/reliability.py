@@ -123,10 +123,8 @@ def _greatest(changes: list[tuple[float, str]]) -> str:
 
 def describe_flatness(estimates: Sequence[Estimate], degrees_of_freedom: int, margins: Array) -> list[str]:
     """A sentence on the unknowns that change widely at an rms residual that is hardly greater, by the linearised fit.
-
     The sum of squares grows by one residual variance at a standard error, so the rms residual grows by the fraction r
-    at sqrt((2 r + r^2) (N - P)) standard errors. `margins` are those of `distinct_optima`.
-    """
+    at sqrt((2 r + r^2) (N - P)) standard errors. `margins` are those of `distinct_optima`."""
     ratio = float(np.sqrt((2 * SMALL_RMS + SMALL_RMS**2) * degrees_of_freedom))
     wide = []
     for e, size in zip(estimates, _magnitudes(estimates, margins), strict=True):

@@ -163,11 +163,9 @@ class DynamicFit(Reported):
         return DynamicProfile(name, self.estimates[index].unit, values, increase, estimates)
 
     def plot(self, record: int = 0, *, ax: Any = None) -> Any:
-        """Plot the observed quantities of one record, measured and modelled, one panel each.
-
-        `ax` is an Axes, or a sequence of one for each quantity, and is returned; without it a figure is returned.
-        Raises ParameterError if `ax` contains too few Axes.
-        """
+        """Plot the observed quantities of one record, measured and modelled, one panel each. `ax` is an Axes, or a
+        sequence of one for each quantity, and is returned; without it a figure is returned. Raises ParameterError if
+        `ax` contains too few Axes."""
         model, modelled = self.problem.record_models[record], self.modelled(record)
         measured, names, figure = model.experiment.recording, model.names, None
         if ax is None:

@@ -210,10 +210,8 @@ def loop_path(distance: float) -> Array:
 
 
 def plot_loops(friction: Friction, axis: Axis = MILLIMETRES) -> Any:
-    """Friction force over displacement: from rest, around the outer loop, through two inner loops.
-
-    Returns a Matplotlib figure.
-    """
+    """Friction force over displacement: from rest, around the outer loop, through two inner loops. Returns a Matplotlib
+    figure."""
     path = loop_path(friction.presliding_distance or 1e-3)
     force = friction.force_along(path)
     outer, parts = force.copy(), [(force, 0, 1, "from rest", 1)]

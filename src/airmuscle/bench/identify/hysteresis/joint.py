@@ -82,11 +82,9 @@ def agreement_of_run(joint: Friction, own: HysteresisFit, description: str, pres
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class JointFit(FrictionFit):
-    """A friction law fitted to several runs together, each with its own static curve; forces in N.
-
-    `friction` is a `PressureScaledFriction` if the runs justify a dependence on pressure; `scale_p_value` is that of
-    its F test, NaN where the runs have one pressure.
-    """
+    """A friction law fitted to several runs together, each with its own static curve; forces in N. `friction` is a
+    `PressureScaledFriction` if the runs justify a dependence on pressure; `scale_p_value` is that of its F test, NaN
+    where the runs have one pressure."""
 
     series: tuple[LoopSeries, ...]
     agreement: tuple[RunAgreement, ...]
@@ -141,10 +139,8 @@ class JointFit(FrictionFit):
 
     def plot(self, *, ax: Any = None) -> Any:
         """Plot half the range of the friction force over the gauge pressure: each run alone with two standard errors,
-        and the joint fit.
-
-        `ax` is an Axes and is returned; without it a new figure is returned. Raises ParameterError for another `ax`.
-        """
+        and the joint fit. `ax` is an Axes and is returned; without it a new figure is returned. Raises ParameterError
+        for another `ax`."""
         fields = ("pressure", "amplitude", "amplitude_stderr", "joint_amplitude")
         pressure, own, error, joint = (np.array([getattr(run, name) for run in self.agreement]) for name in fields)
         grid = np.linspace(0.0, 1.05 * pressure.max(), 100)
@@ -237,10 +233,8 @@ def identified_friction(friction: Friction, runs: Sequence[LoopSeries]) -> Frict
 
 
 def _fit_law(usable: Sequence[LoopFit], own: Sequence[HysteresisFit]) -> JointFit:
-    """One law fitted to all runs, with a constant and with a pressure-dependent scale; the better of the two.
-
-    The search of the scale starts from the run at the highest pressure, and a line through the amplitudes of all runs.
-    """
+    """One law fitted to all runs, with a constant and with a pressure-dependent scale; the better of the two. The
+    search of the scale starts from the run at the highest pressure, and a line through the amplitudes of all runs."""
     runs, scale_p_value = [fit.series for fit in own], float("nan")
     known = [None if run.pressure is None else float(np.mean(run.pressure[run.fitted_rows])) for run in runs]
     pressures = np.array([float("-inf") if each is None else each for each in known])

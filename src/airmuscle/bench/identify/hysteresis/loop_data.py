@@ -18,10 +18,8 @@ from ..identifiability import UndeterminedCombination
 
 @dataclasses.dataclass(frozen=True)
 class Axis:
-    """The axis on which a path [m] is plotted: its label, and the factor from metres to its unit.
-
-    `si_unit` is the SI unit of the driving quantity, of which `si_factor` correspond to a metre.
-    """
+    """The axis on which a path [m] is plotted: its label, and the factor from metres to its unit. `si_unit` is the SI
+    unit of the driving quantity, of which `si_factor` correspond to a metre."""
 
     label: str
     factor: float
@@ -146,10 +144,8 @@ AMPLITUDE_QUANTILE = 0.95
 
 @dataclasses.dataclass(frozen=True)
 class DataLimits:
-    """Maximum force [N], lowest and highest speed [m/s], and maximum stiffness [N/m] that the data show.
-
-    The speeds are NaN without a time. A stiffer transition of the friction lies between two readings of the path.
-    """
+    """Maximum force [N], lowest and highest speed [m/s], and maximum stiffness [N/m] that the data show. The speeds are
+    NaN without a time. A stiffer transition of the friction lies between two readings of the path."""
 
     force: float
     low_speed: float
@@ -175,10 +171,8 @@ class DataLimits:
 
 
 def data_limits(force: Array, path: Array, time: Array | None, rows: Mask) -> DataLimits:
-    """The limits of a run: forces [N] and the path [m] over the time [s], at the fitted rows; arrays (N,).
-
-    The speeds are those at which the path passed intervals of equal length in one direction and ended in a fitted row.
-    """
+    """The limits of a run: forces [N] and the path [m] over the time [s], at the fitted rows; arrays (N,). The speeds
+    are those at which the path passed intervals of equal length in one direction and ended in a fitted row."""
     greatest, low, high = float(np.max(np.abs(force[rows]), initial=0.0)), math.nan, math.nan
     width = float(np.ptp(path)) / SPEED_INTERVALS if len(path) else 0.0
     if time is not None and width > 0:
@@ -195,10 +189,8 @@ def data_limits(force: Array, path: Array, time: Array | None, rows: Mask) -> Da
 
 def resolved_stiffness(path: Array, hysteresis: Array) -> float:
     """The maximum stiffness that readings show [N/m]: the amplitude of the hysteresis (N,) [N], the force without its
-    static curve, by the resolution of the path (N,) [m], both at the fitted rows.
-
-    The resolution is the noise, a tenth of the median step, or the step of a reading that is repeated in motion.
-    """
+    static curve, by the resolution of the path (N,) [m], both at the fitted rows. The resolution is the noise, a tenth
+    of the median step, or the step of a reading that is repeated in motion."""
     steps = np.abs(np.diff(path))
     moving = steps > 0
     if not moving.any():

@@ -58,11 +58,9 @@ def mean_square(parts: Sequence[Array]) -> float:
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class FrictionFit(Reported):
-    """A friction law fitted to runs, compared with the same static curves without friction; forces in N.
-
-    `repeat_rmse` and `repeat_rmse_without_friction` are the errors on second runs, where only the static coefficients
-    are fitted again, because the level may shift between runs; NaN without a second run.
-    """
+    """A friction law fitted to runs, compared with the same static curves without friction; forces in N. `repeat_rmse`
+    and `repeat_rmse_without_friction` are the errors on second runs, where only the static coefficients are fitted
+    again, because the level may shift between runs; NaN without a second run."""
 
     friction: Friction
     rmse: float
@@ -208,10 +206,8 @@ class HysteresisFit(FrictionFit):
 
     def plot(self, *, ax: Any = None) -> Any:
         """Plot the measured force minus the static curve over the path, with the friction force, and the residuals.
-
         `ax` is an Axes for the loop, or a sequence of two, also for the residuals, and is returned; without it a new
-        figure is returned. Raises ParameterError for another `ax`.
-        """
+        figure is returned. Raises ParameterError for another `ax`."""
         series, figure = self.series, None
         if ax is None:
             figure, axes = new_figure(2, 1, width=6.0, height=5.6, sharex=True)

@@ -33,9 +33,7 @@ class BinnedDifference:
 
 def binned_difference(path: Array, values: Array, other_path: Array, other_values: Array) -> BinnedDifference:
     """Second minus first branch in the bins of the common path where both have n and m rows, with weight n m/(n + m).
-
-    The values should be residuals from a common static curve: the slope of a force would appear as a difference.
-    """
+    The values should be residuals from a common static curve: the slope of a force would appear as a difference."""
     low = max(path.min(initial=np.inf), other_path.min(initial=np.inf))
     high = min(path.max(initial=-np.inf), other_path.max(initial=-np.inf))
     if not low < high:
@@ -130,11 +128,9 @@ def free_parameters(friction: Friction) -> int:
 def search_parameters(
     friction: Friction, runs: Sequence[LoopSeries]
 ) -> tuple[Friction, tuple[UndeterminedCombination, ...]]:
-    """The friction with the least squares of the residuals of all runs, and what the runs do not determine.
-
-    Each run has its own static curve. Elements of a law with several of them are not judged one by one, because they
-    replace each other: only their sum has a meaning.
-    """
+    """The friction with the least squares of the residuals of all runs, and what the runs do not determine. Each run
+    has its own static curve. Elements of a law with several of them are not judged one by one, because they replace
+    each other: only their sum has a meaning."""
     if friction.linear_in:
         return _fit_stiffnesses(friction, runs), ()
     if isinstance(friction, PressureScaledFriction) and friction.inner.linear_in:
