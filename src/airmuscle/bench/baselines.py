@@ -43,18 +43,18 @@ class LinearArx(ShortRepr):
 
 def fit_arx(runs: Sequence[tuple[Array, Array]], low: Array | float, high: Array | float) -> LinearArx:
     """Least squares of the change of the outputs in runs with outputs (R, J) and inputs (R, K), R > DEPTH + 1."""
-    x, y = (np.concatenate(part) for part in zip(*(_regressors(*run) for run in runs), strict=True))
+    seen, changes = [], []
+    for outputs, inputs in runs:
+        count = len(outputs) - DEPTH
+        past = sliding_window_view(outputs, DEPTH, axis=0)[:count].transpose(0, 2, 1).reshape(count, -1)
+        driven = sliding_window_view(inputs, DEPTH + 1, axis=0).transpose(0, 2, 1).reshape(count, -1)
+        seen.append(np.concatenate([past, driven], axis=1))
+        changes.append(outputs[DEPTH:] - outputs[DEPTH - 1 : -1])
+    x, y = np.concatenate(seen), np.concatenate(changes)
     mean, spread = x.mean(axis=0), x.std(axis=0) + 1e-9
     design = np.column_stack([(x - mean) / spread, np.ones(len(x))])
     normal = design.T @ design + RIDGE * len(design) * np.eye(design.shape[1])
     return LinearArx(mean, spread, np.linalg.solve(normal, design.T @ y), low, high)
-
-
-def _regressors(outputs: Array, inputs: Array) -> tuple[Array, Array]:
-    count = len(outputs) - DEPTH
-    past = sliding_window_view(outputs, DEPTH, axis=0)[:count].transpose(0, 2, 1).reshape(count, -1)
-    driven = sliding_window_view(inputs, DEPTH + 1, axis=0).transpose(0, 2, 1).reshape(count, -1)
-    return np.concatenate([past, driven], axis=1), outputs[DEPTH:] - outputs[DEPTH - 1 : -1]
 
 
 def skill(error: float, baselines: Mapping[str, float]) -> float | None:
@@ -97,23 +97,17 @@ def baseline_errors(records: Sequence[TimedRecord]) -> list[dict[str, Array]]:
     longest = max((float(np.ptp(each.time)) for each in records), default=0.0)
     sampled = max((float(np.median(np.diff(each.time))) for each in records if each.time.size > 1), default=0.0)
     grids = [each.on_grid(max(sampled, longest / GRID_ROWS)) for each in records]
+    sizes = [(each.outputs.shape[1], each.inputs.shape[1]) for each in records]
     found = []
     for i, record in enumerate(records):
         first = record.outputs[np.argmax(record.compared, axis=0), np.arange(record.outputs.shape[1])]
         errors = {PERSISTENCE: _rms(record, np.broadcast_to(first, record.outputs.shape))}
-        others = [
-            each
-            for k, each in enumerate(grids)
-            if k != i and len(each.time) > DEPTH + 1 and _sizes(each) == _sizes(grids[i])
-        ]
+        alike = [each for k, each in enumerate(grids) if k != i and sizes[k] == sizes[i]]
+        others = [each for each in alike if len(each.time) > DEPTH + 1]
         if (predicted := _predicted(grids[i], others)) is not None:
             errors[ARX] = _rms(record, _interpolated(record.time, grids[i].time, predicted))
         found.append(errors)
     return found
-
-
-def _sizes(record: TimedRecord) -> tuple[int, int]:
-    return int(record.outputs.shape[1]), int(record.inputs.shape[1])
 
 
 def _predicted(grid: TimedRecord, others: Sequence[TimedRecord]) -> Array | None:
@@ -129,10 +123,8 @@ def _predicted(grid: TimedRecord, others: Sequence[TimedRecord]) -> Array | None
 
 def _run(grid: TimedRecord, known: Sequence[TimedRecord]) -> Array:
     measured = np.concatenate([each.outputs for each in known])
-    margin = LIMIT_MARGIN * np.ptp(measured, axis=0)
-    model = fit_arx(
-        [(each.outputs, each.inputs) for each in known], measured.min(axis=0) - margin, measured.max(axis=0) + margin
-    )
+    margin, runs = LIMIT_MARGIN * np.ptp(measured, axis=0), [(each.outputs, each.inputs) for each in known]
+    model = fit_arx(runs, measured.min(axis=0) - margin, measured.max(axis=0) + margin)
     return np.concatenate([grid.outputs[:DEPTH], model.free_run(grid.outputs[None, :DEPTH], grid.inputs[None])[0]])
 
 

@@ -1,7 +1,5 @@
 """Plots of a campaign: characteristic, loops with their bands, residuals of the stages, fills and creep."""
 
-from typing import Any
-
 import numpy as np
 
 from ....core import BLACK, BLUE, DASHES, LINES, RED, AirmuscleError, legend_below, new_figure
@@ -9,7 +7,7 @@ from ....report.chapter import Plot
 from ...segment import level_intervals
 from ..data_checks import level_text
 from ..dynamic.dynamic_chapter import draw_residuals, residual_panels, running_extreme
-from . import Campaign, CampaignRecord, CreepStage, FillStage, RecordKind, StaticStage
+from . import Campaign, CreepStage, FillStage, RecordKind, StaticStage
 from .transient import thinned_rows
 
 MAX_LOOPS, MAX_PANELS = 6, 6
@@ -73,7 +71,19 @@ def prediction_plot(campaign: Campaign) -> Plot | None:
     rows = -(-len(shown) // columns)
     figure, panels = new_figure(rows, columns, width=7.4, height=2.3 * rows + 0.4, squeeze=False)
     for axes, record in zip(panels.ravel(), shown, strict=False):
-        _draw_loop(axes, campaign, record)
+        recording, prediction = record.recording, campaign.predict(record.recording)
+        is_ramp = record.kind is RecordKind.ISOMETRIC
+        x = 1e-3 * recording["pressure"] if is_ramp else 100.0 * recording["contraction"]
+        dots = {"linestyle": "none", "marker": ".", "markersize": 2, "color": BLUE, "alpha": 0.6}
+        axes.plot(x, recording["force"], label="measured", **dots)
+        order = np.argsort(x, kind="stable")
+        low = running_extreme(prediction.low[order], np.minimum)
+        high = running_extreme(prediction.high[order], np.maximum)
+        axes.fill_between(x[order], low, high, color=RED, alpha=0.15, linewidth=0, label="95 % band")
+        axes.plot(x, prediction.force, color=RED, linewidth=0.9, label="predicted")
+        axes.set_xlabel("pressure [kPa]" if is_ramp else "contraction [%]")
+        length = "" if record.resting_length is None else f", {1e3 * record.resting_length:.4g} mm"
+        axes.set_title("" if record.level is None else f"{level_text(*record.level)}{length}", fontsize=8)
     for axes in panels.ravel()[len(shown) :]:
         axes.set_visible(False)
     for axes in panels[:, 0]:
@@ -81,21 +91,6 @@ def prediction_plot(campaign: Campaign) -> Plot | None:
     legend_below(figure, panels[0, 0], columns=3)
     force = "static law minus friction and creep along the recorded motion"
     return Plot("campaign-loops", f"Slow records with the predicted force: {force}. Shaded: 95 % band.", figure)
-
-
-def _draw_loop(axes: Any, campaign: Campaign, record: CampaignRecord) -> None:
-    recording, prediction = record.recording, campaign.predict(record.recording)
-    is_ramp = record.kind is RecordKind.ISOMETRIC
-    x = 1e-3 * recording["pressure"] if is_ramp else 100.0 * recording["contraction"]
-    dots = {"linestyle": "none", "marker": ".", "markersize": 2, "color": BLUE, "alpha": 0.6}
-    axes.plot(x, recording["force"], label="measured", **dots)
-    order = np.argsort(x, kind="stable")
-    low, high = running_extreme(prediction.low[order], np.minimum), running_extreme(prediction.high[order], np.maximum)
-    axes.fill_between(x[order], low, high, color=RED, alpha=0.15, linewidth=0, label="95 % band")
-    axes.plot(x, prediction.force, color=RED, linewidth=0.9, label="predicted")
-    axes.set_xlabel("pressure [kPa]" if is_ramp else "contraction [%]")
-    length = "" if record.resting_length is None else f", {1e3 * record.resting_length:.4g} mm"
-    axes.set_title("" if record.level is None else f"{level_text(*record.level)}{length}", fontsize=8)
 
 
 def residual_plot(campaign: Campaign) -> Plot | None:

@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from ....core import Array, IdentificationError, ParameterError, Status, System, tree
 from ....engine import InputSignal, Integrator, WithSensitivities
@@ -108,20 +107,6 @@ class RecordModel:
 
     def evaluate(self, values: Array, max_steps: int = MAX_STEPS) -> "ModelOutputs":
         """The modelled outputs at the rows for unknowns at `values` (P,) [SI]. Raises IdentificationError."""
-        outputs, before_start, steps = self._outputs(values, max_steps)
-        count, columns = len(self.names), self._system.sizes.outputs // len(self.names) - 2
-        by_column = outputs[:, count:-count].reshape(-1, count, columns)
-        if len(self.sensitivity_indices) == len(self.unknowns):
-            return ModelOutputs(outputs[:, :count], by_column, steps)
-        jacobian = np.zeros((*self.measured.shape, len(self.unknowns)))
-        jacobian[:, :, self.sensitivity_indices] = by_column[:, :, : len(self.sensitivity_indices)]
-        for k in self.unknown_indices:
-            if isinstance(self.unknowns[k].target, StartTime):
-                jacobian[:, :, k] = np.where(before_start[:, None], 0.0, -outputs[:, -count:])
-        return ModelOutputs(outputs[:, :count], jacobian, steps)
-
-    def _outputs(self, values: Array, max_steps: int) -> tuple[Array, npt.NDArray[np.bool_], int]:
-        """Outputs of the compiled system at the rows, the mask of the rows before the start, and the steps."""
         state, derivatives = self.initial_state(values)
         grid = self._time_grid(values)
         leaves = self._system.parameters.copy()
@@ -133,10 +118,19 @@ class RecordModel:
             full_state[state.size :] = derivatives.ravel()
         bound = self._bound_integrator(system)
         rows, steps = self._integrate(bound, system, full_state, grid, max_steps)
-        results = np.empty((grid.times.size, system.sizes.outputs))
-        evaluate(system.address["outputs"], system.precomputed, rows, grid.inputs, results)
+        outputs = np.empty((grid.times.size, system.sizes.outputs))
+        evaluate(system.address["outputs"], system.precomputed, rows, grid.inputs, outputs)
         self._idle.append(bound)  # only now: another thread that takes it overwrites the precomputed values
-        return results, grid.before_start, steps
+        count, columns = len(self.names), self._system.sizes.outputs // len(self.names) - 2
+        by_column = outputs[:, count:-count].reshape(-1, count, columns)
+        if len(self.sensitivity_indices) == len(self.unknowns):
+            return ModelOutputs(outputs[:, :count], by_column, steps)
+        jacobian = np.zeros((*self.measured.shape, len(self.unknowns)))
+        jacobian[:, :, self.sensitivity_indices] = by_column[:, :, : len(self.sensitivity_indices)]
+        for k in self.unknown_indices:
+            if isinstance(self.unknowns[k].target, StartTime):
+                jacobian[:, :, k] = np.where(grid.before_start[:, None], 0.0, -outputs[:, -count:])
+        return ModelOutputs(outputs[:, :count], jacobian, steps)
 
     def _integrate(
         self, bound: BoundIntegrator, system: CompiledSystem, state: Array, grid: TimeGrid, max_steps: int
