@@ -82,7 +82,8 @@ def hysteresis(
         of_all = " for all runs together" if joint else ""
         notes.append(f"no friction file: no model that a plant can use is justified{of_all}")
     else:
-        parts.append(("friction", selected.friction, selected.verdict, f"Friction from {selected.origin}"))
+        friction, source, verdict = selected
+        parts.append(("friction", friction, verdict, f"Friction from {source}"))
     if held is not None and held.elements.stiffnesses:
         parts.append(("creep", held.elements, held.verdict, "Creep"))
     elif held is not None:

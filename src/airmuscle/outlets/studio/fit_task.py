@@ -130,7 +130,8 @@ def _friction(recordings: Sequence[am.Recording], folder: Path, report: Report) 
     (own / "report.html").replace(folder / "friction.html")
     chosen = select_friction(fits, joint)
     if chosen is not None:
-        text = f"# {chosen.verdict}\n{part_toml('friction', chosen.friction)}"
+        friction, _, verdict = chosen
+        text = f"# {verdict}\n{part_toml('friction', friction)}"
         (folder / "friction.toml").write_text(text, encoding="utf-8")
     together = _sheet(joint_friction_chapter(joint, loops_not_joined(fits))) if joint else None
     return {"reason": "", "loops": [_loop(fit) for fit in fits], "joint": together, "remarks": remarks}

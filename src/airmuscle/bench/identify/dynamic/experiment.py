@@ -46,9 +46,6 @@ class StartTime(_Checked):
     margin: float
     """Maximum deviation from the start time of the experiment [s]."""
 
-    def __str__(self) -> str:
-        return "start time"
-
 
 @dataclasses.dataclass(frozen=True)
 class InitialValue(_Checked):
@@ -57,9 +54,6 @@ class InitialValue(_Checked):
     name: str
     margin: float
     """Maximum deviation from the value of the experiment [SI]."""
-
-    def __str__(self) -> str:
-        return f"initial {self.name}"
 
 
 @dataclasses.dataclass(frozen=True)
@@ -139,10 +133,8 @@ def make_unknowns(
     unknowns = [_plant_unknown(plant, paths, None, bounds) for paths in free]
     for i, experiment in enumerate(experiments):
         for target in per_record:
-            if isinstance(target, CommandInstants):
-                unknowns += _instant_unknowns(experiment, target.margin, i)
-            elif isinstance(target, StartTime | InitialValue):
-                unknowns.append(_record_unknown(experiment, target, i))
+            if isinstance(target, StartTime | InitialValue | CommandInstants):
+                unknowns += _record_unknowns(experiment, target, i)
             else:
                 unknowns.append(_plant_unknown(experiment.plant or plant, target, i, bounds))
     if not unknowns:
@@ -173,32 +165,35 @@ def _plant_unknown(
     return Unknown(name, paths, record, leaf.value, low, high, declared.unit, declared.symbol, declared.meaning)
 
 
-def _record_unknown(experiment: Experiment, target: StartTime | InitialValue, record: int) -> Unknown:
+def _record_unknowns(
+    experiment: Experiment, target: StartTime | InitialValue | CommandInstants, record: int
+) -> list[Unknown]:
+    """A start time, an initial value, or the instants of a command after its first one. Raises ParameterError."""
+    found: list[tuple[str, Nuisance, float, str, str]]  # name, target, value, unit and symbol
     if isinstance(target, StartTime):
-        value, unit, symbol = experiment.start_time, "s", "t_0"
-    else:
+        found = [("start time", target, experiment.start_time, "s", "t_0")]
+    elif isinstance(target, InitialValue):
         known, where = experiment.initial_conditions.known, f"the initial conditions of record {record + 1}"
         check_known(f"{where} have no known value", target.name, known, "known are")
-        value, symbol = known[target.name], f"{target.name}_0"
         unit = column_heading(target.name).partition("[")[2].rstrip("]") or "SI"
-    name, margin = f"{target} of record {record + 1}", target.margin
-    return Unknown(name, target, record, value, value - margin, value + margin, unit, symbol, str(target))
-
-
-def _instant_unknowns(experiment: Experiment, margin: float, record: int) -> list[Unknown]:
-    """The instants of a command after its first one. Raises ParameterError for a command that is no Schedule."""
-    if not isinstance(experiment.command, Schedule):
+        found = [(f"initial {target.name}", target, known[target.name], unit, f"{target.name}_0")]
+    elif isinstance(experiment.command, Schedule):
+        instants = sorted({instant for points in experiment.command.changes.values() for instant, _ in points})
+        of_command = [
+            (number, CommandInstant(instant, target.margin)) for number, instant in enumerate(instants[1:], 2)
+        ]
+        found = [(f"command instant {i}", each, each.instant, "s", f"t_{i}") for i, each in of_command]
+    else:
         raise ParameterError(
             f"the command of record {record + 1} is a {type(experiment.command).__name__}, which has no "
             "instants; give a Schedule, or leave CommandInstants out."
         )
-    instants = sorted({instant for points in experiment.command.changes.values() for instant, _ in points})
     return [
         Unknown(
-            f"command instant {number} of record {record + 1}", CommandInstant(instant, margin), record, instant,
-            instant - margin, instant + margin, "s", f"t_{number}", "command instant",
+            f"{name} of record {record + 1}", each, record, value, value - target.margin, value + target.margin, unit,
+            symbol, "command instant" if isinstance(each, CommandInstant) else name,
         )
-        for number, instant in enumerate(instants[1:], 2)
+        for name, each, value, unit, symbol in found
     ]  # fmt: skip
 
 

@@ -3,7 +3,7 @@ agreement with each run, and selection of the friction that is written."""
 
 import dataclasses
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -260,24 +260,16 @@ def _fit_law(usable: Sequence[LoopFit], own: Sequence[HysteresisFit]) -> JointFi
     )  # fmt: skip
 
 
-class SelectedFriction(NamedTuple):
-    """The friction to write, with the range of its data, the file or files it is from, and its verdict."""
-
-    friction: Friction
-    origin: str
-    verdict: str
-
-
-def select_friction(fits: Sequence[LoopFit], joint: Sequence[JointFit]) -> SelectedFriction | None:
-    """The friction to write: of all runs together or, if they are not several, of the only run a plant can use."""
+def select_friction(fits: Sequence[LoopFit], joint: Sequence[JointFit]) -> tuple[Friction, str, str] | None:
+    """The friction to write with the range of its data, its origin and verdict: that of all runs together or, if they
+    are not several, of the only run a plant can use."""
     if joint:
         best = preferred_fit(joint)
         if best is None:
             return None
-        origin = f"{len(best.series)} runs"
-        return SelectedFriction(identified_friction(best.friction, best.series), origin, best.verdict)
+        return identified_friction(best.friction, best.series), f"{len(best.series)} runs", best.verdict
     usable = [fit.recommended for fit in fits if fit.recommended is not None and fit.usable_in_plant]
     if not usable:
         return None
     only = max(usable, key=lambda fit: fit.effective_sample_size)
-    return SelectedFriction(identified_friction(only.friction, (only.series,)), only.series.origin, only.verdict)
+    return identified_friction(only.friction, (only.series,)), only.series.origin, only.verdict
