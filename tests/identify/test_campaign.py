@@ -36,7 +36,7 @@ from airmuscle.bench.identify.campaign import (
     held_steady,
     relate_volumes,
 )
-from airmuscle.bench.identify.campaign.next_experiment import _levels
+from airmuscle.bench.identify.campaign.campaign import _levels
 from airmuscle.errors import IdentificationError
 from airmuscle.physics import BoucWen, Braid, CreepElements, NoFriction
 from airmuscle.recording import Recording

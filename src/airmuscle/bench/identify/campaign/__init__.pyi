@@ -1,5 +1,6 @@
 from .campaign import STAGES as STAGES
 from .campaign import Campaign as Campaign
+from .campaign import NextExperiment as NextExperiment
 from .campaign import Prediction as Prediction
 from .campaign import identify_campaign as identify_campaign
 from .campaign_chapters import ValidationRow as ValidationRow
@@ -21,10 +22,9 @@ from .friction_and_release import fit_friction_stage as fit_friction_stage
 from .friction_and_release import fit_release_stage as fit_release_stage
 from .friction_and_release import free_of_creep as free_of_creep
 from .friction_and_release import friction_along as friction_along
-from .next_experiment import NextExperiment as NextExperiment
-from .next_experiment import check_one_rig as check_one_rig
 from .record import CampaignRecord as CampaignRecord
 from .record import RecordKind as RecordKind
+from .record import check_one_rig as check_one_rig
 from .record import classify_records as classify_records
 from .static_stage import ErrorBand as ErrorBand
 from .static_stage import StaticStage as StaticStage

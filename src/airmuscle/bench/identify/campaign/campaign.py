@@ -1,4 +1,4 @@
-"""Campaign: the identification of one muscle from all records of a rig, stage by stage."""
+"""Campaign: the identification of one muscle from all records of a rig, stage by stage, and the next experiments."""
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
@@ -7,17 +7,20 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from ....core import Array, IdentificationError, ShortRepr
+from ....core import AirmuscleError, Array, IdentificationError, ShortRepr
 from ....engine.processes import Workers, process_pool
-from ....physics import CreepElements, ForceLaw, Friction, Geometry, LinearDamper, Muscle, NoFriction
+from ....physics import CreepElements, ForceLaw, Friction, Geometry, LinearDamper, Muscle, NoFriction, ValidityRange
 from ....recording import Recording
 from ..compared_points import law_of_length
+from ..data_checks import level_text
+from ..dynamic import rank_records
+from ..dynamic.record_ranking import MIN_GAIN
+from ..experiment_design import BenchLimits, ExperimentPlan, PlannedRun, optimal_design
 from .creep_stage import CreepStage, fit_creep_stage
 from .fill_stage import FillStage, fit_fill_stage
 from .friction_and_release import FrictionStage, ReleaseStage, fit_friction_stage, fit_release_stage, predicted_force
-from .next_experiment import NextExperiment, check_one_rig, plan_next
-from .record import CampaignRecord, RecordKind, classify_records
-from .static_stage import StaticStage, VolumeChange, fit_static_stage, force_limit, volume_change
+from .record import CampaignRecord, RecordKind, check_one_rig, classify_records
+from .static_stage import StaticStage, fit_static_stage, force_limit
 from .transient import LeftOutStage, named
 
 STAGES = ("records", "creep", "hysteresis", "static characteristic", "fills and volume", "release", "plan")
@@ -34,6 +37,15 @@ class Prediction(NamedTuple):
     force: Array
     low: Array
     high: Array
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class NextExperiment(ShortRepr):
+    """An experiment that would improve the muscle: what to measure, and why; `plan` has the runs of a static one."""
+
+    measure: str
+    purpose: str
+    plan: ExperimentPlan | None = None
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -87,7 +99,7 @@ class Campaign(ShortRepr):
         length = resting_length or self.resting_length
         if length is None or abs(length - own.resting_length) < 1e-6:
             return own
-        change = _volume_change(self.static, length)
+        change = self.static.volume_change(length) if isinstance(self.static, StaticStage) else None
         at_rest = float(own.volume(0.0)) * length / own.resting_length
         return None if change is None else change.geometry(at_rest)
 
@@ -118,16 +130,6 @@ class Campaign(ShortRepr):
         measured = length is None or any(abs(float(length) - k) < 1e-6 for k in known if k)
         half = self.static.half_width(recording, measured)
         return Prediction(np.maximum(force, 0.0), force - half, force + half)
-
-
-def _volume_change(static: StaticStage | LeftOutStage, length: float) -> VolumeChange | None:
-    """The change of the volume of a muscle of a resting length [m] by its static law; None where that gives none."""
-    if isinstance(static, LeftOutStage):
-        return None
-    law, ranges = law_of_length(static.fit.model, length), static.fit.data_ranges
-    if not isinstance(law, ForceLaw):
-        return None
-    return volume_change(law, length, ranges["pressure"], ranges["contraction"])
 
 
 def _main_length(records: Sequence[CampaignRecord]) -> float | None:
@@ -179,7 +181,7 @@ def identify_campaign(
     filled, main = of_kind[RecordKind.FILL], _main_length(of_kind[RecordKind.FILL])
     if len({r.resting_length for r in filled} - {None}) > 1:  # one muscle, that of the most records
         filled = [r for r in filled if r.resting_length == main]
-    change = None if main is None else _volume_change(static, main)
+    change = static.volume_change(main) if isinstance(static, StaticStage) and main is not None else None
     fills = steps.fit("fills and volume", lambda show: fit_fill_stage(filled, geometry, change, show))
     partial = Campaign(records, creep, hysteresis, static, fills, LeftOutStage("release", "", ""), (), geometry)
     releases = of_kind[RecordKind.RELEASE]
@@ -213,3 +215,82 @@ class _Steps:
         if self.finished is not None:
             self.finished(stage, result)
         return result
+
+
+PLANNED_RUNS, PLANNED_POINTS = 4, 15
+"""Number of planned static runs, and of their points (chosen)."""
+POORLY_DETERMINED = 0.05
+"""Relative standard error of a parameter of valve or wall from which a further record is planned (chosen)."""
+MIN_LENGTHS = 3
+"""Number of resting lengths from which the error for other lengths can be judged."""
+
+
+def plan_next(stages: Sequence[object], records: Sequence[CampaignRecord]) -> tuple[NextExperiment, ...]:
+    """The next experiments: missing ones, then those that determine weak parameters, then static runs."""
+    planned = [
+        NextExperiment(_sentence(stage.remedy), f"{stage.name}: {stage.reason.rstrip('.')}")
+        for stage in stages
+        if isinstance(stage, LeftOutStage) and stage.remedy
+    ]
+    for stage in stages:
+        if isinstance(stage, FillStage):
+            planned += _separating_records(stage)
+        elif isinstance(stage, CreepStage):
+            longest = max(stage.elements.relaxation_times, default=0.0)
+            if longest > stage.longest / 2:
+                text = f"Hold the length for {6 * longest:.2g} s instead of {stage.longest:.3g} s."
+                planned.append(NextExperiment(text, "creep: the longest relaxation time is extrapolated"))
+    for stage in stages:
+        if isinstance(stage, StaticStage):
+            planned += [*_lengths(records), *_static_runs(stage)]
+    return tuple(planned)
+
+
+def _sentence(text: str) -> str:
+    return f"{text[:1].upper()}{text[1:].rstrip('.')}."
+
+
+def _separating_records(stage: FillStage) -> list[NextExperiment]:
+    """The experiments that determine what the fills do not, and the record that would separate valve and wall."""
+    planned = []
+    for each in stage.fit.identifiability.undetermined:
+        names = ", ".join(name for name, _ in each.shares)
+        planned.append(NextExperiment(_sentence(each.remedy), f"fills: {names} are not determined"))
+    try:
+        ranking = rank_records(stage.fit)
+    except AirmuscleError:
+        return planned  # fewer than two common parameters within their bounds
+    best, (first, second) = ranking.ranking[0], ranking.pair
+    if ranking.now.worst < POORLY_DETERMINED or best.gain < MIN_GAIN:
+        return planned
+    now, after = (100.0 * each.worst for each in (ranking.now, best.precision))
+    purpose = f"fills: {first} and {second} have a relative standard error of up to {now:.2g} %, then {after:.2g} %"
+    return [*planned, NextExperiment(_sentence(f"measure {best.description}"), purpose)]
+
+
+def _lengths(records: Sequence[CampaignRecord]) -> list[NextExperiment]:
+    lengths = {r.resting_length for r in records if r.kind.is_static and r.resting_length is not None}
+    measured = f"{len(lengths)} resting {'length is' if len(lengths) == 1 else 'lengths are'} measured"
+    text = "Measure muscles of the same type with three resting lengths, each at three pressures or more."
+    next_length = NextExperiment(text, f"lengths: {measured}, so the error for other lengths is not known")
+    return [next_length] if len(lengths) < MIN_LENGTHS else []
+
+
+def _levels(run: PlannedRun) -> str:
+    """A planned run as a phrase: its constant quantity and the sweep of the other."""
+    ends = " to ".join(level_text(run.swept, end) for end in run.sweep_limits)
+    return f"{run.constant} {level_text(run.constant, run.level)}, {run.swept} {ends}"
+
+
+def _static_runs(stage: StaticStage) -> list[NextExperiment]:
+    fit, ranges = stage.fit, stage.fit.data_ranges
+    (low, high), (least, greatest) = ranges["pressure"], ranges["contraction"]
+    limits = BenchLimits(ValidityRange(max(low, 0.0), high, max(least, 0.0), greatest), ranges["force"][1])
+    fixed = tuple(leaf.path for i, leaf in enumerate(fit.problem.leaves) if i not in set(fit.problem.free))
+    sigma = max(fit.sigma, 1e-9)
+    try:
+        plan = optimal_design(fit.model, limits, runs=PLANNED_RUNS, points=PLANNED_POINTS, sigma=sigma, fixed=fixed)
+    except AirmuscleError:
+        return []  # the law has no derivative at a corner of the range; the other experiments remain
+    text = f"Measure {len(plan.runs)} further static runs: {'; '.join(map(_levels, plan.runs))}."
+    return [NextExperiment(text, "static characteristic: the D-optimal runs within the range of the records", plan)]

@@ -1,4 +1,5 @@
-"""Records of a campaign and their kinds: static points, slow runs, fills, creep and release."""
+"""Records of a campaign and their kinds, static points, slow runs, fills, creep and release; check that they are of one
+rig."""
 
 import dataclasses
 import enum
@@ -7,12 +8,13 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ....core import Array, ShortRepr
+from ....core import Array, IdentificationError, ShortRepr
 from ....recording import Recording
 from ...segment import Inspection, Mask, Sensor, estimate_sensors, inspect, inspect_all, quasi_static_rows
 from ...segment.interval import Interval, true_intervals
 from ...segment.runs import AT_REST, CONTRACTION_BAND, ISOBARIC, ISOMETRIC, ISOTONIC, RELATIVE_BAND, Run
 from ..hysteresis.loops import describe_run, rows_of
+from ..matched_rows import match_rows
 from .transient import MAX_RELEASE, MIN_STEP, PressureStep, find_motion, find_pressure_steps
 
 MIN_HOLD, MIN_HOLD_RATIO = 10.0, 10.0
@@ -206,3 +208,60 @@ def _span(values: Array) -> float:
     """The range of the values without the extreme rows."""
     low, high = np.quantile(values, [0.01, 0.99])
     return float(high - low)
+
+
+MAX_RATIO, MAX_SCALE = 1.5, 10.0
+"""Maximum ratio of the forces of two records at the same pressure, contraction and length, and of the maximum forces by
+pressure of two isobaric records of one length (chosen)."""
+OWN_FOLDER = "Give the files of one muscle and one rig in a folder of their own"
+
+
+def check_one_rig(records: Sequence[CampaignRecord]) -> None:
+    """Raise IdentificationError where records of one length are of different specimens, or contradict each other."""
+    by_length: dict[float, list[CampaignRecord]] = {}
+    for record in records:
+        if record.kind is not RecordKind.UNUSED and record.resting_length is not None:
+            by_length.setdefault(round(record.resting_length, 6), []).append(record)
+    for length, own in by_length.items():
+        specimens = {str(r.recording.constants["specimen"]) for r in own if "specimen" in r.recording.constants}
+        if len(specimens) > 1:
+            names = ", ".join(sorted(specimens))
+            raise IdentificationError(
+                f"the records of {1e3 * length:.4g} mm are of several specimens: {names}. {OWN_FOLDER}."
+            )
+        isobaric = [record for record in own if record.kind is RecordKind.ISOBARIC]
+        _check_scale(isobaric)
+        _check_forces([record.recording for record in isobaric])
+
+
+def _check_scale(records: Sequence[CampaignRecord]) -> None:
+    """Raise IdentificationError where the force by pressure differs by a factor that only a unit explains."""
+    levels = [(record.recording, record.level[1]) for record in records if record.level is not None]
+    scales = [(float(np.max(each["force"])) / level, each) for each, level in levels if level > 0]
+    positive = sorted((pair for pair in scales if pair[0] > 0), key=lambda pair: pair[0])
+    if positive and positive[-1][0] > MAX_SCALE * positive[0][0]:
+        (low, first), (high, last) = positive[0], positive[-1]
+        raise IdentificationError(
+            f"the force by pressure of {_with_units(last)} is {high / low:.3g} times that of {_with_units(first)}, at "
+            f"the same length: a unit is wrong, or the files are of different muscles. {OWN_FOLDER}, or correct "
+            "the units."
+        )
+
+
+def _with_units(recording: Recording) -> str:
+    units = [f"{name} in {recording.units[name]}" for name in ("pressure", "force") if name in recording.units]
+    return f"{recording.origin} ({', '.join(units)})"
+
+
+def _check_forces(recordings: Sequence[Recording]) -> None:
+    """Raise IdentificationError where forces at equal pressure and contraction differ by a factor."""
+    for each in match_rows(recordings).runs:
+        names = [block.recording.origin for block in (each.first, each.second)]
+        first, second = (float(np.mean(force)) for force in each.forces)
+        if max(first, second) > MAX_RATIO * min(first, second):
+            pressure = float(np.median(each.first.recording["pressure"][each.first.rows]))
+            raise IdentificationError(
+                f"{' and '.join(names)} contradict each other: at {pressure / 1e3:.3g} kPa and the same contractions "
+                f"their forces are {first:.4g} and {second:.4g} N. They are of different muscles or rigs, or a unit is "
+                f"wrong. {OWN_FOLDER}, or correct the units."
+            )

@@ -11,7 +11,7 @@ import numpy as np
 from ....core import AirmuscleError, Array, PhysicsError, ShortRepr, counted
 from ....physics import ChebyshevGeometry, CreepElements, ForceLaw, Friction
 from ....recording import Recording
-from ..compared_points import FORCE_MARGIN, force_residuals
+from ..compared_points import FORCE_MARGIN, force_residuals, law_of_length
 from ..data_checks import check_data
 from ..fit_points import FitPoints
 from ..model_selection import Comparison, compare
@@ -171,6 +171,13 @@ class StaticStage(ShortRepr):
     def all_bands(self) -> tuple[ErrorBand, ...]:
         """The bands for each purpose, then that for isometric runs."""
         return self.bands if self.held_band is None else (*self.bands, self.held_band)
+
+    def volume_change(self, length: float) -> "VolumeChange | None":
+        """The change of the volume of a muscle of a resting length [m] by virtual work; None where the law has none."""
+        law, ranges = law_of_length(self.fit.model, length), self.fit.data_ranges
+        if not isinstance(law, ForceLaw):
+            return None
+        return volume_change(law, length, ranges["pressure"], ranges["contraction"])
 
     def half_width(self, recording: Recording, measured_length: bool = True) -> float:
         """The half width [N] of the band for a recording, at a resting length of the records or at another one."""

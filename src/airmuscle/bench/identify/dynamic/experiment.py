@@ -179,10 +179,8 @@ def _record_unknowns(
         found = [(f"initial {target.name}", target, known[target.name], unit, f"{target.name}_0")]
     elif isinstance(experiment.command, Schedule):
         instants = sorted({instant for points in experiment.command.changes.values() for instant, _ in points})
-        of_command = [
-            (number, CommandInstant(instant, target.margin)) for number, instant in enumerate(instants[1:], 2)
-        ]
-        found = [(f"command instant {i}", each, each.instant, "s", f"t_{i}") for i, each in of_command]
+        further = [(i, CommandInstant(instant, target.margin)) for i, instant in enumerate(instants[1:], 2)]
+        found = [(f"command instant {i}", each, each.instant, "s", f"t_{i}") for i, each in further]
     else:
         raise ParameterError(
             f"the command of record {record + 1} is a {type(experiment.command).__name__}, which has no "
