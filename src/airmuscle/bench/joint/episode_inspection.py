@@ -105,7 +105,14 @@ def inspect_episodes(episodes: Episodes, pairs: Sequence[tuple[int, int]] = (), 
     except IdentificationError as error:
         errors.append(str(error))
     delay, actions = (0, ()) if errors else _actions(episodes)
-    errors += _exchanged(actions, pairs)
+    certain = {a.muscle: a for a in actions if a.certain}
+    said = [(m, j, sign) for j, pair in enumerate(pairs, start=1) for m, sign in zip(pair, (1, -1), strict=True)]
+    errors += [
+        f"muscles are exchanged: the mapping says that pressure {muscle} {'raises' if sign > 0 else 'lowers'} angle "
+        f"{joint}, the record that {certain[muscle]}. Correct pairs in the mapping file."
+        for muscle, joint, sign in said
+        if muscle in certain and (certain[muscle].joint, certain[muscle].sign) != (joint, sign)
+    ]
     remarks = (*short, *saturated(episodes)[1], *_doubtful(episodes))
     return EpisodeInspection(episodes, delay, actions, tuple(errors), remarks)
 
@@ -238,18 +245,6 @@ def _regress(blocks: Sequence[tuple[Array, Array, Array]], delay: int) -> tuple[
         covariance = inverse @ (scores[:, :, j].T @ scores[:, :, j]) @ inverse
         t_values[:, j] = coefficients[:muscles, j] / np.sqrt(np.maximum(np.diag(covariance)[:muscles], 1e-300))
     return t_values, float(np.sum(residual.var(axis=0) / target.var(axis=0)))
-
-
-def _exchanged(actions: Sequence[PressureAction], pairs: Sequence[tuple[int, int]]) -> list[str]:
-    """Pairs that contradict what the pressures do with certainty."""
-    certain = {a.muscle: a for a in actions if a.certain}
-    said = [(m, j, sign) for j, pair in enumerate(pairs, start=1) for m, sign in zip(pair, (1, -1), strict=True)]
-    return [
-        f"muscles are exchanged: the mapping says that pressure {muscle} {'raises' if sign > 0 else 'lowers'} angle "
-        f"{joint}, the record that {certain[muscle]}. Correct pairs in the mapping file."
-        for muscle, joint, sign in said
-        if muscle in certain and (certain[muscle].joint, certain[muscle].sign) != (joint, sign)
-    ]
 
 
 def saturated(episodes: Episodes) -> tuple[Array, list[str]]:

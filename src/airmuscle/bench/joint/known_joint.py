@@ -195,11 +195,7 @@ class KnownSearch:
             f"{float(f'{each.standard_error:.2g}'):g}{READINGS[field]}"
             for each in estimates for field, _, number in [each.path.partition("[")] if field in READINGS
         ]  # fmt: skip
-        return estimates, covariance, remarks + self._implausible(names, values) + not_separated("", names, shares)
-
-    def _implausible(self, names: Sequence[str], values: Array) -> list[str]:
-        """Remarks on estimates that no such joint has: far from their first values, or at a limit of their range."""
-        far = []
+        far = []  # estimates that no such joint has
         for name, value, own, *ends in zip(names, values, self.start, self.low, self.high, strict=True):
             if abs(value) > FAR * abs(own) > 0.0 or (ends[0] > 0.0 and value < own / FAR):
                 far.append(f"{name} is {value:.3g}, {value / own:.3g} times its first value")
@@ -209,4 +205,4 @@ class KnownSearch:
             f"{'; '.join(far)}: another joint, or a wrong sample time (inertia grows with its square, damping and lags "
             "with it), or a wrong scale of angles or pressures; do not use the numbers before this is explained"
         )
-        return [text] if far else []
+        return estimates, covariance, [*remarks, *([text] if far else []), *not_separated("", names, shares)]

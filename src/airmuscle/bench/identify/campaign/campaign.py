@@ -240,9 +240,13 @@ def plan_next(stages: Sequence[object], records: Sequence[CampaignRecord]) -> tu
             if longest > stage.longest / 2:
                 text = f"Hold the length for {6 * longest:.2g} s instead of {stage.longest:.3g} s."
                 planned.append(NextExperiment(text, "creep: the longest relaxation time is extrapolated"))
+    lengths = {r.resting_length for r in records if r.kind.is_static and r.resting_length is not None}
+    measured = f"{len(lengths)} resting {'length is' if len(lengths) == 1 else 'lengths are'} measured"
+    text = "Measure muscles of the same type with three resting lengths, each at three pressures or more."
+    further = NextExperiment(text, f"lengths: {measured}, so the error for other lengths is not known")
     for stage in stages:
         if isinstance(stage, StaticStage):
-            planned += [*_lengths(records), *_static_runs(stage)]
+            planned += [*([further] if len(lengths) < MIN_LENGTHS else []), *_static_runs(stage)]
     return tuple(planned)
 
 
@@ -266,14 +270,6 @@ def _separating_records(stage: FillStage) -> list[NextExperiment]:
     now, after = (100.0 * each.worst for each in (ranking.now, best.precision))
     purpose = f"fills: {first} and {second} have a relative standard error of up to {now:.2g} %, then {after:.2g} %"
     return [*planned, NextExperiment(_sentence(f"measure {best.description}"), purpose)]
-
-
-def _lengths(records: Sequence[CampaignRecord]) -> list[NextExperiment]:
-    lengths = {r.resting_length for r in records if r.kind.is_static and r.resting_length is not None}
-    measured = f"{len(lengths)} resting {'length is' if len(lengths) == 1 else 'lengths are'} measured"
-    text = "Measure muscles of the same type with three resting lengths, each at three pressures or more."
-    next_length = NextExperiment(text, f"lengths: {measured}, so the error for other lengths is not known")
-    return [next_length] if len(lengths) < MIN_LENGTHS else []
 
 
 def _levels(run: PlannedRun) -> str:

@@ -197,10 +197,8 @@ def _record_table(campaign: Campaign, scenarios: dict[str, str]) -> Table:
 
 
 def creep_chapter(verdict: str, sentences: Sequence[str], elements: CreepElements, standard_errors: Array) -> Chapter:
-    """Return the chapter of creep: the verdict, a sentence on each hold, and the Maxwell elements.
-
-    standard_errors  of the stiffnesses [N/m], then of the relaxation times [s]
-    """
+    """Return the chapter of creep: the verdict, a sentence on each hold, and the Maxwell elements with the standard
+    errors of their stiffnesses [N/m], then of their relaxation times [s]."""
     count = len(elements.stiffnesses)
     columns: dict[str, Any] = {
         "stiffness": TableColumn(elements.stiffnesses, "N/m"),

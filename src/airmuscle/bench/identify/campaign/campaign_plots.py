@@ -27,7 +27,12 @@ def characteristic_plot(campaign: Campaign) -> Plot | None:
     length = campaign.resting_length
     figure, axes = new_figure(width=6.6, height=4.0)
     runs = [run for run in stage.points if length is None or run.constants.get("resting_length") in (length, None)]
-    pressures = _isobaric_levels(campaign, length) or np.linspace(*stage.fit.data_ranges["pressure"], 6)[1:].tolist()
+    isobaric = [r for r in campaign.records if r.kind is RecordKind.ISOBARIC and r.resting_length in (length, None)]
+    levels = sorted(record.level[1] for record in isobaric if record.level)
+    band = LEVEL_TOLERANCE * max(levels, default=0.0)
+    distinct = [levels[interval.start] for interval in level_intervals(np.array(levels), band)]
+    evenly = np.linspace(*stage.fit.data_ranges["pressure"], 6)[1:].tolist()
+    pressures = distinct[:: max(1, -(-len(distinct) // 7))] or evenly
     low, high = stage.fit.data_ranges["contraction"]
     eps = np.linspace(low, high, CURVE_POINTS)
     for i, pressure in enumerate(pressures):
@@ -46,17 +51,6 @@ def characteristic_plot(campaign: Campaign) -> Plot | None:
     text = "" if length is None else f" of the muscle of {1e3 * length:.4g} mm"
     contents = "fitted law with its 95 % band, and measured points freed of friction and creep"
     return Plot("campaign-characteristic", f"Static characteristic{text}: {contents}.", figure)
-
-
-def _isobaric_levels(campaign: Campaign, length: float | None) -> list[float]:
-    levels = sorted(
-        record.level[1]
-        for record in campaign.records
-        if record.kind is RecordKind.ISOBARIC and record.level and record.resting_length in (length, None)
-    )
-    band = LEVEL_TOLERANCE * max(levels, default=0.0)
-    distinct = [levels[interval.start] for interval in level_intervals(np.array(levels), band)]
-    return distinct[:: max(1, -(-len(distinct) // 7))]
 
 
 def prediction_plot(campaign: Campaign) -> Plot | None:

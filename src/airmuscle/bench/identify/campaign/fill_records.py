@@ -69,8 +69,7 @@ def rescaled(plant: Plant, scale: float) -> Plant:
             values[path] = float(np.clip(value * scale, *HEAT_TRANSFER_BOUNDS))
         elif path.startswith("circuit.") and path.endswith(("conductance", "volume")):
             values[path] = value * scale
-    changed: Plant = tree.with_parameters(plant, list(values.values()))
-    return changed
+    return tree.with_parameters(plant, list(values.values()))
 
 
 def at_record(plant: Plant, record: CampaignRecord, volume: float) -> Plant:

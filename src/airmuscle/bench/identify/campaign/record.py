@@ -83,10 +83,8 @@ class CampaignRecord(ShortRepr):
 
 
 def classify_records(recordings: Sequence[Recording]) -> tuple[CampaignRecord, ...]:
-    """The records of a campaign with their kinds; the sensors are estimated from all recordings of the rig together.
-
-    A recording with several long runs at levels of one quantity gives one record for each of them.
-    """
+    """The records of a campaign with their kinds, one for each long run of a recording with several levels of one
+    quantity; the sensors are estimated from all recordings of the rig together."""
     sensors = estimate_sensors(recordings) if recordings else {}
     records = []
     for record in map(_classify, inspect_all(recordings)):

@@ -90,20 +90,15 @@ def named(recordings: Sequence[Recording]) -> tuple[Recording, ...]:
     )
 
 
-MIN_STEP = 20e3
-"""Minimum change of the pressure of a step [Pa] (chosen)."""
-MAX_MIDDLE = 0.47
-"""Maximum time of half the change of a step, as a fraction of the time from 5 % to 95 %; 0.5 is a ramp (chosen)."""
-MIN_TRANSIENT = 0.5
-"""Minimum fraction of the rows of a step that are not quasi-static (chosen)."""
+MIN_STEP, MAX_MIDDLE, MIN_TRANSIENT = 20e3, 0.47, 0.5
+"""Minimum change of the pressure of a step [Pa], maximum time of half of it, as a fraction of the time from 5 to 95 %,
+which is 0.5 in a ramp, and minimum fraction of its rows that are not quasi-static (chosen)."""
 MAX_PULSES = 2
 """Maximum number of rises after a rest within a step (chosen); more are the pulses of a valve that makes a ramp."""
 PULSE_POINTS, PULSE_WINDOW = 200, 4
 """Number of points of a step, and of those of a moving difference, by which pulses are counted (chosen)."""
-MAX_RELEASE = 2.0
-"""Maximum duration of the motion of a release [s] (chosen)."""
-MEDIAN_ROWS = 5
-"""Width of the moving median of the pressure and the length, in rows (chosen)."""
+MAX_RELEASE, MEDIAN_ROWS = 2.0, 5
+"""Maximum duration of the motion of a release [s], and width of the median of pressure and length [rows] (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True)

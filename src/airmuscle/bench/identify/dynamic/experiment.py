@@ -58,10 +58,8 @@ class InitialValue(_Checked):
 
 @dataclasses.dataclass(frozen=True)
 class CommandInstants(_Checked):
-    """The instants at which the command of a run changes after its first one, each of them as an unknown.
-
-    They count from the start of the run, whose error is that of `StartTime`. The command must be a Schedule.
-    """
+    """The instants at which the command of a run, a Schedule, changes after its first one, each as an unknown; they
+    count from the start of the run, whose error is that of `StartTime`."""
 
     margin: float
     """Maximum deviation from an instant of the command of the experiment [s]."""
@@ -214,10 +212,8 @@ CONSTANTS = {"ambient": "pressure", "ambient_temperature": "temperature"}
 
 
 def stated_ambient(recording: Recording, default: Ambient | None = None) -> Ambient:
-    """The ambient air of a recording: its constants `ambient` [Pa] and `ambient_temperature` [K].
-
-    What it does not state is that of `default`, by default the standard atmosphere at 20 degC.
-    """
+    """The ambient air of a recording: its constants `ambient` [Pa] and `ambient_temperature` [K]; what it does not
+    state is that of `default`, by default the standard atmosphere at 20 degC."""
     known = recording.constants
     stated = {field: float(known[name]) for name, field in CONSTANTS.items() if name in known}
     return dataclasses.replace(default or Ambient(), **stated)

@@ -227,12 +227,8 @@ class CrossPrediction:
 
 
 def cross_predict(fit: DynamicFit, refit: Callable[[Sequence[int]], DynamicFit]) -> tuple[CrossPrediction, ...]:
-    """Each record of a joint fit, predicted without it; empty for one record or without common parameters.
-
-    refit  the fit to the records of these numbers, from 0, with the same unknowns
-
-    A record without which the others do not give a fit is left out.
-    """
+    """Each record of a joint fit, predicted without it, as far as the others give a fit; empty for one record or
+    without common parameters. `refit` is the fit to the records of these numbers, from 0, with the same unknowns."""
     count = len(fit.problem.record_models)
     if count < 2 or all(OF_RECORD in estimate.name for estimate in fit.estimates):
         return ()

@@ -116,7 +116,12 @@ class RecordModel:
         full_state[: state.size] = state
         if self.sensitivity_indices:
             full_state[state.size :] = derivatives.ravel()
-        bound = self._bound_integrator(system)
+        try:  # an idle integrator, because binding takes a twentieth of a simulation
+            bound = self._idle.pop()
+        except IndexError:  # none, or another thread was quicker
+            bound = self.method.bind(system)
+        else:
+            bound.rebind(self.method.binding(system))
         rows, steps = self._integrate(bound, system, full_state, grid, max_steps)
         outputs = np.empty((grid.times.size, system.sizes.outputs))
         evaluate(system.address["outputs"], system.precomputed, rows, grid.inputs, outputs)
@@ -153,15 +158,6 @@ class RecordModel:
             rows.append(solution.rows)
             state, held, steps = solution.state, interval.segments.values[-1], steps + solution.steps
         return rows[0] if len(rows) == 1 else np.concatenate(rows), steps
-
-    def _bound_integrator(self, system: CompiledSystem) -> BoundIntegrator:
-        """The integrator at a system, an idle one if there is any: binding takes a twentieth of a simulation."""
-        try:
-            bound = self._idle.pop()
-        except IndexError:  # none, or another thread was quicker
-            return self.method.bind(system)
-        bound.rebind(self.method.binding(system))
-        return bound
 
     def _time_grid(self, values: Array) -> TimeGrid:
         """The rows relative to the start of the run; the last result is kept, as the instants rarely change."""

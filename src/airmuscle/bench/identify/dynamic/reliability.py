@@ -82,10 +82,8 @@ def searches_at_lowest(costs: Array) -> int:
 def describe_optima(
     optima: Sequence[Optimum], estimates: Sequence[Estimate], costs: Array, margins: Array
 ) -> list[str]:
-    """Sentences on other optima that fit almost as well, or on an optimum that a single search reached.
-
-    margins  of the estimates that have one, as in `distinct_optima`
-    """
+    """Sentences on other optima that fit almost as well, or on an optimum that a single search reached; `margins` are
+    those of `distinct_optima`."""
     best, notes = optima[0], list[str]()
     for other in optima[1:]:
         increase, differences = float(np.sqrt(other.cost / max(best.cost, 1e-300))) - 1.0, []

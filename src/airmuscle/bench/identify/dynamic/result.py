@@ -220,23 +220,18 @@ one model is better than another; chosen."""
 
 @dataclasses.dataclass(frozen=True)
 class SensorLocation:
-    """Rms residuals [Pa] of two models of one fill, and the pressure rise [Pa], from which the location follows."""
+    """Rms residuals [Pa] of one fill of a muscle with a growing volume and the sensor in it, and of a line and a muscle
+    with the sensor in the line, and the pressure rise [Pa], from which the location follows."""
 
     rms_in_muscle: float
-    """Rms residual of a muscle with a growing volume, with the sensor in the muscle."""
     rms_in_line: float
-    """Rms residual of a line and a muscle, with the sensor in the line."""
     pressure_rise: float
 
     @property
     def is_upstream(self) -> bool:
         """Whether the sensor is probably upstream of the muscle: the model with the line fits, the other does not."""
-        return self.line_fits_better and self.rms_in_muscle > MIN_RELATIVE_RESIDUAL * self.pressure_rise
-
-    @property
-    def line_fits_better(self) -> bool:
-        """Whether the rms residual with the line is less than half of that with the growing volume."""
-        return self.rms_in_line * MIN_RESIDUAL_RATIO < self.rms_in_muscle
+        rejected = self.rms_in_muscle > MIN_RELATIVE_RESIDUAL * self.pressure_rise
+        return rejected and self.rms_in_line * MIN_RESIDUAL_RATIO < self.rms_in_muscle
 
     def __str__(self) -> str:
         rms = (
@@ -246,7 +241,7 @@ class SensorLocation:
         )
         if self.is_upstream:
             return f"the sensor is probably upstream of the muscle: {rms}"
-        if self.line_fits_better:
+        if self.rms_in_line * MIN_RESIDUAL_RATIO < self.rms_in_muscle:
             return (
                 f"the sensor may be upstream of the muscle: {rms}; another model of the volume may fit as well. Record "
                 "the length, or the pressure at both ends of the line"

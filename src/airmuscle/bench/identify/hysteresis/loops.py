@@ -273,9 +273,7 @@ def make_loop_series(
 
 
 def fit_loop(loop: HysteresisLoop, *, elements: int = 8, progress: Callable[[str], None] | None = None) -> LoopFit:
-    """Fit every friction law to a loop and sort the fits by AICc.
-
-    A law with terms of speed is left out if the speed in the loop hardly varies.
+    """Fit every friction law to a loop and sort the fits by AICc; laws with terms of speed need a speed that varies.
 
     `elements` is the number of elements of MaxwellSlip and PrandtlIshlinskii; `progress` is called with the name of
     each law.

@@ -191,19 +191,6 @@ class HysteresisFit(FrictionFit):
         further = f"; the repeatability of the runs is {self.repeatability:.3g} N"
         return self._judged(f"{text}.", "this friction", "second run", further)
 
-    @property
-    def parameter_table(self) -> Table:
-        """The parameters in units of the driving quantity: N/Pa of a stiffness, Pa/s of a speed with the pressure."""
-        rows = [(leaf, *self.series.axis.display(leaf.value, leaf.declared.unit)) for leaf in leaves(self.friction)]
-        columns: dict[str, Any] = {
-            "parameter": [leaf.path for leaf, _, _ in rows],
-            "symbol": [leaf.declared.symbol for leaf, _, _ in rows],
-            "value": TableColumn([value for _, value, _ in rows], BY_ROW),
-            "unit": [unit for _, _, unit in rows],
-            "meaning": TableColumn([leaf.declared.meaning for leaf, _, _ in rows], brief=False),
-        }
-        return Table("parameters", f"Parameters of {self.name}", columns, brief=len(rows))
-
     def plot(self, *, ax: Any = None) -> Any:
         """Plot the measured force minus the static curve over the path, with the friction force, and the residuals.
         `ax` is an Axes for the loop, or a sequence of two, also for the residuals, and is returned; without it a new
@@ -235,11 +222,20 @@ class HysteresisFit(FrictionFit):
         return figure
 
     def chapter(self) -> Chapter:
-        """The description of the fit: verdict, parameters, and the loop with the friction force."""
+        """The description of the fit: verdict, parameters in units of the driving quantity, such as N/Pa of a stiffness
+        with the pressure, and the loop with the friction force."""
+        rows = [(leaf, *self.series.axis.display(leaf.value, leaf.declared.unit)) for leaf in leaves(self.friction)]
+        columns: dict[str, Any] = {
+            "parameter": [leaf.path for leaf, _, _ in rows],
+            "symbol": [leaf.declared.symbol for leaf, _, _ in rows],
+            "value": TableColumn([value for _, value, _ in rows], BY_ROW),
+            "unit": [unit for _, _, unit in rows],
+            "meaning": TableColumn([leaf.declared.meaning for leaf, _, _ in rows], brief=False),
+        }
+        table = Table("parameters", f"Parameters of {self.name}", columns, brief=len(rows))
         title, caption = f"{self.name} fitted to {self.series.origin}", f"Loop and hysteresis described by {self.name}."
-        tables, plots = (self.parameter_table,), (Plot("friction", caption, self.plot),)
-        references = self.friction.references
-        return Chapter("friction", title, self.verdict, tables=tables, plots=plots, references=references)
+        plots, references = (Plot("friction", caption, self.plot),), self.friction.references
+        return Chapter("friction", title, self.verdict, tables=(table,), plots=plots, references=references)
 
 
 def assess_fit(
