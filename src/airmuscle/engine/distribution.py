@@ -103,8 +103,7 @@ class DistributedCalls:
         return pickle.dumps(self._common, protocol=5)
 
     def completed(self, tasks: Sequence[Any]) -> Iterator[tuple[int, Any]]:
-        """The index of each task and its result, as they are completed. Raises what a call raises, SimulationError if a
-        worker dies."""
+        """Index and result of each task, as completed. Raises what a call raises; SimulationError at a crash."""
         if self._executor is None:
             yield from ((i, self._function(self._common, task)) for i, task in enumerate(tasks))
             return

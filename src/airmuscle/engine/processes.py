@@ -26,6 +26,11 @@ stop_events: list[Any] = []
 """Events that stop what this process computes for a pool, between two runs."""
 _share: list[int | None] = [None]
 """Cores of a worker: those of its parent, divided among its workers."""
+START_LIMIT = 60.0
+"""Limit [s] of the start of a worker with its imports (chosen)."""
+_START = f"import sys; sys.path[:] = sys.argv[1:]; from {__name__} import serve_tasks; serve_tasks()"
+Report = Callable[..., None]
+"""Receives the progress of a task, with the arguments that the task states."""
 
 
 def available_cores() -> int:
@@ -126,13 +131,6 @@ def check_running() -> None:
     """Raise KeyboardInterrupt in a worker whose pool has been stopped."""
     if any(event.is_set() for event in stop_events):
         raise KeyboardInterrupt
-
-
-START_LIMIT = 60.0
-"""Limit [s] of the start of a worker with its imports (chosen)."""
-_START = f"import sys; sys.path[:] = sys.argv[1:]; from {__name__} import serve_tasks; serve_tasks()"
-Report = Callable[..., None]
-"""Receives the progress of a task, with the arguments that the task states."""
 
 
 class WorkerError(AirmuscleError):

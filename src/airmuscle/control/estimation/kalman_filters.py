@@ -14,6 +14,8 @@ from .state_estimator import StateEstimate, StateEstimator
 
 _predict_extended = Kernel("predict_extended", "kalman_filter")
 _correct_extended = Kernel("correct_extended", "kalman_filter")
+_predict_unscented = Kernel("predict_unscented", "kalman_filter")
+_correct_unscented = Kernel("correct_unscented", "kalman_filter")
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -98,10 +100,6 @@ def consistency_band(dimension: int, runs: int, probability: float = 0.95) -> tu
     tails = ((1.0 - probability) / 2.0, (1.0 + probability) / 2.0)
     low, high = (float(chi2.ppf(tail, dimension * runs)) / runs for tail in tails)
     return low, high
-
-
-_predict_unscented = Kernel("predict_unscented", "kalman_filter")
-_correct_unscented = Kernel("correct_unscented", "kalman_filter")
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)

@@ -11,6 +11,8 @@ from ..laws.state_feedback import StateFeedback
 
 DISTURBANCE = ".disturbance"
 """End of the name of an estimated disturbance, after that of its state."""
+HAN2009 = published("han-2009")
+GAO2003 = published("gao-2003")
 
 
 def check_numbers(
@@ -84,13 +86,6 @@ def regulator(owner: str, a: Array, b: Array, weights: Array, costs: Array) -> t
     return np.asarray(np.linalg.solve(costs + b.T @ p @ b, b.T @ p @ a)), p
 
 
-def observer_gain(owner: str, a: Array, c: Array, noise: Array, covariance: Array) -> Array:
-    """Gain (n, p) of the stationary Kalman filter, which corrects a prediction by a measurement."""
-    failure = "columns do not detect all states, or a process noise is missing. Give states a process noise, or measure"
-    p = _riccati(a.T, c.T, noise, covariance, f"{owner}: these measured {failure} more.")
-    return np.asarray(np.linalg.solve(c @ p @ c.T + covariance, c @ p).T)
-
-
 def _riccati(a: Array, b: Array, weights: Array, costs: Array, failure: str) -> Array:
     """The solution (n, n) of the discrete algebraic Riccati equation; ParameterError with this text without one."""
     from scipy.linalg import solve_discrete_are
@@ -104,8 +99,8 @@ def _riccati(a: Array, b: Array, weights: Array, costs: Array, failure: str) -> 
 def disturbance_observer(
     owner: str, sampled: tuple[Array, Array, Array, Array], noise: Array, deviations: Array
 ) -> tuple[Array, Array, Array, Array]:
-    """State, input and output matrix of a sampled plant with constant disturbances as further states, and the gain of
-    the observer of both.
+    """State, input and output matrix of a sampled plant with constant disturbances as states, and the gain (n + d, p)
+    of its stationary Kalman filter, which corrects a prediction by a measurement.
 
     sampled     matrices of states (n, n), inputs (n, m), disturbances (n, d) and measured columns (p, n)
     noise       covariance (n + d, n + d) of the process noise of a sample
@@ -115,7 +110,10 @@ def disturbance_observer(
     n, d = by_disturbance.shape
     wide = np.block([[a, by_disturbance], [np.zeros((d, n)), np.eye(d)]])
     seen = np.hstack([c, np.zeros((len(c), d))])
-    gain = observer_gain(owner, wide, seen, noise, np.diag(deviations**2))
+    failure = "columns do not detect all states, or a process noise is missing. Give states a process noise, or measure"
+    covariance = np.diag(deviations**2)
+    p = _riccati(wide.T, seen.T, noise, covariance, f"{owner}: these measured {failure} more.")
+    gain = np.asarray(np.linalg.solve(seen @ p @ seen.T + covariance, seen @ p).T)
     return wide, np.vstack([b, np.zeros((d, b.shape[1]))]), seen, gain
 
 
@@ -149,10 +147,6 @@ def steady_target(owner: str, a: Array, b: Array, entering: Array, controlled: A
         )
     inverse = np.linalg.pinv(equations) / rows
     return -inverse[:, :n] @ entering, inverse[:, n:]
-
-
-HAN2009 = published("han-2009")
-GAO2003 = published("gao-2003")
 
 
 def design_lqg(

@@ -15,8 +15,7 @@ from ..laws.linear_model_predictive import TOLERANCES, UNLIMITED
 from . import ExtendedKalmanFilter, StateEstimate
 
 MAX_HORIZON, STEPS, SETTLED = 200, 20, 1e-9
-"""Maximum number of samples of a window; Gauss-Newton steps, and the step in standard deviations that ends them
-(chosen)."""
+"""Samples of a window at most; Gauss-Newton steps, and the step in standard deviations that ends them (chosen)."""
 _shortest = Kernel("shortest_vector", "predictive")
 
 

@@ -206,10 +206,7 @@ def _check(measured: Sequence[str], disturbed: Sequence[str], blocks: Sequence[i
 def _reach(
     limits: Mapping[str, tuple[float, float]], closed: Array, entering: Array, gain: Array, columns: Array, horizon: int
 ) -> tuple[Array, Array]:
-    """How far disturbances move the inputs (N, m) and, one sample later, the columns (N, l) under the regulator.
-
-    Raises ParameterError where they reach half of the range of a column.
-    """
+    """How far disturbances move the inputs (N, m) and, one sample later, the columns (N, l) under the regulator."""
     inputs, limited, moved = [np.zeros(len(gain))], list[Array](), entering
     for _ in range(horizon):
         limited.append((limited[-1] if limited else 0.0) + np.abs(columns @ moved).sum(axis=1))

@@ -159,8 +159,13 @@ class PredictiveProgram:
             return None, None
         count, width = law.horizon, len(law.limits)
         slack, steps = np.zeros(self.slacks), np.zeros(count * n)
+        if variables is None:
+            begin = np.concatenate([np.tile(np.append(x, aim[n:]), count), slack])
+        else:  # the last plan, moved by one sample
+            _, *samples, last = np.split(variables, aim.size * np.arange(1, count + 2))
+            begin = np.concatenate([*samples[1:], samples[-1], last])
         solution = planner(
-            x0=self._start(x, aim, variables),
+            x0=begin,
             p=np.concatenate([x, d, aim]),
             lbx=np.concatenate([np.tile(lower, count), slack]),
             ubx=np.concatenate([np.tile(upper, count), slack + np.inf]),
@@ -171,12 +176,3 @@ class PredictiveProgram:
         if not (planner.stats()["success"] and np.isfinite(z).all()):
             return None, None
         return z[: count * (n + m)].reshape(count, n + m)[:, n:] * self.sizes, np.concatenate([aim, z])
-
-    def _start(self, x: Array, aim: Array, variables: Array | None) -> Array:
-        """The variables from which the search starts: the last ones, moved by one sample, or the target."""
-        if variables is None:
-            return np.concatenate(
-                [np.tile(np.append(x, aim[x.size :]), self.controller.horizon), np.zeros(self.slacks)]
-            )
-        _, *samples, slack = np.split(variables, aim.size * np.arange(1, self.controller.horizon + 2))
-        return np.concatenate([*samples[1:], samples[-1], slack])

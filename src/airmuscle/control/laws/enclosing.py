@@ -84,8 +84,7 @@ class WithCommandDelay(EnclosingLaw):
     n `samples`, m `jitter`: the age of the applied command is uniform from n to n + m samples, a command is lost with
     the probability p_l `lost`, and the last one is then held. Before the first command arrives, inputs are 0. The
     computing time of a controller is a part of its sample time where the loop is sampled faster:
-    `WithCommandDelay(Multirate(law, 5), 2)` is a delay of 0.4 of the sample time of the law. The seed determines the
-    sequence, as in WithSensors.
+    `WithCommandDelay(Multirate(law, 5), 2)` is a delay of 0.4 of the sample time of the law. Seed as in WithSensors.
     """
 
     references: ClassVar[tuple[Reference, ...]] = (LECUYER1999,)

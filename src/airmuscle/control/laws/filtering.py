@@ -13,11 +13,6 @@ from .enclosing import MAX_SAMPLES
 from .state_feedback import FRANKLIN1998
 
 
-def check_measured(owner: str, law: ControlLaw, column: str) -> None:
-    """Raise ParameterError where a law does not measure a column."""
-    check_known(f"{owner}: the law does not measure", column, law.measured_columns, "it measures")
-
-
 @model
 class WithFilter(EnclosingLaw):
     """y_f = F(s) y,  F = (b_2 s^2 + b_1 s + 1)/(a_2 s^2 + a_1 s + 1): the law receives y_f for a measured column y.
@@ -53,7 +48,7 @@ class WithFilter(EnclosingLaw):
         return cls(law, column, (lead_time, 0.0), (lag_time, 0.0))
 
     def check(self) -> None:
-        check_measured("WithFilter", self.law, self.column)
+        check_known("WithFilter: the law does not measure", self.column, self.law.measured_columns, "it measures")
         if len(self.numerator) != 2 or len(self.denominator) != 2 or min(self.denominator) < 0:
             raise ParameterError(
                 f"WithFilter: numerator {self.numerator} and denominator {self.denominator}; give two coefficients "
@@ -106,7 +101,7 @@ class SmithPredictor(EnclosingLaw):
     time_constant: float = parameter("s", "T", "time constant of the model", bounds=(1e-6, 1e6))
 
     def check(self) -> None:
-        check_measured("SmithPredictor", self.law, self.column)
+        check_known("SmithPredictor: the law does not measure", self.column, self.law.measured_columns, "it measures")
         if set(inputs_of(self.commanded)) != set(self.law.inputs):
             raise ParameterError(
                 f"SmithPredictor: the model has the inputs {', '.join(inputs_of(self.commanded))}; the law commands "
@@ -165,7 +160,9 @@ class RepetitiveControl(EnclosingLaw):
                 f"RepetitiveControl: period and lead are {self.period_samples} and {self.lead_samples} samples; "
                 f"allowed range: a period of 4 to {MAX_SAMPLES}, a lead from 0 to two less than that."
             )
-        check_measured("RepetitiveControl", self.law, self.column)
+        check_known(
+            "RepetitiveControl: the law does not measure", self.column, self.law.measured_columns, "it measures"
+        )
         check_known("RepetitiveControl: the law has no set point", self.column, self.law.setpoints)
 
     @property

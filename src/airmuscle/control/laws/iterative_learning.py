@@ -83,15 +83,14 @@ class IterativeLearning:
     def convergence_rate(self, true_response: npt.ArrayLike) -> float:
         """|Q (I - L G_0)| [1], the factor by which the distance of the signal to its limit shrinks with each trial.
 
-        `true_response` is the impulse response (N,) of the controlled plant. Below 1 the convergence is monotonic;
-        above 1 the signal may diverge.
+        `true_response` is the impulse response (N,) of the plant. Convergence is monotonic below 1, not sure above 1.
         """
-        matrix = toeplitz_matrix(np.asarray(true_response, dtype=float))
+        matrix = _toeplitz(np.asarray(true_response, dtype=float))
         return float(np.linalg.norm(self._filtered(np.eye(len(matrix)) - self._learning @ matrix), 2))
 
     @functools.cached_property
     def _learning(self) -> Array:
-        matrix = toeplitz_matrix(np.array(self.impulse_response))
+        matrix = _toeplitz(np.array(self.impulse_response))
         weight = self.change_weight * np.linalg.norm(matrix, 2) ** 2
         return np.asarray(np.linalg.solve(matrix.T @ matrix + weight * np.eye(len(matrix)), matrix.T))
 
@@ -104,7 +103,7 @@ class IterativeLearning:
         return np.asarray(sosfiltfilt(sections, signals, axis=0, padtype="even", padlen=padding))
 
 
-def toeplitz_matrix(response: Array) -> Array:
+def _toeplitz(response: Array) -> Array:
     """Lower triangular Toeplitz matrix (N, N) of an impulse response (N,)."""
     from scipy.linalg import toeplitz
 

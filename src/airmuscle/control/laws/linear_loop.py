@@ -16,6 +16,11 @@ from .linear_law import LinearLaw, Point, linearise_law
 
 POINTS, DECADES = 4000, 6
 """Frequencies below the Nyquist frequency between which crossings are sought, and their decades (chosen)."""
+SHOWN = 500
+"""Frequencies of a Bode plot."""
+NO_GAIN = STABLE = 1e-9
+"""Greatest gain of an open loop that counts as none (a closed valve), and by how much the magnitude of a pole of
+a stable loop may exceed 1: enclosed air that is not controlled, rounding (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -79,10 +84,7 @@ def loop_margins(opened: SampledModel) -> Margins:
 
 
 def _scanned(opened: SampledModel, frequencies: Array) -> npt.NDArray[np.complex128]:
-    """The responses (F,) of a loop, many at once: back substitution in the Schur form of its balanced state matrix.
-
-    Next to crossings, where a sign may be rounding, they are those of the linear solution by which crossings are found.
-    """
+    """The responses (F,) of a loop, many at once: back substitution in the Schur form of its balanced state matrix."""
     from scipy.linalg import matrix_balance, schur
 
     balanced, (scale, _) = matrix_balance(opened.A, permute=False, separate=True)
@@ -93,7 +95,7 @@ def _scanned(opened: SampledModel, frequencies: Array) -> npt.NDArray[np.complex
     for i in reversed(range(len(b))):
         states[i] = (b[i] + triangle[i, i + 1 :] @ states[i + 1 :]) / (z - triangle[i, i])
     values = np.asarray(c @ states + opened.D[0, 0])
-    for signs in (np.sign(values.imag), np.sign(np.abs(values) - 1.0)):
+    for signs in (np.sign(values.imag), np.sign(np.abs(values) - 1.0)):  # next to crossings a sign may be rounding
         near = np.unique(np.flatnonzero(np.diff(signs))[:, None] + np.arange(2))
         values[near] = opened.frequency_response(frequencies[near])[:, 0, 0]
     return values
@@ -119,13 +121,6 @@ def _peak(grid: Array, distances: Array, function: Callable[[float], float]) -> 
     return (math.inf if best == 0 else 1.0 / best), where
 
 
-SHOWN = 500
-"""Frequencies of a Bode plot."""
-NO_GAIN = STABLE = 1e-9
-"""Greatest gain of an open loop that counts as none (a closed valve), and by how much the magnitude of a pole of
-a stable loop may exceed 1: enclosed air that is not controlled, rounding (chosen)."""
-
-
 @dataclasses.dataclass(frozen=True, eq=False)
 class LinearLoop:
     """A control loop near a working point, between its samples: the plant for held inputs, and the law.
@@ -149,8 +144,7 @@ class LinearLoop:
 
         Without a column it is the first that is measured. The loops of all other columns remain closed: opened at the
         pressure, a cascade has the open loop of its pressure control, with that of the position around it. With L the
-        loop is stable where 1 + L(z) has no zero outside the unit circle. Raises ParameterError for a column that the
-        law does not measure.
+        loop is stable where 1 + L(z) has no zero outside the unit circle. Raises ParameterError for another column.
         """
         known = self.law.measured
         name = known[0] if column is None else column

@@ -12,6 +12,12 @@ from ...core import Array, Reference, ShortRepr, Status, published
 from ...engine.compile.cache.kernel import Kernel
 from ...engine.loop.controller import Measurement, MultivariableController, failure_notes
 
+RAWLINGS2017 = published("rawlings-2017")
+CHISCI2001 = published("chisci-2001")
+_sample = Kernel("predictive_sample", "predictive")
+UNLIMITED, TOLERANCES = 1e30, (1e-9, 1e-6, 1e-12, 1e-9)
+"""A limit that nothing reaches; tolerances of the quadratic program, by their places in the kernel (chosen)."""
+
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class CondensedProblem(ShortRepr):
@@ -44,13 +50,6 @@ class CondensedProblem(ShortRepr):
     upper: npt.NDArray[np.bool_]
     narrowed: tuple[Array, Array]
     max_change: Array
-
-
-RAWLINGS2017 = published("rawlings-2017")
-CHISCI2001 = published("chisci-2001")
-_sample = Kernel("predictive_sample", "predictive")
-UNLIMITED, TOLERANCES = 1e30, (1e-9, 1e-6, 1e-12, 1e-9)
-"""A limit that nothing reaches; tolerances of the quadratic program, by their places in the kernel (chosen)."""
 
 
 class PredictiveMemory(NamedTuple):

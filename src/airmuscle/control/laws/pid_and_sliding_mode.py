@@ -3,11 +3,12 @@
 import functools
 from typing import ClassVar
 
-from ...core import ParameterError, Reference, Value, model, ops, parameter, published
+from ...core import INFINITY, ParameterError, Reference, Value, model, ops, parameter, published
 from ...engine.loop import Measurement, Memory, Sampled, SisoController, commands, range_of
 
 SLIDING_MEMORY: Memory = {"started": 0.0, "error": 0.0, "error_rate": 0.0}
 """Whether it has started (0 or 1), the last error and its filtered derivative."""
+ASTROM_HAGGLUND1995 = published("astrom-hagglund-1995")
 
 
 def sliding_variable(
@@ -86,9 +87,6 @@ class SuperTwisting(SisoController):
         rate = ops.where((wanted - command) * sign > 0.0, 0.0, self.integral * sign)
         later["integral"] = integral + dt * rate
         return commands(self.commanded, command), later
-
-
-ASTROM_HAGGLUND1995 = published("astrom-hagglund-1995")
 
 
 @model
@@ -170,9 +168,7 @@ class OnOffController(SisoController):
 
     references: ClassVar[tuple[Reference, ...]] = (ASTROM_HAGGLUND1995,)
 
-    hysteresis: float = parameter(
-        "y", "H", "width between switching on and off", bounds=(0.0, float("inf")), default=0.0
-    )
+    hysteresis: float = parameter("y", "H", "width between switching on and off", bounds=(0.0, INFINITY), default=0.0)
 
     initial_memory: ClassVar[Memory] = {"on": 0.0}
     """Whether the maximum is commanded (0 or 1)."""

@@ -13,6 +13,11 @@ from .pid_and_sliding_mode import ASTROM_HAGGLUND1995
 
 DIFFERENCE = "difference"
 """Name of the set point that an outer controller commands: half the difference of both pressures [Pa]."""
+TONIETTI_BICCHI2002 = published("tonietti-bicchi-2002")
+UNREACHED = 0.01
+"""Part of the torque that the pressures must miss for the integral to stop (chosen): above the error of the inverse."""
+SLACK_STEPS = 6
+"""Steps of the static inverse at the minimum tension."""
 
 
 @model
@@ -98,15 +103,6 @@ class ProportionalFeedback(ControlLaw):
             y, (low, high) = measurement.columns[name], range_of(commanded, measurement.ranges)
             result[name] = ops.clip(result[name], y + low / gain, y + high / gain)
         return result
-
-
-TONIETTI_BICCHI2002 = published("tonietti-bicchi-2002")
-
-
-UNREACHED = 0.01
-"""Part of the torque that the pressures must miss for the integral to stop (chosen): above the error of the inverse."""
-SLACK_STEPS = 6
-"""Steps of the static inverse at the minimum tension."""
 
 
 @model

@@ -23,6 +23,8 @@ from .pwm_and_solenoid import Driver, WithDrivers
 
 COMMAND, SETPOINT, MEASURED = "command.", "setpoint.", "measured."
 """Prefixes of the columns of a recording that hold commands, set points and measurements of a controller."""
+_without_design: set[Structure] = set()
+"""Structures of control laws that contain no design."""
 
 
 class ControlLoopState(NamedTuple):
@@ -127,14 +129,6 @@ class ControlLoop(ShortRepr):
         known = {**declared, **dict.fromkeys(self.drivers, (0.0, 1.0))}
         return {name: known[name] for name in self.controller.inputs}
 
-    def check_sample_time(self, duration: float) -> None:
-        """Raise ParameterError where a run of `duration` [s] ends before the second sample."""
-        if self.sample_time > duration:
-            raise ParameterError(
-                f"the sample time of the controller is {self.sample_time:g} s, longer than the run of {duration:g} s. "
-                "Shorten the sample time, or simulate longer."
-            )
-
     def units(self, known: Mapping[str, str]) -> dict[str, str]:
         """The units of the columns that the loop adds to a recording, from those of the plant's columns."""
         known = {**named_signal_units(self.controller), **{name: unit for name, unit in known.items() if unit}}
@@ -191,10 +185,6 @@ def check_present(controller: Controller, columns: Sequence[str], inputs: Sequen
                 f"{alternatives(name, columns)}"
             )
     check_input_names(controller.inputs, inputs)
-
-
-_without_design: set[Structure] = set()
-"""Structures of control laws that contain no design."""
 
 
 class LawDesign(EnclosingLaw):

@@ -58,8 +58,7 @@ class Controller(SignalRelated):
     def step(self, memory: Any, measurement: Measurement, dt: float) -> tuple[Mapping[str, float], Any]:
         """The command of every input until the next sample, `dt` [s] later, and the memory for that sample.
 
-        Commands are limited to the ranges of the inputs afterwards; a controller with integral action must account for
-        it.
+        Commands are limited to the ranges of the inputs afterwards, for which integral action must account.
         """
 
     @property

@@ -17,6 +17,9 @@ FEW_SEGMENTS = 16
 """Segments up to which they are gone through one by one, which is faster (measured)."""
 Segment = tuple[float, float, float]
 """A segment of a single input: its end [s], the value at its start, the slope [1/s]."""
+MAX_INSTANTS = 10_000_000
+"""Instants of one run that fit a usual memory."""
+NO_INPUT = "the plant has no input"
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -113,10 +116,6 @@ def merge_columns(columns: Sequence[Sequence[Segment]], start: float) -> Piecewi
     return PiecewiseLinear(np.array([*starts[1:], columns[0][-1][0]]), table, rising)
 
 
-MAX_INSTANTS = 10_000_000
-"""Instants of one run that fit a usual memory."""
-
-
 class InputSignal(abc.ABC):
     """The inputs of a plant as functions of time."""
 
@@ -149,9 +148,6 @@ def check_input_signal(given: object) -> None:
         raise ParameterError(
             f"the input is {abridged(given)}; give a Schedule, a SampledSignal or another InputSignal.{remedy}"
         )
-
-
-NO_INPUT = "the plant has no input"
 
 
 def check_input_names(given: Iterable[str], inputs: Sequence[str], prefix: str = NO_INPUT) -> None:

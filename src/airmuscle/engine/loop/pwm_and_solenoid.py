@@ -1,8 +1,7 @@
 """Drivers between the command of an input and the opening of its valve: solenoids and pulse width modulation.
 
 A driver has a state, a named tuple of numbers, because what was switched may still be pending: carried along, a run in
-many steps equals the run in one. At the start of a run every driver is at rest: no current in the coil, valve closed,
-carrier at the start of a period.
+many steps equals the run in one. A run starts at rest: no current, valve closed, carrier at the start of a period.
 """
 
 import abc
@@ -19,6 +18,9 @@ from .inputs import InputSignal, PiecewiseLinear, Segment, check_input_names, ch
 
 MAX_PERIODS = 10_000_000
 """Periods of a carrier in one run."""
+_ROUNDING = 1e-9
+"""How far a command may exceed 0 to 1 through rounding."""
+_FULL = 1 + _ROUNDING
 
 
 class Driver(abc.ABC):
@@ -133,11 +135,6 @@ def _driven(
     function = plain_kernels("drivers")[kernel]
     count = function(settings, state, later, signal, len(signal[0]), start, last, (ends, values, slopes))
     return [(ends[i], values[i], slopes[i]) for i in range(count)], later
-
-
-_ROUNDING = 1e-9
-"""How far a command may exceed 0 to 1 through rounding."""
-_FULL = 1 + _ROUNDING
 
 
 @dataclasses.dataclass(frozen=True, repr=False)

@@ -63,8 +63,7 @@ class SampledSignal(InputSignal):
 
         Each line is compared with its function at a quarter, a half and three quarters of it, and none is longer than
         1/64 of the duration (chosen); what a function does between these points is not seen. Raises ParameterError for
-        a function that 100 000 points do not approximate, for one that jumps (give it as a Schedule), and for one that
-        does not return a finite number.
+        a function that 100 000 points do not approximate, jumps (give a Schedule), or returns no finite number.
         """
         check_mapping("sampled signal", functions, "lambda t: 0.5")
         duration = as_float("SampledSignal.sampled: duration", duration)

@@ -13,6 +13,12 @@ from .controller import Measurement, SignalRelated
 
 MAX_DELAY = 1000
 """Maximum delay of a sensor in samples (chosen)."""
+LECUYER1999 = published("lecuyer-1999")
+FIRST_MODULUS, SECOND_MODULUS = 4294967087.0, 4294944443.0
+_SEED_MODULUS, _SEED_FACTOR = 2147483647.0, 16807.0
+"""Park and Miller's generator, from which the state of a seed is taken."""
+STATE = ("x0", "x1", "x2", "y0", "y1", "y2")
+"""Names of the six numbers of the state, the oldest first."""
 
 
 @model
@@ -55,14 +61,6 @@ class ColumnSensor(SignalRelated):
         waiting = [ops.where(started > 0, memory[f"delayed{i}"], read) for i in range(self.delay)]
         moved = [*waiting[1:], read]
         return waiting[0], {"lagged": lagged, **{f"delayed{i}": each for i, each in enumerate(moved)}}
-
-
-LECUYER1999 = published("lecuyer-1999")
-FIRST_MODULUS, SECOND_MODULUS = 4294967087.0, 4294944443.0
-_SEED_MODULUS, _SEED_FACTOR = 2147483647.0, 16807.0
-"""Park and Miller's generator, from which the state of a seed is taken."""
-STATE = ("x0", "x1", "x2", "y0", "y1", "y2")
-"""Names of the six numbers of the state, the oldest first."""
 
 
 def modulo(value: Value, modulus: float) -> Value:

@@ -1,7 +1,6 @@
 """Control loop as one program: control law, drivers and plant from sample to sample without a return to Python.
 
-A controller that is no control law, and drivers that no kernel implements, are called from Python; only then does the
-program pause at each sample.
+A controller that is no control law, and drivers that no kernel implements, are called from Python at each sample.
 """
 
 from typing import Any
@@ -62,7 +61,6 @@ class CompiledRun:
         self._integrator, self._precomputed = integrator, compiled.precomputed
         self.bound = integrator.bind(compiled)
         self._drivers = DriverTable(loop.prepared, control_state, loop.capacity, loop.called_drivers)
-        self._take_beginning(control_state)
         self._make_arrays(compiled.sizes.states, compiled.sizes.inputs)
         self._parameters = loop.parameters.copy() if parameters is None else parameters
         arguments = self._arguments(compiled, self._parameters)
@@ -70,7 +68,7 @@ class CompiledRun:
         self._columns = next(i for i, each in enumerate(arguments) if each is self._drivers.columns)
         self._kernel = kernel.sampled_loop.bind(*arguments)
         self._controller = None if loop.law is not None else CalledController(loop.prepared)
-        self._begin(initial_state)
+        self._begin(initial_state, control_state)
 
     def restart(
         self, compiled: CompiledSystem, initial_state: Array, parameters: Array,
@@ -81,25 +79,19 @@ class CompiledRun:
         `control_state` is by default that of the first time; another one differs from it in the controller's memory
         alone. Everything that was returned by this run is overwritten.
         """
-        if control_state is not None:
-            self._take_beginning(control_state)
         self.bound.rebind(self._integrator.binding(compiled))
         self._precomputed[:], self._parameters[:] = compiled.precomputed, parameters
         self._kernel.replace(self._budget, INTERRUPT_CHECK_STEPS)
         self._drivers.restart()
-        self._begin(initial_state)
+        self._begin(initial_state, control_state or self._begin_state)
 
-    def _take_beginning(self, state: ControlLoopState) -> None:
-        law, self._begin_state = self.loop.law, state
-        self._begin_memory = [state.controller[name] for name in law.initial_memory] if law is not None else []
-
-    def _begin(self, initial_state: Array) -> None:
+    def _begin(self, initial_state: Array, state: ControlLoopState) -> None:
         """Write what the kernel finds at the beginning; no sample has been taken yet."""
-        state = self._begin_state
+        law, self._begin_state = self.loop.law, state
         self.bound.state[:] = self.state[:] = initial_state
         self.bound.count[:] = 0
         self.progress.fill(0)
-        self._memory[:] = self._begin_memory
+        self._memory[:] = [state.controller[name] for name in law.initial_memory] if law is not None else []
         self._measured[:], self._command[:] = state.measured, state.commanded
         self._applied[:] = self._kept_inputs[:] = state.applied_inputs or self.prepared.inputs.values[0]
         self._memories, self._called_at = [state.controller] * 2, -1
@@ -111,11 +103,11 @@ class CompiledRun:
         return len(self._rows)
 
     def _make_arrays(self, n: int, m: int) -> None:
-        prepared, state = self.prepared, self._begin_state
+        prepared, controller, law = self.prepared, self.prepared.loop.controller, self.loop.law
         inputs, intervals = prepared.inputs, self.loop.edges.size - 1
         self.progress = np.zeros(len(Progress), dtype=np.int64)
-        self._memory = np.empty((2, len(self._begin_memory)))
-        self._measured, self._command = np.empty(len(state.measured)), np.empty(len(state.commanded))
+        self._memory = np.empty((2, 0 if law is None else len(law.initial_memory)))
+        self._measured, self._command = np.empty(len(controller.measured_columns)), np.empty(len(controller.inputs))
         self._views = flat_view(self._measured), flat_view(self._command)
         self._applied, self._kept_inputs, self.state = np.empty(m), np.empty(m), np.empty(n)
         """The state (n,) at the end of the last completed interval."""
@@ -237,8 +229,7 @@ class CompiledRun:
         return self._times[:count], self._rows[:count]
 
     def columns(self, intervals: npt.NDArray[np.int64], setpoints: Array) -> dict[str, Array]:
-        """Set points, and measurements and commands of the last sample, at rows in these intervals (R,), whose set
-        points (R, s) are given."""
+        """Set points (R, s), and measurements and commands of the last sample, at rows in these intervals (R,)."""
         intervals = np.minimum(intervals, max(len(self.measured) - 1, 0))
         measured, commanded = (values.take(intervals, axis=0) for values in (self.measured, self.commanded))
         columns = *setpoints.T, *measured.T, *commanded.T

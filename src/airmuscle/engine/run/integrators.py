@@ -66,7 +66,9 @@ class BoundIntegrator:
         self._clock_view, self._count_view = flat_view(self.clock), flat_view(self.count)
         self.places = np.array([self._kernel.slot_of(self._first + i) for i in range(5)], dtype=np.int64)
         """The places in the slots of ends, values and slopes of segments, and of times and rows (5,)."""
-        self._words = None if self._kernel.entry_address is None else flat_view(self._kernel.slots)
+        self.slots: Any = self._kernel.slots
+        """The slots of the kernel's arguments."""
+        self._words = None if self._kernel.entry_address is None else flat_view(self.slots)
         self._budget = len(binding.leading) + len(run) + len(binding.trailing) + 2
 
     def rebind(self, binding: Binding) -> None:
@@ -134,11 +136,6 @@ class BoundIntegrator:
     def entry_address(self) -> int | None:
         """The address of the kernel's entry point, for a kernel that calls it; None without machine code."""
         return self._kernel.entry_address
-
-    @property
-    def slots(self) -> Any:
-        """The slots of the kernel's arguments."""
-        return self._kernel.slots
 
     def _continue(self, status: int, max_steps: int, check: Callable[[Array, float], Status] | None = None) -> int:
         """Go on where the kernel paused so that an interruption or an impossible state can be noticed."""

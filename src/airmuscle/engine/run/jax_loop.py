@@ -12,12 +12,10 @@ from ..loop import COMMAND, ControlLaw, ControlLoop, Measurement
 from .problem import Problem
 from .sampled_loop import SampledLoop, prepare_loop
 
-LoopFunction = Callable[[Any, Any], dict[str, Any]]
-
 
 def loop_in_jax(
     plant: System, loop: ControlLoop, *, duration: float, step: float, initial_state: Mapping[str, float]
-) -> LoopFunction:
+) -> Callable[[Any, Any], dict[str, Any]]:
     """A control loop as a pure JAX function, for `jit`, `vmap`, `grad` and `jacfwd` in a user's own program.
 
     duration       of the run [s]
@@ -28,14 +26,20 @@ def loop_in_jax(
     `tree.flatten(loop.controller)` or JAX arrays in their place, and returns arrays: `time` (K + 1,), every state of
     the plant at the sampling instants and at the end (K + 1,), and `command.<input>` (K,) of every sample. With the
     steps and commands of `simulate(..., integrator=RungeKutta4(step))` its derivatives are those of
-    `differentiate_loop`.
-    JAX must be in double precision (`jax_enable_x64`).
+    `differentiate_loop`. JAX must be in double precision (`jax_enable_x64`).
 
     Raises ParameterError for a controller that is no ControlLaw, drivers, inputs beside the controller that change
     between two samples, or a step that is not positive; AirmuscleError without JAX or in single precision.
     """
-    jnp = _double_precision()
-    law = loop.controller
+    try:
+        import jax
+    except ImportError:
+        raise AirmuscleError("loop_in_jax needs the package 'jax'; pip install airmuscle[jax].") from None
+    if jax.numpy.zeros(0).dtype != float:
+        raise AirmuscleError(
+            'loop_in_jax: JAX is in single precision; write jax.config.update("jax_enable_x64", True) first.'
+        )
+    law, jnp = loop.controller, jax.numpy
     if not isinstance(law, ControlLaw) or loop.drivers:
         what = "the loop has drivers" if isinstance(law, ControlLaw) else f"{type(law).__name__} is no ControlLaw"
         raise ParameterError(f"loop_in_jax: {what}; give a loop of a ControlLaw without drivers.")
@@ -50,8 +54,6 @@ def loop_in_jax(
     )
 
     def run(plant_parameters: Any, law_parameters: Any) -> dict[str, Any]:
-        import jax
-
         varied, commanding = tree.unflatten(plant, list(plant_parameters)), tree.unflatten(law, list(law_parameters))
         memory = {name: _number(value) for name, value in commanding.initial_memory.items()}
         before = start, memory, {name: _number(0.0) for name in law.inputs}
@@ -98,19 +100,6 @@ def runge_kutta4(plant: System, state: Mapping[str, Any], inputs: Mapping[str, A
     fourth = plant.rates(moved(third, h), inputs)
     mean = {name: (first[name] + 2.0 * second[name] + 2.0 * third[name] + fourth[name]) / 6.0 for name in state}
     return moved(mean, h)
-
-
-def _double_precision() -> Any:
-    """jax.numpy. Raises AirmuscleError where JAX is missing, or in single precision."""
-    try:
-        import jax
-    except ImportError:
-        raise AirmuscleError("loop_in_jax needs the package 'jax'; pip install airmuscle[jax].") from None
-    if jax.numpy.zeros(0).dtype != float:
-        raise AirmuscleError(
-            'loop_in_jax: JAX is in single precision; write jax.config.update("jax_enable_x64", True) first.'
-        )
-    return jax.numpy
 
 
 def _constant_inputs(prepared: SampledLoop) -> Any:

@@ -102,15 +102,13 @@ def tracking_sensitivity(recording: Recording, column: str, *, begin: float = 0.
             f"tracking_sensitivity: begin is {begin:g} s; at least two rows must follow, allowed range: "
             f"{time[0]:g} to {time[-2] if time.size > 1 else time[0]:g} s."
         )
-    count = 0
-    while sensitivity(column, count) in recording.columns:
-        count += 1
-    error = (recording[f"{SETPOINT}{column}"] - recording[column])[rows]
-    slopes = np.array([recording[sensitivity(column, k)][rows] for k in range(count)])
+    error, slopes = (recording[f"{SETPOINT}{column}"] - recording[column])[rows], list[Array]()
+    while (name := sensitivity(column, len(slopes))) in recording.columns:
+        slopes.append(recording[name][rows])
     duration = time[rows][-1] - time[rows][0]
     size = math.sqrt(np.trapezoid(error**2, time[rows]) / duration)
     with np.errstate(divide="ignore", invalid="ignore"):
-        gradient = -np.trapezoid(error * slopes, time[rows], axis=1) / (np.float64(size) * duration)
+        gradient = -np.trapezoid(error * np.array(slopes), time[rows], axis=1) / (np.float64(size) * duration)
     return TrackingSensitivity(size, gradient)
 
 

@@ -63,8 +63,11 @@ class Problem(ShortRepr):
             object.__setattr__(self, "input", designed_loop(self.input, self.system))
             known = self.compiled.description
             self.input.check_columns((*known.state_names, *known.output_names), known.input_names)
-            if self.control_state is None:
-                self.input.check_sample_time(self.duration)
+            if self.control_state is None and self.input.sample_time > self.duration:
+                raise ParameterError(
+                    f"the sample time of the controller is {self.input.sample_time:g} s, longer than the run of "
+                    f"{self.duration:g} s. Shorten the sample time, or simulate longer."
+                )
             others = self.input.driven_inputs.checked_segments(known.input_names, self.start_time, self.duration)
             check_input_range(self.compiled, others, self.start_time)
         else:

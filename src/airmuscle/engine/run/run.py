@@ -32,6 +32,8 @@ INSTANTS = 1000
 """Instants between two rows at which the first impossible state is looked for (chosen)."""
 MAX_KEPT_ROWS = 100_000
 """Rows up to which a run is kept (chosen)."""
+_NO_TIMES = np.empty(0)
+_NO_INPUT = -1, (np.inf, -np.inf)
 
 
 def solve(problem: Problem) -> Solution:
@@ -53,9 +55,7 @@ def solve(problem: Problem) -> Solution:
 
 
 def _end_between_rows(problem: Problem, raw: RawSolution) -> RawSolution:
-    """The solution, which ended early, with time, state and status of the first impossible one of many instants since
-    its last row, if there is one: beyond the model numbers can grow without limit. A run does not depend on its rows.
-    """
+    """The solution, which ended early, cut at the first impossible one of many instants since its last row, if any."""
     compiled, integrator = problem.compiled, problem.integrator
     assert integrator is not None
     instants = np.linspace(problem.times[raw.reached - 1], raw.time, INSTANTS + 1)[1:]
@@ -194,9 +194,6 @@ def advance(
     return dict(zip(compiled.description.state_names, raw.state.tolist(), strict=True))
 
 
-_NO_TIMES = np.empty(0)
-
-
 def _hold(
     compiled: CompiledSystem, integrator: Integrator, state: Mapping[str, float], inputs: Mapping[str, float], dt: float
 ) -> list[float] | None:
@@ -220,9 +217,6 @@ def _hold(
     if status is not Status.DONE or any(map(operator.lt, final, known.state_limits.values())):
         return None
     return final
-
-
-_NO_INPUT = -1, (np.inf, -np.inf)
 
 
 def _segments(

@@ -20,6 +20,13 @@ MAX_SAMPLES = 10_000_000
 """Samples of one run that fit a usual memory."""
 CLOSE = 1e-9
 """Part of a sample time within which two instants are one: rounding separates 3 * 0.1 from 0.3."""
+MAX_CAPACITY = 1_000_000
+"""Segments of an input within an interval up to which a kernel computes them."""
+WIDTH = 4
+"""Numbers of the settings and of the state of a driver."""
+KINDS: dict[type, DriverKind] = {PWM: DriverKind.MODULATOR, SolenoidDriver: DriverKind.SWITCH}
+"""The drivers that kernels and exported programs implement."""
+_STATES: dict[type, Any] = {PWM: PwmState, SolenoidDriver: SolenoidState}
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -82,7 +89,7 @@ def prepare_loop(problem: Problem, state: ControlLoopState) -> SampledLoop:
     first_segments = np.arange(edges.size)
     if starts.size >= edges.size:
         first_segments[:-1], first_segments[-1] = np.searchsorted(starts, edges[:-1]), starts.size
-    times = output_times(problem.output_times, start, duration, np.append(start, inputs.ends))
+    times = output_times(problem.output_times, start, duration, np.concatenate([[start], inputs.ends]))
     setpoint = snapped(loop.setpoint, loop.controller.setpoints, edges, close)
     setpoints, _ = setpoint.at_rising(edges[:-1], start)
     return SampledLoop(
@@ -132,9 +139,11 @@ def snapped(signal: InputSignal, names: tuple[str, ...], edges: Array, close: fl
     segments = signal.segments(names, start, float(edges[-1]) - start)
     ends = segments.ends
     behind = np.minimum(np.maximum(edges.searchsorted(ends), 1), edges.size - 1)
-    before, after = edges[behind - 1], edges[behind]
+    before, after = edges.take(behind - 1), edges.take(behind)
     nearest = np.where(ends - before < after - ends, before, after)
     ends = np.where(np.abs(nearest - ends) <= close, nearest, ends)
+    if ends[0] > start and (ends[1:] > ends[:-1]).all():
+        return PiecewiseLinear(ends, segments.values, segments.slopes)
     kept = ends > np.concatenate([edges[:1], ends[:-1]])
     return PiecewiseLinear(ends[kept], segments.values[kept], segments.slopes[kept])
 
@@ -168,15 +177,6 @@ class CalledController:
                 f"{type(self._controller).__name__} commands {commands!r}; it must give a number for each of "
                 f"{', '.join(self._inputs)}."
             ) from None
-
-
-MAX_CAPACITY = 1_000_000
-"""Segments of an input within an interval up to which a kernel computes them."""
-WIDTH = 4
-"""Numbers of the settings and of the state of a driver."""
-KINDS: dict[type, DriverKind] = {PWM: DriverKind.MODULATOR, SolenoidDriver: DriverKind.SWITCH}
-"""The drivers that kernels and exported programs implement."""
-_STATES: dict[type, Any] = {PWM: PwmState, SolenoidDriver: SolenoidState}
 
 
 def are_called(prepared: SampledLoop) -> bool:

@@ -1,9 +1,8 @@
 """Stepper: a plant that is advanced by hand, step after step, for hardware in the loop, other simulators and ROS."""
 
-import dataclasses
 import numbers
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -16,9 +15,15 @@ from ..compile.program import CompiledSystem, compile_system
 from .integrators import Integrator, default_integrator
 from .problem import LARGEST, check_inputs, default_state, initial_vector
 
+_RANGES = {
+    DiagnosticCode.EXTRAPOLATION: "the validity range",
+    DiagnosticCode.RATING: "the rating",
+    DiagnosticCode.GEOMETRY_LIMIT: "the range of the geometry",
+    DiagnosticCode.FRICTION_EXTRAPOLATION: "the range of the friction data",
+}
 
-@dataclasses.dataclass(frozen=True)
-class Snapshot:
+
+class Snapshot(NamedTuple):
     """Everything that the further steps of a Stepper depend on: time [s], states and inputs in their order.
 
     It can be pickled and restored in another process.
@@ -109,9 +114,7 @@ class Stepper:
         if not isinstance(dt, (float, numbers.Real)) or not 0.0 < dt <= LARGEST:
             raise ParameterError(f"Stepper: dt is {one_line(dt)} s; it must be positive and finite.")
         if hasattr(inputs, "keys"):
-            check_known("Stepper: no input", inputs, self.input_names)
-            present = zip(self.input_names, self.inputs.tolist(), strict=True)
-            inputs = list({**dict(present), **inputs}.values())
+            inputs = self._by_name(inputs)
         try:
             if len(inputs) != self._given.size:
                 raise ValueError
@@ -202,20 +205,21 @@ class Stepper:
         )  # fmt: skip
         self._kernels, self._begin, self._end = (begin, end), begin.runner, end.runner
 
+    def _by_name(self, inputs: Mapping[str, float]) -> list[Any]:
+        """The inputs in their order; those that are not given keep their present values."""
+        values: list[Any] = self.inputs.tolist()
+        for name, value in inputs.items():
+            if name not in self.input_names:
+                check_known("Stepper: no input", name, self.input_names)
+            values[self.input_names.index(name)] = value
+        return values
+
     def _settle(self) -> Array:
         """Compute the outputs at the present state and the given inputs."""
         self._next[:], self._always[0] = self.state, 1
         self._end()
         self._always[0] = 0
         return self.outputs
-
-
-_RANGES = {
-    DiagnosticCode.EXTRAPOLATION: "the validity range",
-    DiagnosticCode.RATING: "the rating",
-    DiagnosticCode.GEOMETRY_LIMIT: "the range of the geometry",
-    DiagnosticCode.FRICTION_EXTRAPOLATION: "the range of the friction data",
-}
 
 
 class _Limits:

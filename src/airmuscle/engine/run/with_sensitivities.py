@@ -83,32 +83,25 @@ class WithSensitivities(SensitivitySystem):
     def states(self) -> tuple[StateVariable, ...]:
         """The inner system's states, then for each of them the derivatives by every column."""
         inner = self.inner.states
-        further = [
-            StateVariable(
-                sensitivity(s.name, k), s.unit, TOLERANCE_FACTOR * s.nominal / scale, f"d {s.name} by column {k}"
-            )
-            for s in inner
-            for k, scale in enumerate(self.scales)
-        ]
+        further = []
+        for s, (k, scale) in itertools.product(inner, enumerate(self.scales)):
+            nominal = TOLERANCE_FACTOR * s.nominal / scale
+            further.append(StateVariable(sensitivity(s.name, k), s.unit, nominal, f"d {s.name} by column {k}"))
         return (*inner, *further)
 
     @property
     def inputs(self) -> tuple[str, ...]:
         """The inner system's inputs, then for each dependent one its derivatives by every column."""
-        return (*self.inner.inputs, *(name for name, _ in self._input_sensitivities()))
+        further = [sensitivity(name, k) for name in self.dependent_inputs for k in range(len(self.columns))]
+        return (*self.inner.inputs, *further)
 
     @property
     def input_variables(self) -> tuple[Input, ...]:
         """The inner system's inputs, then the derivatives of the dependent ones, without bounds."""
-        further = (
-            Input(name, "", -float("inf"), float("inf"), f"derivative of {of}")
-            for name, of in self._input_sensitivities()
-        )
-        return (*self.inner.input_variables, *further)
-
-    def _input_sensitivities(self) -> list[tuple[str, str]]:
-        """Names of the derivatives of inputs, and of the input of each."""
-        return [(sensitivity(name, k), name) for name in self.dependent_inputs for k in range(len(self.columns))]
+        known, infinity = self.inner.input_variables, float("inf")
+        of_each = [name for name in self.dependent_inputs for _ in self.columns]
+        named = zip(self.inputs[len(known) :], of_each, strict=True)
+        return (*known, *(Input(name, "", -infinity, infinity, f"derivative of {of}") for name, of in named))
 
     @property
     def state_lower_bounds(self) -> Sequence[float]:

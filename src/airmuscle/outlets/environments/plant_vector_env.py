@@ -174,7 +174,7 @@ class PlantVectorEnv(gymnasium.vector.VectorEnv):  # type: ignore[misc, unused-i
 
     def _place(self, plants: npt.NDArray[np.intp], parameters: Array, states: Array) -> None:
         """Write parameters (R, P) and states (R, n) of plants into their lanes."""
-        block, lane = self._plants.lanes_of(plants)
+        block, lane = np.divmod(plants, self._plants.width)
         self._plants.parameters[block, :, lane] = parameters
         self._plants.states[block, :, lane] = states
         self._plants.prepare(np.unique(block))

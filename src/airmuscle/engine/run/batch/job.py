@@ -1,4 +1,4 @@
-"""BatchJob: the arguments that all ways of running a batch share, places of results, and the threads of its queue."""
+"""BatchJob: plants and loops of a batch, places of their results, and the threads of its queue."""
 
 import concurrent.futures
 import contextlib
@@ -16,19 +16,27 @@ import numpy.typing as npt
 
 from ....core import Array, Status
 from ...compile.program import CompiledSystem, Pool
-from ...loop.inputs import PiecewiseLinear
+from ...loop import ControlLoop, PiecewiseLinear
+from ..compiled_loop import CompiledLoop, CompiledRun
 from ..integrators import Integrator, RawSolution
+from ..problem import Problem
+from ..sampled_loop import first_rows_of, prepare_loop
 from ..solution import RowRecorder, early_end
-from .loops import LoopBatch
 from .variations import Variations
 
 NOT_RUN = -1
 """Status of a plant that has not been run yet."""
+BAR_DELAY = 2.0
+"""Seconds after which a progress bar is drawn, on a terminal."""
+_hidden = contextvars.ContextVar("hidden", default=False)
 
 
 @dataclasses.dataclass(eq=False)
 class BatchJob:
     """N plants to be simulated: initial states (N, n), segments of the inputs of each, rows and columns to be stored.
+
+    template  a problem with the plant, for which loops are prepared; None without loops
+    loops     one for all plants, or one for each; their controllers `laws`, where their parameters differ
 
     Results are written into `columns` (N, T) by name, `final` (N, n), `status` (N,), the number of rows `reached` (N,),
     and `reasons`, which say why plants failed.
@@ -43,9 +51,14 @@ class BatchJob:
     duration: float
     times: Array
     reasons: dict[int, str]
-    loops: LoopBatch | None = None
+    template: Problem | None = None
+    loops: tuple[ControlLoop, ...] = ()
+    laws: Variations | None = None
     columns: dict[str, npt.NDArray[Any]] = dataclasses.field(default_factory=dict)
     _recorders: Pool = dataclasses.field(default_factory=Pool)
+    _runs: Pool = dataclasses.field(default_factory=Pool)
+    _prepared: dict[int, CompiledLoop] = dataclasses.field(default_factory=dict)
+    _preparing: Any = dataclasses.field(default_factory=threading.Lock)
 
     def __post_init__(self) -> None:
         count = len(self.initial_states)
@@ -65,7 +78,7 @@ class BatchJob:
     def names(self) -> tuple[str, ...]:
         """All columns that can be stored: states, then outputs, then inputs."""
         known = self.compiled.description
-        of_loop = () if self.loops is None else self.loops.loops[0].column_names
+        of_loop = self.loops[0].column_names if self.loops else ()
         return (*known.state_names, *known.output_names, *known.input_names, *of_loop)
 
     @functools.cached_property
@@ -76,21 +89,50 @@ class BatchJob:
     def run_single(self, index: int) -> None:
         """Simulate one plant alone, exactly as `simulate` would, and write its results."""
         one = self.compiled.at(self.variations.parameters(index), self.nominal[index])
-        state, loops = self.initial_states[index], self.loops
-        if loops is None:
+        state = self.initial_states[index]
+        if not self.loops:
             segments = self.segments[index]
             raw = self.integrator.run(one, segments, self.start_time, state, self.times)
             self._write(index, one, self._truncate(raw), segments, {})
             return
-        run = loops.run(index, one, state)
+        loop = self.loop_of(index)
+        run = self._integrated(index, one, loop)
         times, rows = run.rows
-        if run.prepared.loop.drivers:  # there may be further rows
-            at = np.searchsorted(times, self.times - 1e-9 * loops.template.duration)
+        if loop.prepared.loop.drivers:  # there may be further rows
+            at = np.searchsorted(times, self.times - 1e-9 * self.duration)
             rows = rows[at[at < times.size]]
-        at, setpoints = run.prepared.at_times
+        at, setpoints = loop.prepared.at_times
         more = run.columns(at[: len(rows)], setpoints[: len(rows)]) if len(run.measured) else {}
         self._write(index, one, self._truncate(run.raw(rows)), run.signal, more)
-        loops.release(run)
+        self._runs.give_back(id(loop), run)
+
+    def loop_of(self, index: int) -> CompiledLoop:
+        """The loop of one plant, prepared for runs with rows at the times of the batch."""
+        return self.prepared(self.loops[index if len(self.loops) > 1 else 0])
+
+    def prepared(self, loop: ControlLoop) -> CompiledLoop:
+        """A loop prepared for its runs, once for all plants that share it."""
+        with self._preparing:
+            if id(loop) not in self._prepared:
+                assert self.template is not None
+                problem = dataclasses.replace(self.template, input=loop)
+                prepared = prepare_loop(problem, loop.init(self.start_time))
+                rows = first_rows_of(self.times, prepared.instants)
+                prepared = dataclasses.replace(prepared, times=self.times, first_rows=rows)
+                self._prepared[id(loop)] = CompiledLoop(problem.compiled, prepared)
+        return self._prepared[id(loop)]
+
+    def _integrated(self, index: int, one: CompiledSystem, loop: CompiledLoop) -> CompiledRun:
+        """The loop of one plant, integrated from its initial state; it serves another one when it is given back."""
+        parameters = loop.parameters.copy() if self.laws is None else self.laws.parameters(index)
+        state, begin = self.initial_states[index], loop.prepared.loop.init
+        run: CompiledRun | None = self._runs.borrow(id(loop))
+        if run is None:
+            run = CompiledRun(loop, one, self.integrator, state, begin(self.start_time), parameters)
+        else:  # a controller of the user may have changed its first memory, although a memory is a value
+            run.restart(one, state, parameters, begin(self.start_time) if loop.law is None else None)
+        run.integrate()
+        return run
 
     def _truncate(self, raw: RawSolution) -> RawSolution:
         """The solution up to the first row with a negative air mass, as `simulate` ends it."""
@@ -132,16 +174,6 @@ class BatchJob:
             column[index] = np.nan
         if reason is not None:
             self.reasons[index] = reason
-
-    def mark_interrupted(self) -> None:
-        """Write that the plants that have not been run were left out because the user stopped."""
-        for index in np.flatnonzero(self.status == NOT_RUN):
-            self.mark_not_run(int(index), Status.INTERRUPTED)
-
-
-BAR_DELAY = 2.0
-"""Seconds after which a progress bar is drawn, on a terminal."""
-_hidden = contextvars.ContextVar("hidden", default=False)
 
 
 class Queue:

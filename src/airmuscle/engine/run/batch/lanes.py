@@ -20,7 +20,6 @@ from ..compiled_law import compiled_sample
 from ..integrators import ExplicitRungeKutta
 from ..sampled_loop import intervals_of
 from .job import BatchJob, Queue
-from .loops import LoopBatch
 
 Plants = npt.NDArray[np.intp]
 BITS = 1024
@@ -140,13 +139,13 @@ class LaneBlock(LaneArrays):
 class LoopLaneBlock(LaneArrays):
     """A block of control loops, whose sampling instants and segments are the same."""
 
-    def __init__(self, job: BatchJob, loops: LoopBatch) -> None:
-        first = loops.of_plant(0)
+    def __init__(self, job: BatchJob) -> None:
+        first = job.loop_of(0)
         assert first.law is not None
         law, memory = first.law, len(first.law.initial_memory)
         k, s, c = len(law.measured_columns), len(law.setpoints), len(law.inputs)
         super().__init__(job, Double(), (first.parameters.size, memory, memory, k, s, c, c, c, 1))
-        self.loops, self.first, self.prepared = loops, first, first.prepared
+        self.first, self.prepared = first, first.prepared
         width, m = self.width, job.compiled.sizes.inputs
         self.sample = compiled_sample(law, width)
         intervals, segments = self.prepared.instants.size - 1, self.prepared.inputs.ends.size
@@ -160,13 +159,13 @@ class LoopLaneBlock(LaneArrays):
 
     def load(self, lane: Plants) -> None:
         super().load(lane)
-        loops, u = self.loops, self.arrays[4]
+        job, u = self.job, self.arrays[4]
         parameters, memory, _, _, _, _, low, high, period = self.arrays[9:]
         for i, plant in enumerate(lane.tolist()):
-            loop = loops.of_plant(plant)
+            loop = job.loop_of(plant)
             prepared, law = loop.prepared, loop.law
             assert law is not None
-            parameters[:, i] = loop.parameters if loops.laws is None else loops.laws.parameters(plant)
+            parameters[:, i] = loop.parameters if job.laws is None else job.laws.parameters(plant)
             memory[:, i] = list(law.initial_memory.values())
             self.setpoints[:, :, i] = prepared.setpoint_values
             self.values[:, :, i], self.slopes[:, :, i] = prepared.inputs.values, prepared.inputs.slopes
@@ -191,11 +190,11 @@ class LoopLaneBlock(LaneArrays):
 
     def _of_loop(self, name: str, plants: Plants) -> Array:
         """A column (R, T) of the set points, measurements or commands of plants."""
-        signals = self.loops.loops[0].signals
+        signals = self.job.loops[0].signals
         prefix = next(each for each in signals if name.startswith(each))
         index = signals[prefix].index(name.removeprefix(prefix))
         if prefix == SETPOINT:
-            return np.array([self.loops.of_plant(i).prepared.at_times[1][:, index] for i in plants.tolist()])
+            return np.array([self.job.loop_of(i).prepared.at_times[1][:, index] for i in plants.tolist()])
         at = np.minimum(self.prepared.at_times[0], len(self.samples) - 1)
         return np.asarray((self.samples if prefix == MEASURED else self.commands)[at, index, : plants.size].T)
 
@@ -221,14 +220,11 @@ def lane_workers(
 
     Unused lanes repeat the last plant. None where these plants are computed one by one.
     """
-    loops = job.loops
-    make: Callable[[], LaneArrays] | None = None
-    if loops is not None and run_in_lanes(job, active):
-        make = functools.partial(LoopLaneBlock, job, loops)
-    elif loops is None and isinstance(job.integrator, ExplicitRungeKutta):
-        make = functools.partial(LaneBlock, job, precision, SegmentTable(job))
-    if make is None:
+    if not isinstance(job.integrator, ExplicitRungeKutta) or (job.loops and not run_in_lanes(job, active)):
         return None
+    make: Callable[[], LaneArrays] = functools.partial(LoopLaneBlock, job)
+    if not job.loops:
+        make = functools.partial(LaneBlock, job, precision, SegmentTable(job))
     first = make()
     count = -(-active.size // first.width)
     queue = Queue(count)
@@ -244,22 +240,16 @@ def lane_workers(
 
 
 def run_in_lanes(job: BatchJob, plants: Plants) -> bool:
-    """Whether the loops of these plants can be computed in lanes.
-
-    That is with a fixed step, control laws of one structure, no drivers, common sampling instants and segments, and at
-    most MAX_SAMPLES samples.
-    """
-    loops = job.loops
-    if loops is None or not isinstance(job.integrator, ExplicitRungeKutta):
-        return False
-    distinct = {id(loop): loop for loop in loops.loops}.values()
+    """Whether the loops of these plants can be computed in lanes: control laws of one structure, no drivers, common
+    sampling instants and segments, and at most MAX_SAMPLES samples."""
+    distinct = {id(loop): loop for loop in job.loops}.values()
     if any(loop.drivers or not isinstance(loop.controller, ControlLaw) for loop in distinct):
         return False
-    structure, sample_time = tree.structure(loops.loops[0].controller), loops.loops[0].sample_time
+    structure, sample_time = tree.structure(job.loops[0].controller), job.loops[0].sample_time
     if any(tree.structure(o.controller) is not structure or o.sample_time != sample_time for o in distinct):
         return False
-    first = loops.of_plant(int(plants[0])).prepared
+    first = job.loop_of(int(plants[0])).prepared
     if first.instants.size > MAX_SAMPLES:
         return False
     ends = first.inputs.ends
-    return all(np.array_equal(loops.compiled(loop).prepared.inputs.ends, ends) for loop in distinct)
+    return all(np.array_equal(job.prepared(loop).prepared.inputs.ends, ends) for loop in distinct)

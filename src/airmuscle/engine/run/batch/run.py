@@ -4,6 +4,7 @@ import contextlib
 import dataclasses
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -11,16 +12,16 @@ import numpy.typing as npt
 from ....core import Array, ParameterError, Status, System, as_float, check_known, one_line
 from ....core.system import check_system
 from ...compile.program import CompiledSystem, compile_system
-from ...loop import ControlLoop, InputSignal, PiecewiseLinear
+from ...loop import ControlLaw, ControlLoop, InputSignal, PiecewiseLinear, designed_loop
 from ...processes import available_cores
 from ..integrators import MAX_STEPS, ExplicitRungeKutta, Integrator, default_integrator
+from ..loop_sensitivities import CONTROLLER
 from ..problem import Problem, check_input_range
 from ..problem import output_times as times_of
-from .job import BatchJob, Queue, progress, run_workers
+from .job import NOT_RUN, BatchJob, Queue, progress, run_workers
 from .lanes import Double, Precision, lane_workers
-from .loops import LoopBatch, loops_of, vary
 from .solution import BatchSolution, file_of, new_columns, new_folder, write_rest
-from .variations import default_states, given_states
+from .variations import Variations, default_states, given_states, variations_of
 
 
 def simulate_batch(
@@ -60,13 +61,13 @@ def simulate_batch(
     interrupted batch (Ctrl-C) is returned as far as it was computed; the other plants have Status.INTERRUPTED.
     """
     check_system("simulate_batch", plant)
-    loops = loops_of(input, plant)
+    loops = _loops_of(input, plant)
     duration = as_float("simulate_batch: duration", duration)
     start_time = as_float("simulate_batch: start_time", start_time)
     integrator = default_integrator(integrator)
     _check_time(duration, start_time, integrator)
     _check_options(initial_states, keep, into, precision, cores, integrator, loops=bool(loops))
-    varied, laws = vary(plant, variations, loops, _count(initial_states, input))
+    varied, laws = _vary(plant, variations, loops, _count(initial_states, input))
     count = len(varied.values)
     compiled = compile_system(plant)
     segments = () if loops else _segments(compiled, input, count, start_time, duration)  # type: ignore[arg-type]
@@ -76,11 +77,10 @@ def simulate_batch(
     else:
         with progress("computing the equilibrium of each plant", count) as advanced:
             states, reasons = default_states(varied, advanced)
-    batch = None
-    if loops:
-        template = Problem(plant, loops[0], duration, start_time=start_time, integrator=integrator)
-        batch = LoopBatch(template, loops, laws, times)
-    job = BatchJob(compiled, varied, integrator, states, segments, start_time, duration, times, reasons, batch)
+    template = Problem(plant, loops[0], duration, start_time=start_time, integrator=integrator) if loops else None
+    job = BatchJob(
+        compiled, varied, integrator, states, segments, start_time, duration, times, reasons, template, loops, laws
+    )
     return _solved(job, _kept(job, keep), into, precision, cores or available_cores())
 
 
@@ -182,6 +182,49 @@ def _kept(job: BatchJob, keep: Sequence[str] | None) -> tuple[str, ...]:
     return (keep,) if isinstance(keep, str) else tuple(dict.fromkeys(keep))
 
 
+def _loops_of(given: Any, system: System) -> tuple[ControlLoop, ...]:
+    """The control loops among the inputs of a batch; none where its inputs are signals.
+
+    Raises ParameterError where signals and loops are mixed, or loops of different controllers.
+    """
+    inputs = tuple(given) if isinstance(given, Sequence) else (given,)
+    loops = tuple(one for one in inputs if isinstance(one, ControlLoop))
+    if not loops:
+        return ()
+    if len(loops) < len(inputs):
+        raise ParameterError("simulate_batch: the inputs are control loops and signals; give one kind for all plants.")
+    distinct = {id(loop): designed_loop(loop, system) for loop in loops}
+    loops = tuple(distinct[id(loop)] for loop in loops)
+    for row, loop in enumerate(loops):
+        if loop.signals != loops[0].signals:
+            raise ParameterError(
+                f"inputs, row {row}: {type(loop.controller).__name__} measures or commands other columns than that of "
+                "row 0; all loops of a batch need the same measured columns, set points and commanded inputs."
+            )
+    return loops
+
+
+def _vary(
+    plant: System, given: Mapping[str, npt.ArrayLike], loops: tuple[ControlLoop, ...], count: int | None
+) -> tuple[Variations, Variations | None]:
+    """The variations of the plants, and those of the controllers, whose paths begin with "controller."."""
+    if not loops or not isinstance(given, Mapping):
+        return variations_of(plant, given, count), None
+    plants = {path: values for path, values in given.items() if not str(path).startswith(CONTROLLER)}
+    laws = {path[len(CONTROLLER) :]: given[path] for path in given if path not in plants}
+    if not laws:
+        return variations_of(plant, plants, count), None
+    controller = loops[0].controller
+    if len(loops) > 1 or not isinstance(controller, ControlLaw):
+        reason = "there is one loop for each plant" if len(loops) > 1 else "its controller is no ControlLaw"
+        raise ParameterError(
+            f"variations: '{CONTROLLER}{next(iter(laws))}' varies a parameter of the controller, but {reason}. Give a "
+            "list of loops with the controllers instead."
+        )
+    varied = variations_of(controller, laws, count)
+    return variations_of(plant, plants, len(varied.values)), varied
+
+
 def _run(job: BatchJob, precision: Precision, cores: int) -> None:
     """Simulate all plants that have an initial state; those that an interruption leaves out are marked."""
     for index, reason in job.reasons.copy().items():
@@ -200,7 +243,8 @@ def _run(job: BatchJob, precision: Precision, cores: int) -> None:
     with progress(f"simulating {active.size} plants", active.size) as advanced:
         complete = run_workers(queue, workers, lambda done: advanced(min(done * each, active.size)))
     if not complete or queue.stop[0]:
-        job.mark_interrupted()
+        for left in np.flatnonzero(job.status == NOT_RUN):
+            job.mark_not_run(int(left), Status.INTERRUPTED)
 
 
 def _solved(

@@ -20,6 +20,9 @@ from ....recording import Recording
 from ..integrators import Integrator
 from .variations import Variations
 
+MAX_MEMORY = 4e9
+"""Bytes that the columns in memory may take (chosen)."""
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class BatchSolution:
@@ -102,10 +105,6 @@ class BatchSolution:
         failed = f", {self.failed.size} failed" if self.failed.size else ""
         kept = f"{', '.join(self.columns)} at {self.time.size} times" if self.columns else "final states"
         return f"BatchSolution({len(self)} plants: {kept}{failed})"
-
-
-MAX_MEMORY = 4e9
-"""Bytes that the columns in memory may take (chosen)."""
 
 
 @contextlib.contextmanager

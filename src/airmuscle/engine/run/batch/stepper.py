@@ -94,11 +94,6 @@ class BatchStepper:
             *functions, self.states, self.inputs, self._held, still, h, other, self.outputs, span, self._steps
         )
 
-    def lanes_of(self, plants: npt.NDArray[np.intp]) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
-        """Block and lane of each of the plants (R,)."""
-        block, lane = np.divmod(plants, self.width)
-        return block, lane
-
     def prepare(self, blocks: npt.NDArray[np.intp] | None = None) -> None:
         """Take over the parameters of these blocks, or of all, after they were changed."""
         for block in range(self.blocks) if blocks is None else blocks.tolist():

@@ -11,6 +11,9 @@ import numpy.typing as npt
 from ....core import AirmuscleError, Array, ParameterError, PhysicsError, System, check_known, one_line, parts_of, tree
 from ....core.declaration import check_together
 
+STATES_AT_ONCE = 500
+"""Systems whose default states are computed between two reports of progress (chosen)."""
+
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class Variations:
@@ -138,10 +141,6 @@ def _column(leaf: tree.Leaf, given: npt.ArrayLike) -> Array:
     return values
 
 
-STATES_AT_ONCE = 500
-"""Systems whose default states are computed between two reports of progress (chosen)."""
-
-
 def given_states(variations: Variations, given: Mapping[str, npt.ArrayLike], count: int) -> Array:
     """Initial states (N, n) from numbers or columns (N,) by name. Raises ParameterError for an impossible one."""
     system = variations.system
@@ -189,8 +188,7 @@ def _check_states(variations: Variations, names: list[str], states: Array) -> No
 def default_states(variations: Variations, advanced: Callable[[int], None]) -> tuple[Array, dict[int, str]]:
     """The default state of every system (N, n), and why there is none where there is none.
 
-    Systems that differ only in parameters without an effect on it share it. `advanced` is called with the number of
-    systems that are done.
+    Systems that differ only in parameters without an effect on it share it. `advanced` is told how many are done.
     """
     system = variations.system
     relevant = [i for i, path in enumerate(variations.paths) if system.affects_default_state(path)]
