@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 
 from airmuscle.bench import approximate, find_shape_violations, fit, fit_shape_constrained
-from airmuscle.bench.identify import RISES_WITH_CONTRACTION, blank_surface, shape_constraints
-from airmuscle.bench.identify.surface.shape import FALLS_WITH_PRESSURE
+from airmuscle.bench.identify import FORCE_FALLS, RISES_WITH_CONTRACTION, blank_surface, shape_constraints
 from airmuscle.errors import IdentificationError, SolveError
 from airmuscle.physics import Braid, ContractileSurface, Sarosi2012, TonduLopez2000, ValidityRange
 from airmuscle.recording import Recording
@@ -30,7 +29,7 @@ def points(n: int, noise: float, seed: int = 2) -> Recording:
 def test_few_and_noisy_points_bend_a_free_surface_and_not_a_shaped_one():
     data = points(40, 60.0)
     found = fit_shape_constrained(blank_surface(4), data)
-    assert {b.rule for b in found.unconstrained_violations} == {FALLS_WITH_PRESSURE, RISES_WITH_CONTRACTION}
+    assert {b.rule for b in found.unconstrained_violations} == {FORCE_FALLS, RISES_WITH_CONTRACTION}
     assert find_shape_violations(found.model, found.model.validity_range, points=201) == ()
     assert found.rmse > found.unconstrained_rmse
     grid = np.meshgrid(

@@ -7,8 +7,8 @@ import numpy as np
 
 import airmuscle as am
 
-from ..bench.identify.surface.basis import Chebyshev, LoadRange, conditioning
-from ..bench.identify.surface.exponential import SurfaceFit, SurfaceProblem, fit_linearised, fit_nonlinear
+from ..bench.identify import Chebyshev, LoadRange, SurfaceProblem, conditioning, fit_linearised, fit_nonlinear
+from ..bench.identify.surface.exponential import SurfaceFit
 from ..core import STANDARD_GRAVITY, Array
 from ..physics.muscle.characteristic.borzikova import BORZIKOVA, SAM_30X290, PlaneCurves
 from ..report.chapter import Chapter

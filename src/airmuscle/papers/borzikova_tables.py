@@ -6,9 +6,8 @@ import numpy as np
 
 import airmuscle as am
 
-from ..bench.identify.surface.basis import Basis, Chebyshev, LoadRange, Monomials, conditioning
+from ..bench.identify import Chebyshev, LoadRange, Monomials, conditioning, find_monotonicity_violations
 from ..bench.identify.surface.exponential import SurfaceFit, fit_linearised, fit_nonlinear
-from ..bench.identify.surface.monotonicity import find_monotonicity_violations
 from ..core import bar, percent
 from ..physics.muscle.characteristic.borzikova import PlaneCurves
 from ..report.chapter import Table
@@ -149,7 +148,7 @@ def _fit_both(recording: am.Recording, saturation: float) -> tuple[SurfaceFit, S
 def conditioning_table(data: am.Recording) -> Table:
     """Return the rank and condition number of the 15 coefficients, in four scalings and without the largest load."""
     limits = LoadRange.from_recording(data)
-    scalings: dict[str, Basis] = {
+    scalings: dict[str, Monomials | Chebyshev] = {
         "bar, N": Monomials(bar, 1.0),
         "Pa, N": Monomials(1.0, 1.0),
         r"\(p/p_\text{max}\), \(F/F_\text{max}\)": Monomials(limits.max_pressure, limits.max_force),

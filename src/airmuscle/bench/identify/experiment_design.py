@@ -245,7 +245,7 @@ def _jacobians(
             "minimum pressure or the minimum contraction."
         )
     ends = np.cumsum([r.force.size for r in candidates])[:-1]
-    return tuple(problem.leaves[i].path for i in problem.free), values, np.split(jacobian, ends)
+    return tuple(leaf.path for leaf in problem.free_leaves), values, np.split(jacobian, ends)
 
 
 def _log_determinant(information: Array, selected: Sequence[int] | Array) -> float:

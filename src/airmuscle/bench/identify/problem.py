@@ -118,14 +118,19 @@ class FitProblem:
         return self.data[first], self.data[second]
 
     @property
+    def free_leaves(self) -> list[tree.Leaf]:
+        """The leaves that are fitted."""
+        return [self.leaves[i] for i in self.free]
+
+    @property
     def initial_values(self) -> Array:
         """The free parameters as the law has them; shape (P,)."""
-        return np.array([self.leaves[i].value for i in self.free], dtype=float)
+        return np.array([leaf.value for leaf in self.free_leaves], dtype=float)
 
     @property
     def bounds(self) -> tuple[Array, Array]:
         """Lower and upper bounds of the free parameters; shape (P,) each."""
-        pairs = np.array([self.leaves[i].declared.bounds for i in self.free], dtype=float)
+        pairs = np.array([leaf.declared.bounds for leaf in self.free_leaves], dtype=float)
         return pairs[:, 0], pairs[:, 1]
 
     def bounds_reached(self, values: Array) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
@@ -141,8 +146,8 @@ class FitProblem:
         terms = getattr(self.law, "term_labels", ())
         fields = getattr(self.law, "linear_in", ())
         texts = {f"{field}[{i}]": f"a({term})" for field in fields for i, term in enumerate(terms)}
-        symbols = [self.leaves[i].declared.symbol for i in self.free]
-        paths = [self.leaves[i].path for i in self.free]
+        symbols = [leaf.declared.symbol for leaf in self.free_leaves]
+        paths = [leaf.path for leaf in self.free_leaves]
         names = (s if symbols.count(s) == 1 else path for s, path in zip(symbols, paths, strict=True))
         return tuple(texts.get(path, name) for path, name in zip(paths, names, strict=True))
 

@@ -20,37 +20,13 @@ from .data_checks import Remarks, Scatter
 from .parameter_covariance import ParameterCovariance
 from .problem import FORCE, FitProblem, FittedQuantity, evaluate
 from .specimen_effects import SpecimenEffects
-from .statistics import CorrelationIndex, WorstPoint
+from .statistics import CorrelationIndex, Estimate, WorstPoint
 from .weighting import Loss
 
 MAX_ROWS = 12
 """Maximum number of parameters in the brief view (chosen)."""
 MANY_POINTS = 1000
 """Number of points of a plot from which markers are small."""
-
-
-@dataclasses.dataclass(frozen=True)
-class Estimate:
-    """A fitted parameter with its standard error, NaN on a bound or without degrees of freedom; SI."""
-
-    name: str
-    label: str
-    value: float
-    stderr: float
-    unit: str
-    meaning: str
-    on_bound: bool
-
-    @property
-    def display_unit(self) -> str:
-        """The unit as text, empty for a dimensionless parameter."""
-        return "" if self.unit == "1" else self.unit
-
-    def format_interval(self) -> str:
-        """Two standard errors as text, or why there are none."""
-        if self.on_bound:
-            return "on bound"
-        return f"{2 * self.stderr:.3g}" if np.isfinite(self.stderr) else "unknown"
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core import Array, Hint, IdentificationError, Leaf
+from ...core import Array, Hint, IdentificationError
 from .gauss_newton import gauss_newton
 from .problem import FitProblem, LeastSquaresSolution
 from .variable_projection import (
@@ -52,8 +52,7 @@ def solve_least_squares(problem: FitProblem, loss: Loss, start: Array | None = N
 
 def is_linear(problem: FitProblem) -> bool:
     """Whether the law is linear in all free parameters, and none of them is bounded."""
-    leaves: list[Leaf] = [problem.leaves[i] for i in problem.free]
-    unbounded = all(leaf.declared.bounds == (-np.inf, np.inf) for leaf in leaves)
+    unbounded = all(leaf.declared.bounds == (-np.inf, np.inf) for leaf in problem.free_leaves)
     return unbounded and bool(is_linear_parameter(problem).all())
 
 

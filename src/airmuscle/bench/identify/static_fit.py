@@ -14,18 +14,18 @@ from ...recording import Recording
 from ..checks import find_suspicious
 from ..checks.contractions import MAX_CONTRACTION
 from ..segment.runs import RIPPLE_BAND
-from . import statistics as stats
 from .branch_residuals import branch_distance, branch_notes
 from .data_checks import HELD, Remarks, level_text
 from .fit_points import FitPoints
 from .gauss_newton import gauss_newton
 from .pooling import check_poolable, pool, population_of, refit_pooled
 from .problem import FORCE, RESTING_LENGTH, FitProblem, LeastSquaresSolution, evaluate
-from .result import Estimate, Fit
+from .result import Fit
 from .slack import solve_bounded
 from .solver import is_linear
 from .specimen_effects import SpecimenEffects
-from .variable_projection import find_initial_values
+from .statistics import check_determined, check_determined_by_levels, fit_statistics, goodness_of_fit
+from .variable_projection import find_initial_values, uncensored_rank
 from .weighting import UNCENSORED, Censoring, LeastSquares, Loss, default_censoring
 
 NO_EFFECT = 0.05
@@ -107,20 +107,13 @@ def _fit_law(
 ) -> Fit:  # fmt: skip
     problem = points.problem(law, censoring=censoring, sigma=sigma, fixed=fixed)
     solution = solve_bounded(problem, points, loss)
-    statistics = stats.compute_statistics(problem, solution, loss, points.runs)
-    stats.check_determined_by_levels(problem, solution, points.at_levels)
+    statistics = fit_statistics(problem, solution, loss, points.runs)
+    check_determined_by_levels(problem, solution, points.at_levels)
     data, quantity = problem.data, problem.fitted_quantity
     by_recording = None if sigma is not None else points.deviations(quantity.name)
-    notes = tuple(collect_notes(problem, solution, statistics, loss, points.dropped, by_recording))
     model = tree.with_parameters(problem.law, problem.leaf_values(solution.values))
     return Fit(
         model=model,
-        estimates=_build_estimates(problem, solution, statistics),
-        correlations=statistics.correlations,
-        parameter_covariance=statistics.covariance,
-        rank=statistics.rank,
-        condition=statistics.condition,
-        sigma=statistics.sigma,
         rows_censored=int(np.count_nonzero(problem.censoring)),
         rows_dropped=points.dropped,
         recording=data,
@@ -128,19 +121,9 @@ def _fit_law(
         censoring=problem.censoring,
         problem=dataclasses.replace(problem, law=model, leaves=tuple(tree.leaves(model))),
         loss=loss,
-        remarks=partial(examine, points, problem, solution.modelled, notes),
-        **stats.goodness_of_fit(problem, evaluate(model, quantity.name, quantity.arguments, data), data),
-    )
-
-
-def _build_estimates(
-    problem: FitProblem, solution: LeastSquaresSolution, statistics: stats.FitStatistics
-) -> tuple[Estimate, ...]:
-    leaves, numbers = [problem.leaves[i] for i in problem.free], (solution.values, statistics.standard_errors)
-    columns = zip(leaves, problem.labels, *(each.tolist() for each in (*numbers, statistics.on_bound)), strict=True)
-    return tuple(
-        Estimate(leaf.path, label, value, stderr, leaf.declared.unit, leaf.declared.meaning, on_bound)
-        for leaf, label, value, stderr, on_bound in columns
+        remarks=partial(examine, points, problem, solution, by_recording),
+        **statistics,
+        **goodness_of_fit(problem, evaluate(model, quantity.name, quantity.arguments, data), data),
     )
 
 
@@ -157,35 +140,32 @@ def refit(
     problem = points.problem(law, fixed=fixed)
     near = None if is_linear(problem) or loss != LeastSquares() else gauss_newton(problem, problem.initial_values)
     try:
-        solution = (
-            solve_bounded(problem, points, loss, find_initial_values(problem, multi_start=False))
-            if near is None
-            else near
-        )
+        solution = near or solve_bounded(problem, points, loss, find_initial_values(problem, multi_start=False))
     except IdentificationError:
         solution = solve_bounded(problem, points, loss)
-    stats.check_determined(problem, solution)
+    check_determined(problem, solution)
     model: Characteristic = tree.with_parameters(problem.law, problem.leaf_values(solution.values))
     return model
 
 
-def examine(points: FitPoints, problem: FitProblem, modelled: Array, own: Sequence[str], fit: Fit) -> Remarks:
-    """The remarks on a fit and its points; `own` are notes on the fit that need no examination of the data.
+def examine(
+    points: FitPoints, problem: FitProblem, solution: LeastSquaresSolution, by_recording: Array | None, fit: Fit
+) -> Remarks:
+    """The remarks on a fit and its points; `by_recording` are the standard deviations of sensors that differ.
 
-    The branches that the residuals follow are those of `problem` with the quantity `modelled` at its rows; of a pooled
-    law they are those of its population.
+    Those on the solution of `problem`, and the branches of its residuals, are for a pooled law those of its population.
     """
     checks, quantity = points.checks, problem.fitted_quantity
     residuals = np.full(len(points.joined), np.nan)
-    differences = modelled - problem.data[quantity.name]
+    differences = solution.modelled - problem.data[quantity.name]
     residuals[~points.missing] = np.where(problem.censoring == 0, differences, np.nan)
     ends = np.cumsum([len(run) for run in points.recordings])
     distance = branch_distance(points.recordings, np.split(residuals, ends[:-1]), quantity.name)
     scatter = dataclasses.replace(checks.scatter, branches=distance)
     branches = branch_notes(points.recordings, distance, quantity.name, delayed=checks.delay is not None)
+    own = collect_notes(problem, solution, fit, by_recording)
     notes = (*checks.notes, *map(str, points.repeated), *own, *branches, *_level_notes(fit.data_ranges))
-    if fit.effects is not None:
-        notes += (_effect_note(fit.effects),)
+    notes += () if fit.effects is None else (_effect_note(fit.effects),)
     if quantity == FORCE:
         lengths = {run.constants.get(RESTING_LENGTH) for run in points.recordings} - {None}
         count = 1 if hasattr(fit.model, "with_resting_length") else len(lengths)
@@ -216,12 +196,12 @@ def _effect_note(effects: SpecimenEffects) -> str:
     )
 
 
-def _row_notes(problem: FitProblem, statistics: stats.FitStatistics, dropped: int) -> Iterator[str]:
+def _row_notes(problem: FitProblem, solution: LeastSquaresSolution, fit: Fit) -> Iterator[str]:
     """Remarks on rows that are dropped, censored, above the limit of the law, or at zero force and not censored."""
     force, usual = problem.data["force"], default_censoring(problem.law)
-    if dropped:
-        yield f"{dropped} rows with a missing value (NaN) were dropped."
-    if censored := int(np.count_nonzero(problem.censoring)):
+    if fit.rows_dropped:
+        yield f"{fit.rows_dropped} rows with a missing value (NaN) were dropped."
+    if censored := fit.rows_censored:
         yield HintedText(
             f"{censored} {'row is' if censored == 1 else 'rows are'} censored (at zero force, or at the limit of "
             "the force range): counted only where the law violates the bound.",
@@ -232,9 +212,10 @@ def _row_notes(problem: FitProblem, statistics: stats.FitStatistics, dropped: in
             f"{above} rows are above the upper limit of the force of the law, max_force {usual.max_force:.4g} N, which "
             "the fit does not change: the law gives no greater force. Give a law with a greater max_force."
         )
-    if statistics.uncensored_rank < statistics.rank:
+    inside = [not estimate.on_bound for estimate in fit.estimates]
+    if censored and (rank := uncensored_rank(problem, solution.jacobian[:, inside])) < fit.rank:
         yield (
-            f"The uncensored rows determine {statistics.uncensored_rank} of {statistics.rank} parameters; the others "
+            f"The uncensored rows determine {rank} of {fit.rank} parameters; the others "
             "are limited only by the bounds of the censored rows, and the law is as close to these as possible."
         )
     if at_zero := int(np.count_nonzero((force <= 0) & (problem.censoring == 0))):
@@ -244,14 +225,10 @@ def _row_notes(problem: FitProblem, statistics: stats.FitStatistics, dropped: in
 
 
 def collect_notes(
-    problem: FitProblem, solution: LeastSquaresSolution, statistics: stats.FitStatistics, loss: Loss, dropped: int,
-    by_recording: Array | None,
-) -> Iterator[str]:  # fmt: skip
-    """Remarks on the data and the fit that affect its interpretation, as sentences.
-
-    `dropped` is the number of rows with a missing value, `by_recording` the standard deviations of sensors that differ.
-    """
-    yield from _row_notes(problem, statistics, dropped)
+    problem: FitProblem, solution: LeastSquaresSolution, fit: Fit, by_recording: Array | None
+) -> Iterator[str]:
+    """Remarks on the solution of a fit that affect its interpretation, as sentences; arguments as for `examine`."""
+    yield from _row_notes(problem, solution, fit)
     length = problem.data.constants.get(RESTING_LENGTH)  # to which the contraction is relative
     for leaf in problem.leaves:
         if leaf.declared.name == RESTING_LENGTH and length is not None and abs(leaf.value - float(length)) > 1e-6:
@@ -259,26 +236,27 @@ def collect_notes(
                 f"The muscle in the recording has a resting length of {length:.4g} m, but {leaf.path} is "
                 f"{leaf.value:.4g} m."
             )
-    for i in np.flatnonzero(statistics.on_bound):
-        yield f"{problem.leaves[problem.free[i]].path} is on its bound; its value is not determined by the data."
-    if not np.isfinite(statistics.sigma):
+    for estimate in fit.estimates:
+        if estimate.on_bound:
+            yield f"{estimate.name} is on its bound; its value is not determined by the data."
+    if not np.isfinite(fit.parameter_covariance.sigma):
         yield "There are as many rows as parameters, so the standard errors are unknown."
-    if statistics.condition > ILL_CONDITIONED:
-        yield f"The problem is ill-conditioned (condition number {statistics.condition:.2g})."
+    if fit.condition > ILL_CONDITIONED:
+        yield f"The problem is ill-conditioned (condition number {fit.condition:.2g})."
     unit = "" if problem.fitted_quantity.unit == "1" else f" {problem.fitted_quantity.unit}"
-    if not isinstance(loss, LeastSquares):
-        yield f"Robust loss: {loss}{unit and f', in{unit}'}."
+    if not isinstance(fit.loss, LeastSquares):
+        yield f"Robust loss: {fit.loss}{unit and f', in{unit}'}."
     if by_recording is not None:
         yield HintedText(
             "The recordings come from test rigs with different sensors: rows are weighted by standard deviations of "
             f"{min(by_recording):.3g} to {max(by_recording):.3g}{unit}.",
             Hint("To weight all rows equally", "sigma", 1.0),
         )
-    if not isinstance(loss, LeastSquares):
+    if not isinstance(fit.loss, LeastSquares):
         residuals = np.abs(problem.residuals(solution.modelled))[problem.censoring == 0]
-        inside = int(np.count_nonzero(residuals <= loss.scale))
+        inside = int(np.count_nonzero(residuals <= fit.loss.scale))
         if inside < residuals.size / 2:
             yield (
-                f"Only {inside} of {residuals.size} residuals are within the scale of {loss}, so the standard errors "
-                "are too small. Use a scale of about three times the standard deviation of the noise."
+                f"Only {inside} of {residuals.size} residuals are within the scale of {fit.loss}, so the standard "
+                "errors are too small. Use a scale of about three times the standard deviation of the noise."
             )

@@ -1,6 +1,7 @@
 """Statistics of a static fit: errors of rows, correlation index, rank, condition number and standard errors."""
 
 import dataclasses
+import itertools
 import math
 from typing import Any, NamedTuple
 
@@ -12,9 +13,9 @@ from ...physics.muscle.characteristic import ContractileSurface
 from ...recording import Recording
 from ..segment import RELATIVE_BAND, level_intervals
 from .identifiability import singular_vectors
-from .parameter_covariance import ParameterCovariance, Runs, estimate_covariance
+from .parameter_covariance import Runs, estimate_covariance
 from .problem import POINT_COLUMNS, FitProblem, LeastSquaresSolution
-from .variable_projection import RANK_TOLERANCE, uncensored_rank
+from .variable_projection import RANK_TOLERANCE
 from .weighting import LeastSquares, Loss
 
 
@@ -22,23 +23,17 @@ from .weighting import LeastSquares, Loss
 class CorrelationIndex:
     """IK = sqrt(1 - SSE/SST), SSE = Sum (k_i - y_i)^2, SST = Sum (mean(y) - y_i)^2; k_i modelled, y_i measured.
 
-    Where SSE > SST the model is worse than the mean of the measurements and IK is undefined; `r_squared` is then
-    negative.
+    Where SSE > SST the model is worse than the mean of the measurements and IK is undefined.
     Reference: Borzíková et al., the index given next to their plane curves.
     """
 
     r_squared: float
-    """Coefficient of determination R^2 = 1 - SSE/SST [1], at most 1."""
-
-    @property
-    def is_defined(self) -> bool:
-        """Whether IK exists, that is R^2 >= 0."""
-        return self.r_squared >= 0.0
+    """Coefficient of determination R^2 = 1 - SSE/SST [1], at most 1; negative where IK is undefined."""
 
     @property
     def value(self) -> float | None:
         """IK [1], or None where it is undefined; never NaN."""
-        return math.sqrt(self.r_squared) if self.is_defined else None
+        return math.sqrt(self.r_squared) if self.r_squared >= 0.0 else None
 
     def __str__(self) -> str:
         if self.value is None:
@@ -99,28 +94,38 @@ Mask = npt.NDArray[np.bool_]
 DEGREE_REMEDY = "For the greatest degree that the levels determine"
 
 
-class FitStatistics(NamedTuple):
-    """Statistics of the design matrix and the residuals at the solution; parameters on a bound have NaN."""
+@dataclasses.dataclass(frozen=True)
+class Estimate:
+    """A fitted parameter with its standard error, NaN on a bound or without degrees of freedom; SI."""
 
-    rank: int
-    uncensored_rank: int
-    """Rank without the censored rows."""
-    condition: float
-    """Condition number of the design matrix with columns of unit norm."""
-    sigma: float
-    """Standard deviation of the residuals, in the unit of the fitted quantity; NaN without degrees of freedom."""
-    covariance: ParameterCovariance
-    """Covariance of the parameters that the rows determine, without or with those on a bound."""
-    standard_errors: Array
-    correlations: Array
-    on_bound: Mask
+    name: str
+    label: str
+    value: float
+    stderr: float
+    unit: str
+    meaning: str
+    on_bound: bool
+
+    @property
+    def display_unit(self) -> str:
+        """The unit as text, empty for a dimensionless parameter."""
+        return "" if self.unit == "1" else self.unit
+
+    def format_interval(self) -> str:
+        """Two standard errors as text, or why there are none."""
+        if self.on_bound:
+            return "on bound"
+        return f"{2 * self.stderr:.3g}" if np.isfinite(self.stderr) else "unknown"
 
 
-def compute_statistics(problem: FitProblem, solution: LeastSquaresSolution, loss: Loss, runs: Runs) -> FitStatistics:
-    """Statistics of a solution. Raises IdentificationError where the design matrix is rank-deficient."""
+def fit_statistics(problem: FitProblem, solution: LeastSquaresSolution, loss: Loss, runs: Runs) -> dict[str, Any]:
+    """Estimates and their covariance, rank and condition of a solution, as fields of a `Fit`.
+
+    Raises IdentificationError where the design matrix is rank-deficient.
+    """
+    design, active = check_determined(problem, solution), problem.active_rows(solution.modelled)
     low, high = problem.bounds_reached(solution.values)
-    on_bound, active = low | high, problem.active_rows(solution.modelled)
-    design = _check_rank(problem, solution, on_bound)
+    on_bound = low | high
     residuals = problem.residuals(solution.modelled)[active]
     sigma, influences = _residual_std(residuals, design.norms.size, loss)
     complete = _Design.of(problem, solution, np.ones(on_bound.size, dtype=bool)) if on_bound.any() else design
@@ -134,14 +139,25 @@ def compute_statistics(problem: FitProblem, solution: LeastSquaresSolution, loss
     standard_errors[on_bound], correlations[on_bound], correlations[:, on_bound] = np.nan, np.nan, np.nan
     singular = design.singular_values
     condition = float(singular[0] / singular[-1]) if singular.size else 1.0
-    measured = uncensored_rank(problem, solution.jacobian[:, ~on_bound]) if problem.censoring.any() else singular.size
-    return FitStatistics(singular.size, measured, condition, sigma, covariance, standard_errors, correlations, on_bound)
+    columns = (each.tolist() for each in (solution.values, standard_errors, on_bound))
+    estimates = tuple(
+        Estimate(leaf.path, label, value, stderr, leaf.declared.unit, leaf.declared.meaning, is_on_bound)
+        for leaf, label, value, stderr, is_on_bound in zip(problem.free_leaves, problem.labels, *columns, strict=True)
+    )
+    return {
+        "estimates": estimates, "correlations": correlations, "parameter_covariance": covariance,
+        "rank": singular.size, "condition": condition, "sigma": sigma,
+    }  # fmt: skip
 
 
-def check_determined(problem: FitProblem, solution: LeastSquaresSolution) -> None:
-    """Raise IdentificationError where the design matrix at the solution is rank-deficient."""
+def check_determined(problem: FitProblem, solution: LeastSquaresSolution) -> "_Design":
+    """The design of the parameters that are not on a bound. Raises IdentificationError where it is rank-deficient."""
     low, high = problem.bounds_reached(solution.values)
-    _check_rank(problem, solution, low | high)
+    design = _Design.of(problem, solution, ~(low | high))
+    if design.is_deficient:
+        shares = np.sqrt(np.sum(design.right_singular_vectors[design.null] ** 2, axis=0))
+        raise _rank_deficiency(problem, design.columns, shares, int(np.count_nonzero(~design.null)))
+    return design
 
 
 def check_determined_by_levels(problem: FitProblem, solution: LeastSquaresSolution, at_levels: Recording) -> None:
@@ -192,15 +208,6 @@ class _Design(NamedTuple):
         return np.asarray(self.right_singular_vectors.T / self.singular_values / self.norms[:, None])
 
 
-def _check_rank(problem: FitProblem, solution: LeastSquaresSolution, on_bound: Mask) -> _Design:
-    """The design of the parameters that are not on a bound. Raises IdentificationError where it is rank-deficient."""
-    design = _Design.of(problem, solution, ~on_bound)
-    if design.is_deficient:
-        shares = np.sqrt(np.sum(design.right_singular_vectors[design.null] ** 2, axis=0))
-        raise _rank_deficiency(problem, ~on_bound, shares, int(np.count_nonzero(~design.null)))
-    return design
-
-
 def _residual_std(residuals: Array, parameters: int, loss: Loss) -> tuple[float, Array]:
     """The sigma for which sigma^2 (J^T J)^-1 is the covariance of the estimates, and psi/mean(psi') of every residual.
 
@@ -220,12 +227,12 @@ def _residual_std(residuals: Array, parameters: int, loss: Loss) -> tuple[float,
 
 def _rank_deficiency(problem: FitProblem, free: Mask, shares: Array, rank: int) -> IdentificationError:
     """The parameters with a share in the null space, and what to do; `shares` (P,) are their norms in it."""
-    labels = [label for label, is_free in zip(problem.labels, free, strict=True) if is_free]
+    labels = list(itertools.compress(problem.labels, free))
     names = [label for label, share in zip(labels, shares, strict=True) if share > 1e-3 * shares.max()]
     quantities = problem.fitted_quantity.arguments
     levels = [count_levels(values) for values in problem.arguments]
     counts = [f"{count} of {name}" for count, name in zip(levels, quantities, strict=True)]
-    path = problem.leaves[problem.free[int(np.flatnonzero(free)[int(np.argmax(shares))])]].path
+    path = problem.free_leaves[int(np.flatnonzero(free)[int(np.argmax(shares))])].path
     law = type(problem.law).__name__
     ranks = f"(rank {rank} of {len(labels)} parameters)"
     listed = ", ".join(names[:_MAX_NAMES])

@@ -13,7 +13,7 @@ from ...report.formatting import symbol_formula, to_mathtext
 from . import Bootstrap, Fit, LengthError, ProfileLikelihood, ShapeConstrainedFit
 from .cross_validation import levels_of
 from .length_errors import PRIOR_STD
-from .surface.monotonicity import MonotonicityViolation
+from .surface.shape import MonotonicityViolation
 
 MAX_ROWS, MAX_BRIEF = 40, 8
 """Maximum numbers of parameters in the figure and in the brief view (chosen)."""

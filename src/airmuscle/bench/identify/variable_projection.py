@@ -105,7 +105,7 @@ def linear_fields(law: Any) -> tuple[str, ...]:
 def is_linear_parameter(problem: FitProblem) -> npt.NDArray[np.bool_]:
     """Mask of the free parameters in which the law is linear, shape (P,)."""
     fields = linear_fields(problem.law)
-    return np.array([problem.leaves[i].path.partition("[")[0] in fields for i in problem.free], dtype=bool)
+    return np.array([leaf.path.partition("[")[0] in fields for leaf in problem.free_leaves], dtype=bool)
 
 
 def find_initial_values(problem: FitProblem, multi_start: bool = True) -> Array:

@@ -14,7 +14,7 @@ from ....physics import Ambient, Plant, Tube, Valve, WithTubes
 from ....recording.columns import displayed
 from ..identifiability import analyse_identifiability
 from ..model_evidence import EQUIVALENT, aicc, lag_one_autocorrelation
-from ..result import Estimate
+from ..statistics import Estimate
 from .experiment import Experiment, ParameterPaths, RecordUnknown, check_ambient, describe_ambient, make_unknowns
 from .problem import MAX_RUNS, DynamicFitProblem
 from .record_model import RecordModel, count_readings, separate_residuals

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ....core import Array, counted
-from ..result import Estimate
+from ..statistics import Estimate
 
 SAME_COST, SAME_VALUE = 1e-3, 0.02
 """Relative difference of the sums of squares, and of the unknowns, of one optimum (chosen)."""

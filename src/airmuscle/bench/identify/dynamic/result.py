@@ -16,7 +16,8 @@ from ....report.chapter import BY_ROW, Chapter, NamedValue, Plot, Table, TableCo
 from ....report.shown import estimate_table
 from ...reported import Reported, unit_column
 from ..identifiability import Identifiability
-from ..result import MAX_ROWS, Estimate
+from ..result import MAX_ROWS
+from ..statistics import Estimate
 from .experiment import Unknown
 from .problem import DynamicFitProblem
 from .reliability import Optimum, scatter_of_records, searches_at_lowest

@@ -1,18 +1,133 @@
-"""Fit of the exponential surface k = k_max (1 - exp v(p, F)) by the procedure of Borzíková et al., for any muscle.
+"""Fit of the exponential surface k = k_max (1 - exp v(p, F)) by the procedure of Borzíková et al., for any muscle, with
+the polynomial bases of v and the conditioning of its design matrix in each.
 
 `fit_linearised` is the method of the paper: v is fitted to ln(1 - k/k_max). `fit_nonlinear` is least squares in k
 itself. Both use Chebyshev polynomials on the validity range of the data and return the coefficients in bar and newton.
 """
 
 import dataclasses
+import functools
+from typing import NamedTuple
 
 import numpy as np
+from numpy.polynomial import chebyshev, polynomial
 
-from ....core import Array, IdentificationError
+from ....core import Array, IdentificationError, bar
+from ....physics.muscle.characteristic.base import Characteristic
 from ....physics.muscle.characteristic.borzikova import BorzikovaExponential
 from ....recording import Recording
 from ..statistics import CorrelationIndex, correlation_index
-from .basis import Chebyshev, Conditioning, LoadRange
+
+
+class LoadRange(NamedTuple):
+    """A rectangular range of gauge pressure [Pa] and load [N]."""
+
+    min_pressure: float
+    max_pressure: float
+    min_force: float
+    max_force: float
+
+    @classmethod
+    def from_recording(cls, recording: Recording) -> "LoadRange":
+        """The smallest range that contains every row."""
+        p, f = recording["pressure"], recording["force"]
+        return cls(float(p.min()), float(p.max()), float(f.min()), float(f.max()))
+
+    @classmethod
+    def from_law(cls, law: Characteristic) -> "LoadRange":
+        """The validity range of a law that gives contraction."""
+        return cls(*law.pressure_range, *law.force_range)
+
+    def scale(self, pressure: Array, force: Array) -> tuple[Array, Array]:
+        """Pressure and force scaled to -1..1 on the range."""
+        x = 2 * (pressure - self.min_pressure) / (self.max_pressure - self.min_pressure) - 1
+        y = 2 * (force - self.min_force) / (self.max_force - self.min_force) - 1
+        return x, y
+
+    def grid(self, pressures: int, forces: int) -> tuple[Array, Array]:
+        """Evenly spaced points over the range, edges included, as two arrays of shape (pressures, forces)."""
+        p = np.linspace(self.min_pressure, self.max_pressure, pressures)
+        f = np.linspace(self.min_force, self.max_force, forces)
+        return np.broadcast_to(p[:, None], (pressures, forces)), np.broadcast_to(f, (pressures, forces))
+
+
+@dataclasses.dataclass(frozen=True)
+class Monomials:
+    """p^i F^j, with pressure and force in multiples of the given units [Pa, N]."""
+
+    pressure_unit: float = 1.0
+    force_unit: float = 1.0
+
+    def design_matrix(self, pressure: Array, force: Array, pressure_degree: int, force_degree: int) -> Array:
+        """The terms at N points [Pa, N], one column each, ordered by degree in pressure, then in force."""
+        degrees = [pressure_degree, force_degree]
+        return np.asarray(polynomial.polyvander2d(pressure / self.pressure_unit, force / self.force_unit, degrees))
+
+
+@dataclasses.dataclass(frozen=True)
+class Chebyshev:
+    """T_i(x) T_j(y), with x and y scaled to -1..1 on the validity range, where they are nearly orthogonal."""
+
+    validity_range: LoadRange
+
+    def design_matrix(self, pressure: Array, force: Array, pressure_degree: int, force_degree: int) -> Array:
+        """The terms at N points [Pa, N], in the order of those of `Monomials`."""
+        x, y = self.validity_range.scale(pressure, force)
+        return np.asarray(chebyshev.chebvander2d(x, y, [pressure_degree, force_degree]))
+
+    def to_bar_and_newton(self, coefficients: Array, pressure_degree: int, force_degree: int) -> Array:
+        """The coefficients of p^i F^j in bar and newton of the same surface, in the same order."""
+        limits = self.validity_range
+        by_pressure = _chebyshev_to_monomials(limits.min_pressure / bar, limits.max_pressure / bar, pressure_degree)
+        by_force = _chebyshev_to_monomials(limits.min_force, limits.max_force, force_degree)
+        table = coefficients.reshape(pressure_degree + 1, force_degree + 1)
+        return (by_pressure @ table @ by_force.T).ravel()
+
+
+@functools.lru_cache(maxsize=64)  # a bootstrap refits the same validity range a thousand times
+def _chebyshev_to_monomials(low: float, high: float, degree: int) -> Array:
+    """Column i holds the coefficients of T_i, scaled to low..high, in powers of the unscaled variable."""
+    powers = np.zeros((degree + 1, degree + 1))
+    for i in range(degree + 1):
+        scaled = chebyshev.Chebyshev.basis(i, domain=[low, high]).convert(kind=polynomial.Polynomial)
+        powers[: i + 1, i] = scaled.convert(domain=[-1.0, 1.0]).coef[: i + 1]
+    powers.setflags(write=False)
+    return powers
+
+
+@dataclasses.dataclass(frozen=True)
+class Conditioning:
+    """Rank, number of coefficients and condition number of a design matrix."""
+
+    rank: int
+    coefficients: int
+    condition: float
+    """Ratio of the largest to the smallest singular value; infinite for a rank-deficient matrix."""
+
+    @classmethod
+    def from_design_matrix(cls, matrix: Array) -> "Conditioning":
+        """Of a design matrix (N, coefficients), exact also beyond 1e16, where singular values are lost in rounding.
+
+        The pseudo-inverse is computed with columns of unit norm, and its rows are scaled back by the norms.
+        """
+        norms = np.linalg.norm(matrix, axis=0)
+        normalised = matrix / np.where(norms > 0, norms, 1.0)
+        rank, size = int(np.linalg.matrix_rank(normalised)), matrix.shape[1]
+        if rank < size:
+            return cls(rank, size, np.inf)
+        inverse = np.linalg.pinv(normalised) / norms[:, None]
+        return cls(rank, size, float(np.linalg.norm(matrix, 2) * np.linalg.norm(inverse, 2)))
+
+    def __str__(self) -> str:
+        return f"rank {self.rank} of {self.coefficients}, condition number {self.condition:.2g}"
+
+
+def conditioning(
+    recording: Recording, basis: Monomials | Chebyshev, pressure_degree: int = 4, force_degree: int = 2
+) -> Conditioning:
+    """The conditioning of the design matrix of a surface at the points of a recording."""
+    points = recording["pressure"], recording["force"]
+    return Conditioning.from_design_matrix(basis.design_matrix(*points, pressure_degree, force_degree))
 
 
 @dataclasses.dataclass(frozen=True)
@@ -55,8 +170,30 @@ class SurfaceProblem:
     def from_recording(
         cls, recording: Recording, saturation: float, pressure_degree: int, force_degree: int
     ) -> "SurfaceProblem":
-        """The problem for the points of a recording. Raises IdentificationError where it cannot be solved."""
-        _check_usable(recording, pressure_degree, force_degree)
+        """The problem for the points of a recording.
+
+        Raises IdentificationError for non-finite values, too few rows, or a pressure or force that does not vary.
+        """
+        for name in ("pressure", "force", "contraction"):
+            bad = np.flatnonzero(~np.isfinite(recording[name]))
+            if bad.size:
+                raise IdentificationError(
+                    f"{recording.origin}, row {bad[0] + 1}: {name} is not a finite number. Remove such rows first."
+                )
+        required = (pressure_degree + 1) * (force_degree + 1)
+        if len(recording) < required:
+            raise IdentificationError(
+                f"{recording.origin}: {len(recording)} points cannot determine {required} coefficients (degree "
+                f"{pressure_degree} in pressure, {force_degree} in force). Measure more points, or choose a lower "
+                "degree."
+            )
+        for name, unit in (("pressure", "Pa"), ("force", "N")):
+            values = recording[name]
+            if values.min() == values.max():
+                raise IdentificationError(
+                    f"{recording.origin}: {name} is {values[0]:g} {unit} in every row, so a surface cannot be fitted. "
+                    f"Measure at {force_degree + 1} or more loads and {pressure_degree + 1} or more pressures."
+                )
         basis = Chebyshev(LoadRange.from_recording(recording))
         matrix = basis.design_matrix(recording["pressure"], recording["force"], pressure_degree, force_degree)
         problem = cls(recording, saturation, pressure_degree, force_degree, basis, matrix, recording["contraction"])
@@ -124,8 +261,8 @@ def fit_nonlinear(
 ) -> SurfaceFit:
     """Fit k itself by nonlinear least squares, S(A) = Sum (k_i - f(p_i, F_i, A))^2, with exact derivatives.
 
-    `recording` has pressure [Pa], force [N] and contraction [1]; `saturation` is k_max [1]. All points are used, also
-    those with k >= k_max. Raises IdentificationError.
+    The arguments are those of `fit_linearised`. All points are used, also those with k >= k_max. Raises
+    IdentificationError.
     """
     from scipy.optimize import least_squares
 
@@ -139,26 +276,3 @@ def fit_nonlinear(
             "or use fit_linearised."
         )
     return problem.build_fit(np.asarray(result.x), "nonlinear least squares")
-
-
-def _check_usable(recording: Recording, pressure_degree: int, force_degree: int) -> None:
-    """Raise IdentificationError for non-finite values, too few rows, or a pressure or force that does not vary."""
-    for name in ("pressure", "force", "contraction"):
-        bad = np.flatnonzero(~np.isfinite(recording[name]))
-        if bad.size:
-            raise IdentificationError(
-                f"{recording.origin}, row {bad[0] + 1}: {name} is not a finite number. Remove such rows first."
-            )
-    required = (pressure_degree + 1) * (force_degree + 1)
-    if len(recording) < required:
-        raise IdentificationError(
-            f"{recording.origin}: {len(recording)} points cannot determine {required} coefficients (degree "
-            f"{pressure_degree} in pressure, {force_degree} in force). Measure more points, or choose a lower degree."
-        )
-    for name, unit in (("pressure", "Pa"), ("force", "N")):
-        values = recording[name]
-        if values.min() == values.max():
-            raise IdentificationError(
-                f"{recording.origin}: {name} is {values[0]:g} {unit} in every row, so a surface cannot be fitted. "
-                f"Measure at {force_degree + 1} or more loads and {pressure_degree + 1} or more pressures."
-            )
