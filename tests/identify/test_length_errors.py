@@ -92,7 +92,8 @@ def test_one_law_for_two_purposes_states_its_excess_over_the_best_of_each():
     errors = [[each[c.name].cross_validated_rmse for c in candidates] for each in found.comparisons]
     worst = [max(row[i] / min(row) for row in errors) for i in range(3)]
     assert found.recommended[0].candidate is candidates[int(np.argmin(worst))]
-    assert max(found.ratios) == min(worst)
+    errors_of_both = zip(found.recommended, errors, strict=True)
+    assert max(model.cross_validated_rmse / min(row) for model, row in errors_of_both) == min(worst)
     assert [each.leave_out.group_name for each in found.comparisons] == ["run", "specimen"]
     assert "For further runs of the same kind: rms error" in str(found)
     assert steps == sorted(steps)

@@ -10,7 +10,7 @@ from .identify import Estimate as Estimate
 from .identify import Fit as Fit
 from .identify import GroupSplit as GroupSplit
 from .identify import Huber as Huber
-from .identify import JointSelection as JointSelection
+from .identify import LawSelection as LawSelection
 from .identify import LeastSquares as LeastSquares
 from .identify import LengthError as LengthError
 from .identify import LevelSplit as LevelSplit

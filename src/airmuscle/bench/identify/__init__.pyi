@@ -8,7 +8,7 @@ from .candidates import Candidate as Candidate
 from .candidates import blank_surface as blank_surface
 from .candidates import evaluate_force as evaluate_force
 from .candidates import standard_candidates as standard_candidates
-from .compare_chapter import JointSelection as JointSelection
+from .compare_chapter import LawSelection as LawSelection
 from .compare_chapter import compare_chapters as compare_chapters
 from .compare_chapter import select_for_both as select_for_both
 from .cross_validation import ALWAYS_FITTED as ALWAYS_FITTED

@@ -92,7 +92,22 @@ def bootstrap(
     check_whole("bootstrap", "refits", refits, 1)
     check_whole("bootstrap", "seed", seed, 0)
     runs = [recordings] if isinstance(recordings, Recording) else list(recordings)
-    group, count = _assign_groups(fit, runs, by or default_split(runs, MIN_GROUPS))
+    by = by or default_split(runs, MIN_GROUPS)
+    labels = np.concatenate(by.labels(runs))[~FitPoints.from_recordings(runs).missing]
+    if labels.size != len(fit.recording):
+        raise IdentificationError(
+            f"the fit has {len(fit.recording)} rows, but the recordings have {labels.size}. Give the recordings that "
+            "were fitted."
+        )
+    names, group = np.unique(labels, return_inverse=True)
+    count = int(names.size)
+    if count < MIN_GROUPS:
+        raise IdentificationError(
+            f"a bootstrap needs {MIN_GROUPS} {by.group_name}s or more, but the data have {count}, whose few "
+            f"different samples do not give an interval; {RELIABLE_GROUPS} or more are recommended. Give more runs, or "
+            "use the standard errors of the fit.",
+            hint=Hint("To resample by levels of contraction", "by", LevelSplit("contraction")),
+        )
     draws = np.random.default_rng(seed).multinomial(count, np.full(count, 1.0 / count), size=refits).astype(float)
     if is_linear(fit.problem) and isinstance(fit.loss, LeastSquares):
         return Bootstrap(fit, _refit_linear(fit.problem, fit.values, group, draws), count, seed)
@@ -104,25 +119,6 @@ def bootstrap(
         distribution = DistributedCalls(executor, _refit_iteratively, (fit, group, first, None))
         others = distribution.results(blocks[1:], lambda number: report((1 + number) / len(blocks)))
     return Bootstrap(fit, np.concatenate([first, *others]), count, seed)
-
-
-def _assign_groups(fit: Fit, runs: Sequence[Recording], by: GroupSplit) -> tuple[RowIndices, int]:
-    """The index of the group of each fitted row, and the number of groups."""
-    labels = np.concatenate(by.labels(runs))[~FitPoints.from_recordings(runs).missing]
-    if labels.size != len(fit.recording):
-        raise IdentificationError(
-            f"the fit has {len(fit.recording)} rows, but the recordings have {labels.size}. Give the recordings that "
-            "were fitted."
-        )
-    names, group = np.unique(labels, return_inverse=True)
-    if names.size < MIN_GROUPS:
-        raise IdentificationError(
-            f"a bootstrap needs {MIN_GROUPS} {by.group_name}s or more, but the data have {names.size}, whose few "
-            f"different samples do not give an interval; {RELIABLE_GROUPS} or more are recommended. Give more runs, or "
-            "use the standard errors of the fit.",
-            hint=Hint("To resample by levels of contraction", "by", LevelSplit("contraction")),
-        )
-    return group, int(names.size)
 
 
 def _refit_linear(problem: FitProblem, values: Array, group: RowIndices, draws: Array) -> Array:
@@ -138,9 +134,9 @@ def _refit_linear(problem: FitProblem, values: Array, group: RowIndices, draws: 
     size = rows.shape[1]
     sums = np.zeros((draws.shape[1], size * size + size))
     for i in range(draws.shape[1]):
-        block = rows[group[active] == i]
-        sums[i, : size * size] = (block.T @ block).ravel()
-        sums[i, size * size :] = block.T @ target[group[active] == i]
+        own = group[active] == i
+        block = rows[own]
+        sums[i] = np.append(block.T @ block, block.T @ target[own])
     totals = draws @ sums
     normal, right = totals[:, : size * size].reshape(-1, size, size), totals[:, size * size :]
     determined = _has_full_rank(normal)

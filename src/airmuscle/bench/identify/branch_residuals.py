@@ -6,7 +6,6 @@ friction is independent of the speed, and its maximum is that of the pressure. A
 turning point give the same tau.
 """
 
-import dataclasses
 import itertools
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
@@ -33,8 +32,7 @@ DWELL_ROWS = 4
 """Rows at the highest pressure from which it dwells there, so that the turning point is not sharp (chosen)."""
 
 
-@dataclasses.dataclass(frozen=True)
-class SensorDelay:
+class SensorDelay(NamedTuple):
     """The delay of the force after the pressure [s], from the loops and from their turning points; negative where the
     pressure is later."""
 
@@ -151,11 +149,22 @@ def branch_distance(runs: Sequence[Recording], residuals: Sequence[Array], quant
     share nor an outlier counts. Their average difference must exceed three standard errors and the standard deviation
     of the sensor.
     """
-    differences = np.concatenate([_branch_differences(*pair) for pair in zip(runs, residuals, strict=True)])
-    if differences.size < MIN_BINS:
+    differences: list[float] = []  # median residual of inflating or contracting rows minus that of the others
+    for run, own in zip(runs, residuals, strict=True):
+        known, direction, bins, _ = _branch_bins(run)
+        if not direction.any():
+            continue
+        values = own[known]
+        used = np.isfinite(values) & (direction != 0)
+        cell = 2 * bins[used] + (direction[used] > 0)
+        counts = np.bincount(cell, minlength=2 * BINS)
+        parts = np.split(values[used][np.argsort(cell, kind="stable")], np.cumsum(counts))
+        pairs = zip(parts[1 : 2 * BINS : 2], parts[0 : 2 * BINS : 2], strict=True)
+        differences += [float(np.median(up) - np.median(down)) for up, down in pairs if up.size and down.size]
+    if len(differences) < MIN_BINS:
         return 0.0
     mean = abs(float(np.mean(differences)))
-    standard_error = float(np.std(differences, ddof=1) / np.sqrt(differences.size))
+    standard_error = float(np.std(differences, ddof=1) / np.sqrt(len(differences)))
     random = mean <= MIN_STANDARD_ERRORS * standard_error or mean <= reading_deviations(runs, quantity)[0]
     return 0.0 if random else mean
 
@@ -177,19 +186,6 @@ def branch_notes(runs: Sequence[Recording], distance: float, quantity: str, *, d
             *([] if delayed else [Hint("To identify the friction", function="bench.fit_hysteresis")]),
         )
     ]
-
-
-def _branch_differences(run: Recording, residuals: Array) -> Array:
-    """Median residual of inflating or contracting rows minus that of the others, by interval; shape (intervals,)."""
-    known, direction, bins, _ = _branch_bins(run)
-    if not direction.any():
-        return np.zeros(0)
-    values = residuals[known]
-    used = np.isfinite(values) & (direction != 0)
-    cell = 2 * bins[used] + (direction[used] > 0)
-    parts = np.split(values[used][np.argsort(cell, kind="stable")], np.cumsum(np.bincount(cell, minlength=2 * BINS)))
-    down, up = parts[0 : 2 * BINS : 2], parts[1 : 2 * BINS : 2]
-    return np.array([float(np.median(a) - np.median(b)) for a, b in zip(up, down, strict=True) if a.size and b.size])
 
 
 @remembered

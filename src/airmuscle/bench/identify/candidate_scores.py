@@ -51,14 +51,14 @@ class FoldScore:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class RankedModel:
-    """A candidate whose parameters the data determine, with its scores."""
+    """A candidate whose parameters the data determine, with its scores; root mean square errors in force [N]."""
 
     candidate: Candidate
     fit: Fit
     in_sample_rmse: float
-    """Root mean square error in force [N] on the rows of the fit, as in `FoldScore`."""
+    """That on the rows of the fit, as in `FoldScore`."""
     cross_validated_rmse: float
-    """Root mean square error in force [N] on the rows left out, over all folds."""
+    """That on the rows left out, over all folds."""
     aicc: float
     """Akaike's information criterion of the in-sample errors in force, corrected for small samples."""
     fold_scores: tuple[FoldScore, ...]
@@ -114,7 +114,7 @@ def _cross_validate(
     rmse = points.rms(in_sample)
     if rmse > bound:
         return _excess_error(candidate.name, rmse, bound, "on the rows of the fit")
-    count = points.left_out_count
+    count = sum(int(np.count_nonzero(rows.measured)) or rows.force.size for rows in points.left_out_rows)
     try:
         for name, each, measured in points.left_out_residuals(candidate, fit, loss):
             left_out += [FoldScore.of(name, np.clip(each, -limit, limit), measured)] if each.size else []

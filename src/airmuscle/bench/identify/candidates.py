@@ -44,8 +44,7 @@ def slack_rows(law: Any, pressure: Array, contraction: Array) -> npt.NDArray[np.
     if isinstance(law, ForceLaw) or _solve_error(law, pressure, contraction) is None:
         return np.zeros(pressure.size, dtype=bool)
     slack = np.asarray(_deficit(law, pressure, contraction, np.zeros(pressure.size)) > 0)
-    error = _solve_error(law, pressure[~slack], contraction[~slack])
-    if error is not None:
+    if (error := _solve_error(law, pressure[~slack], contraction[~slack])) is not None:
         raise IdentificationError(
             HintedText("It gives no force at a measured point. ", error.message),
             cause="it gives no force at a measured point",
@@ -76,7 +75,7 @@ def _invert_on_grid(law: Any, pressure: Array, contraction: Array, max_force: fl
     interval = np.minimum(np.maximum((coarse < 0).sum(axis=1) - 1, 0), coarse.shape[1] - 2)
     index = interval[:, None] * COARSE_STEP + np.arange(COARSE_STEP + 1)
     result = np.zeros(pressure.size)
-    every = np.broadcast_to(np.arange(FORCE_GRID_POINTS), (int(np.count_nonzero(~rising)), FORCE_GRID_POINTS))
+    every = np.tile(np.arange(FORCE_GRID_POINTS), (int(np.count_nonzero(~rising)), 1))
     for rows, grid in ((rising, index[rising]), (~rising, every)):
         result[rows] = _first_crossing(law, pressure[rows], contraction[rows], forces[grid])
     return result
@@ -149,22 +148,16 @@ def started_candidates(recordings: Sequence[Recording]) -> tuple[tuple[Candidate
                 missing.append(ExcludedModel(name, error.message, error.cause))
             else:
                 candidates += [Candidate(each, law, cls.redundant) for each, law in laws.items()]
-    return (*candidates, *_pooled_laws(scales)), tuple(missing)
+    # Laws of partial pooling: a population law with a term in ln L0, and specimen effects of degree 2 or 3.
+    can_pool, length = scales.length_count >= 2 and scales.specimen_count >= MIN_POOLED, scales.resting_length
+    for degree, change in POOLED_DEGREES if can_pool else ():
+        population = LogarithmicLength(blank_surface(degree), blank_surface(change), length, length)
+        for effects in (2, 3):
+            name = f"pooled, ln L0, degree {degree}, change of degree {change}, effects of degree {effects}"
+            candidates.append(Candidate(name, PooledLengthLaw(population, (blank_surface(effects),))))
+    return tuple(candidates), tuple(missing)
 
 
 def blank_surface(degree: int, max_force: float = UNREACHED_FORCE) -> ContractileSurface:
     """A surface with coefficients of zero, clamped above all measured forces."""
     return ContractileSurface.blank(degree, max_force=max(max_force, 1.0))
-
-
-def _pooled_laws(scales: DataScales) -> list[Candidate]:
-    """Laws of partial pooling: a population law with a term in ln L0, and specimen effects of degree 2 or 3."""
-    if scales.length_count < 2 or scales.specimen_count < MIN_POOLED:
-        return []
-    length, candidates = scales.resting_length, []
-    for degree, change in POOLED_DEGREES:
-        population = LogarithmicLength(blank_surface(degree), blank_surface(change), length, length)
-        for effects in (2, 3):
-            name = f"pooled, ln L0, degree {degree}, change of degree {change}, effects of degree {effects}"
-            candidates.append(Candidate(name, PooledLengthLaw(population, (blank_surface(effects),))))
-    return candidates

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -30,43 +30,29 @@ MAX_JOINT_EXCESS = 0.05
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class JointSelection(ShortRepr):
-    """One law for two purposes, with its errors relative to the lowest ones; `print` it."""
+class LawSelection(ShortRepr):
+    """The law that is recommended for one purpose, or for both; `print` it."""
 
     comparisons: tuple[Comparison, ...]
     """One for each purpose."""
     recommended: tuple[RankedModel, ...]
     """The law in the ranking of each comparison."""
-    ratios: tuple[float, ...]
-    """Cross-validated error of the law divided by the lowest error, for each purpose."""
+    reason: str
 
     def __str__(self) -> str:
-        name, count = self.recommended[0].candidate.name, self.recommended[0].parameter_count
-        lines = [f"One law for all purposes: {name} with {count} parameters."]
-        for comparison, model, ratio in zip(self.comparisons, self.recommended, self.ratios, strict=True):
-            best = eligible_models(comparison.ranking)[0]
-            lines.append(
-                f"For {comparison.purpose}: rms error {model.cross_validated_rmse:.4g} N, {100 * (ratio - 1):.2g} % "
-                f"above the lowest, {best.cross_validated_rmse:.4g} N of {best.candidate.name}."
-            )
-        return "\n".join(lines)
+        return self.reason
 
 
 def select_for_both(
     recordings: Sequence[Recording], candidates: Sequence[Candidate] | None = None, *, loss: Loss = LeastSquares(),
     workers: Workers = 1, progress: Callable[[str, float], None] | None = None,
-) -> JointSelection:  # fmt: skip
+) -> LawSelection:  # fmt: skip
     """One law for further runs (leave-one-run-out) and for other muscles (leave-one-specimen-out cross-validation).
 
-    candidates  by default `standard_candidates`, of which slow laws may be excluded as in `compare`
-    loss        as in `compare`
-    workers     number of processes, as in `compare`
-    progress    called with the name of each candidate and the completed fraction
-
-    Laws that pull where a muscle was measured slack are not eligible. The best law has the smallest maximum, over the
-    purposes, of the ratio of its error to the lowest one. Of the
-    candidates that are worse for neither purpose by more than one standard error of the difference, and by at most 5 %
-    than the best law of each purpose, the one with the fewest parameters is recommended.
+    The arguments are those of `compare`. Laws that pull where a muscle was measured slack are not eligible. The best
+    law has the smallest maximum, over the purposes, of the ratio of its error to the lowest one. Of the candidates that
+    are worse for neither purpose by more than one standard error of the difference, and by at most 5 % than the best
+    law of each purpose, the one with the fewest parameters is recommended.
     Raises IdentificationError where no candidate is determined for both purposes.
     """
     comparisons = compare_splits(recordings, candidates, SPLITS, loss=loss, workers=workers, progress=progress)
@@ -88,15 +74,15 @@ def select_for_both(
     within = [name for name in names if max(ratios(name)) <= limit]
     equivalent = [name for name in within if all(is_equivalent(each[name], each[best]) for each in rankings)]
     chosen = min(equivalent, key=lambda name: (rankings[0][name].parameter_count, max(ratios(name))))
-    return JointSelection(comparisons, tuple(ranking[chosen] for ranking in rankings), ratios(chosen))
-
-
-class LawSelection(NamedTuple):
-    """The recommended law, with the comparison for one purpose or those for both."""
-
-    comparisons: tuple[Comparison, ...]
-    recommended: RankedModel
-    reason: str
+    models = tuple(ranking[chosen] for ranking in rankings)
+    lines = [f"One law for all purposes: {chosen} with {models[0].parameter_count} parameters."]
+    for comparison, model, ratio in zip(comparisons, models, ratios(chosen), strict=True):
+        lowest_of = eligible_models(comparison.ranking)[0]
+        lines.append(
+            f"For {comparison.purpose}: rms error {model.cross_validated_rmse:.4g} N, {100 * (ratio - 1):.2g} % "
+            f"above the lowest, {lowest_of.cross_validated_rmse:.4g} N of {lowest_of.candidate.name}."
+        )
+    return LawSelection(comparisons, models, "\n".join(lines))
 
 
 def select_law(
@@ -106,21 +92,18 @@ def select_law(
 ) -> LawSelection:  # fmt: skip
     """The law for the purpose of a split, or one law for further runs and for other muscles.
 
-    candidates  as in `compare`
     leave_out   the split of a single purpose, as in `compare`
     both        whether one law must serve both purposes; by default if no split is given and the recordings contain
                 three specimens or more, each in several runs
-    loss, workers, progress  as in `compare`
 
-    Raises IdentificationError where no candidate is determined.
+    The other arguments are those of `compare`. Raises IdentificationError where no candidate is determined.
     """
     counts = Counter(specimen_name(run) for run in recordings)
     serves_both = len(counts) >= MIN_POOLED and min(counts.values()) > 1
     if both or (both is None and leave_out is None and serves_both):
-        joint = select_for_both(recordings, candidates, loss=loss, workers=workers, progress=progress)
-        return LawSelection(joint.comparisons, joint.recommended[0], str(joint))
+        return select_for_both(recordings, candidates, loss=loss, workers=workers, progress=progress)
     comparison = compare(recordings, candidates, leave_out=leave_out, loss=loss, workers=workers, progress=progress)
-    return LawSelection((comparison,), comparison.recommended, comparison.reason)
+    return LawSelection((comparison,), (comparison.recommended,), comparison.reason)
 
 
 _MAX_LABELS = 24
@@ -142,30 +125,26 @@ def compare_chapter(
     """
     fit, chapter = (recommended or comparison.recommended).fit, comparison.chapter()
     joint = () if reason in ("", comparison.reason) else (reason,)
-    folds = Plot("left-out", "Cross-validation error of the laws on each fold.", partial(_fold_figure, comparison))
-    of_fit = (
-        Plot("residuals", "Residuals of the recommended law over each variable.", partial(residual_figure, fit)),
-        Plot(
-            "correlations", "Correlations of the parameters of the recommended law.", partial(correlation_figure, fit)
-        ),
-    )
+    plots = [Plot("left-out", "Cross-validation error of the laws on each fold.", partial(_fold_figure, comparison))]
+    if figures_of_fit:
+        text = "Correlations of the parameters of the recommended law."
+        plots += [
+            Plot("residuals", "Residuals of the recommended law over each variable.", partial(residual_figure, fit)),
+            Plot("correlations", text, partial(correlation_figure, fit)),
+        ]
+    parts = dict.fromkeys(part.fold for model in comparison.ranking for part in model.fold_scores)
+    columns: dict[str, Any] = {"fold": list(parts)}
+    for model in comparison.ranking:
+        errors = {part.fold: part.rmse for part in model.fold_scores}
+        columns[model.candidate.name] = TableColumn([errors.get(part) for part in parts], "N")
     chapter = replace(
         chapter,
         summary=(*joint, *chapter.paragraphs),
-        tables=(*chapter.tables, _fold_table(comparison)),
-        plots=(folds, *of_fit) if figures_of_fit else (folds,),
+        tables=(*chapter.tables, Table("left-out-parts", "Errors by fold", columns, shown=False)),
+        plots=tuple(plots),
     )
     group = comparison.leave_out.group_name
     return replace(chapter.among(f"{group}-"), name=f"comparison-{group}") if joint else chapter
-
-
-def _fold_table(comparison: Comparison) -> Table:
-    parts = {part.fold: None for c in comparison.ranking for part in c.fold_scores}
-    columns: dict[str, Any] = {"fold": list(parts)}
-    for contender in comparison.ranking:
-        errors = {part.fold: part.rmse for part in contender.fold_scores}
-        columns[contender.candidate.name] = TableColumn([errors.get(part) for part in parts], "N")
-    return Table("left-out-parts", "Errors by fold", columns, shown=False)
 
 
 def _fold_figure(comparison: Comparison) -> Any:

@@ -16,7 +16,7 @@ from .cross_validation import GroupSplit, label_folds, specimen_name
 from .fit_points import FitPoints
 from .group_refits import GroupRefits, RowIndices
 from .pooling import Pooling, make_pooling
-from .problem import POINT_COLUMNS, RESTING_LENGTH, FitProblem, LeastSquaresSolution, with_length
+from .problem import POINT_COLUMNS, RESTING_LENGTH, LeastSquaresSolution, with_length
 from .result import Fit
 from .slack import SlackPull, pull_limit, slack_pull, with_slack_bounds
 from .solver import design_matrix, is_linear
@@ -134,15 +134,11 @@ class ComparedPoints:
         return evaluated_rows(self.recordings)
 
     @functools.cached_property
-    def _left_out_rows(self) -> list[EvaluatedRows]:
+    def left_out_rows(self) -> list[EvaluatedRows]:
+        """The evaluated rows of each fold."""
         columns = (self.points.joined[name] for name in POINT_COLUMNS)
         fold = self.fold_of_rows[np.isfinite(np.stack([*columns])).all(axis=0)]
         return [self.rows.at(fold == i) for i in range(len(self.folds))]
-
-    @functools.cached_property
-    def left_out_count(self) -> int:
-        """The number of rows that count in all folds, as in `FoldScore`."""
-        return sum(int(np.count_nonzero(rows.measured)) or rows.force.size for rows in self._left_out_rows)
 
     def rms(self, residuals: Array) -> float:
         """Root mean square [N] of the residuals of the evaluated rows (N,); those of slack rows are added to the rows
@@ -180,7 +176,7 @@ class ComparedPoints:
         """
         law, refits = candidate.law, self._refits_of(fit) if isinstance(loss, LeastSquares) else None
         pooling = make_pooling(law, self.points, fit.problem) if isinstance(law, PooledLengthLaw) else None
-        for i, (name, rows) in enumerate(zip(self.folds, self._left_out_rows, strict=True)):
+        for i, (name, rows) in enumerate(zip(self.folds, self.left_out_rows, strict=True)):
             model = None if refits is None else refits.law_without(i, pooling)
             if model is None:
                 model = self._refit_exactly(candidate, fit, i, loss)
@@ -216,8 +212,12 @@ class _FoldRefits:
     def __init__(self, fit: Fit, group: RowIndices, count: int, points: FitPoints) -> None:
         self.problem, self._group = fit.problem, group
         if points.kept.get("problem") is not fit.problem:  # not yet for another split
-            bounded = with_slack_bounds(fit.problem, points)
-            points.kept.update(problem=fit.problem, bounded=(bounded, _solution(bounded.problem, fit.values)))
+            bounded, values = with_slack_bounds(fit.problem, points), fit.values
+            problem, solution = bounded.problem, None
+            if is_linear(problem):
+                matrix, constant = design_matrix(problem)
+                solution = LeastSquaresSolution(values, matrix @ values + constant, matrix)
+            points.kept.update(problem=fit.problem, bounded=(bounded, solution or problem.solution(values)))
         bounded, solution = points.kept["bounded"]
         self._refits = GroupRefits(bounded.problem, solution, bounded.groups(group, points, count), count + 1)
         self._counts, self._values = np.ones(count + 1) - np.eye(count, count + 1), dict[int, Array | None]()
@@ -235,11 +235,3 @@ class _FoldRefits:
             law = law.rescaled(*((float(x[rows].min()), float(x[rows].max())) for x in problem.arguments))
         model: Characteristic = law if pooling is None else pooling.law(law, pooling.predict(values, rows))
         return model
-
-
-def _solution(problem: FitProblem, values: Array) -> LeastSquaresSolution:
-    """The solution with these parameters (P,), with its Jacobian."""
-    if not is_linear(problem):
-        return problem.solution(values)
-    matrix, constant = design_matrix(problem)
-    return LeastSquaresSolution(values, matrix @ values + constant, matrix)

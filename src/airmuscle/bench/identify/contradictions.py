@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...core import AMBIENT_PRESSURE, Array, Hint, HintedText, listed
+from ...core import AMBIENT_PRESSURE, Hint, HintedText, listed
 from ...recording import Recording
 from ..checks.bench_rows import file_list
 from ..segment.interval import true_intervals
@@ -43,23 +43,23 @@ def find_repeated_rows(recordings: Sequence[Recording], columns: Sequence[str]) 
     if len(recordings) < 2:
         return ()
     found = []
-    for here, there, offset in _candidates([_keys(run, columns) for run in recordings]):
+    for here, there, offset in _candidates(recordings, columns):
         one, other = recordings[here], recordings[there]
-        stretches = _equal_stretches(one, other, offset, columns)
-        found += [RepeatedRows(here, rows, (one.origin, other.origin)) for rows in stretches]
+        first, last = max(offset, 0), min(len(one), len(other) + offset)
+        rows, earlier = slice(first, last), slice(first - offset, last - offset)
+        same = np.logical_and.reduce([one[name][rows] == other[name][earlier] for name in columns])
+        for stretch in true_intervals(same):
+            rows = slice(first + stretch.start, first + stretch.stop)
+            is_long = len(stretch) >= min(MIN_ROWS, len(one), len(other))
+            if is_long and np.unique(one["force"][rows]).size >= MIN_LEVELS:
+                found.append(RepeatedRows(here, rows, (one.origin, other.origin)))
     return tuple(found)
 
 
-def _keys(run: Recording, columns: Sequence[str]) -> Array:
-    """A number for each row, which equal rows have in common; term by term, so that it is equal to the last digit."""
-    keys = np.zeros(len(run))
-    for factor, name in zip(_FACTORS, columns, strict=True):
-        keys += factor * run[name]
-    return keys
-
-
-def _candidates(keys: Sequence[Array]) -> Iterator[tuple[int, int, int]]:
-    """Pairs of recordings (later, earlier) and the offset of their rows at which several keys are equal."""
+def _candidates(recordings: Sequence[Recording], columns: Sequence[str]) -> Iterator[tuple[int, int, int]]:
+    """Pairs of recordings (later, earlier) and the offset of their rows at which several rows have one weighted sum."""
+    weighted = [[factor * run[n] for factor, n in zip(_FACTORS, columns, strict=True)] for run in recordings]
+    keys = [np.add.reduce(terms) for terms in weighted]
     row = np.concatenate([np.arange(key.size) for key in keys])
     run = np.repeat(np.arange(len(keys)), [key.size for key in keys])
     joined = np.concatenate(keys)
@@ -71,19 +71,6 @@ def _candidates(keys: Sequence[Array]) -> Iterator[tuple[int, int, int]]:
     pairs = np.stack([run[equal + 1], run[equal], row[equal + 1] - row[equal]])
     found, counts = np.unique(pairs, axis=1, return_counts=True)
     yield from found[:, counts >= MIN_LEVELS].T.tolist()
-
-
-def _equal_stretches(here: Recording, there: Recording, offset: int, columns: Sequence[str]) -> Iterator[slice]:
-    """The stretches of rows of a recording that equal those of another one by this many rows earlier."""
-    first, last = max(offset, 0), min(len(here), len(there) + offset)
-    same = np.ones(last - first, dtype=bool)
-    for name in columns:
-        same &= here[name][first:last] == there[name][first - offset : last - offset]
-    needed = min(MIN_ROWS, len(here), len(there))
-    for stretch in true_intervals(same):
-        rows = slice(first + stretch.start, first + stretch.stop)
-        if len(stretch) >= needed and np.unique(here["force"][rows]).size >= MIN_LEVELS:
-            yield rows
 
 
 MIN_DIFFERENCE = 0.04
@@ -108,7 +95,11 @@ def repeatability(matches: Matches) -> float | None:
 
 def contradiction_notes(matches: Matches) -> list[str]:
     """The remark that runs contradict each other, with its cause; empty if they do not."""
-    found = [each for each in matches.runs if abs(each.typical) > _limit(each, matches.greatest)]
+    found = []
+    for each in matches.runs:
+        share = MIN_DIFFERENCE if each.first.direction else MAX_HYSTERESIS
+        if abs(each.typical) > (UNORDERED_DIFFERENCE if each.is_unordered else share) * matches.greatest:
+            found.append(each)
     contradicting = [each for each in found if each.are_near] or found
     if not contradicting:
         return []
@@ -128,21 +119,16 @@ def contradiction_notes(matches: Matches) -> list[str]:
     return [HintedText(text, *_cause(contradicting, matches), HYSTERESIS if unordered else "")]
 
 
-def _limit(runs: MatchedRuns, greatest: float) -> float:
-    limit = UNORDERED_DIFFERENCE if runs.is_unordered else MIN_DIFFERENCE if runs.first.direction else MAX_HYSTERESIS
-    return limit * greatest
-
-
 def _example(runs: MatchedRuns) -> str:
     """The matched rows whose difference is the median one, as a sentence."""
     i, j = runs.pairs[int(np.argmin(np.abs(np.abs(runs.differences) - abs(runs.typical))))]
-    rows = [(block, int(block.rows[k])) for block, k in ((runs.first, i), (runs.second, j))]
+    rows = (runs.first.recording, int(runs.first.rows[i])), (runs.second.recording, int(runs.second.rows[j]))
     texts = [
-        f"{block.recording.origin}, row {row + 1}: {block.recording['force'][row]:.4g} N at "
-        f"{block.recording['pressure'][row] / 1e3:.4g} kPa and {100 * block.recording['contraction'][row]:.3g} %"
-        for block, row in rows
+        f"{run.origin}, row {row + 1}: {run['force'][row]:.4g} N at {run['pressure'][row] / 1e3:.4g} kPa and "
+        f"{100 * run['contraction'][row]:.3g} %"
+        for run, row in rows
     ]
-    return f"For example {texts[0]}; {texts[1]}."
+    return f"For example {'; '.join(texts)}."
 
 
 def _cause(contradicting: Sequence[MatchedRuns], matches: Matches) -> list[str | Hint]:

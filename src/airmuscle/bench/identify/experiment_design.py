@@ -19,7 +19,7 @@ from ...recording import Recording
 from ...report.chapter import Chapter, NamedValue, Table, TableColumn
 from ..reported import Reported
 from .identifiability import EXACT_RANK_TOLERANCE, UndeterminedCombination, analyse_identifiability
-from .problem import make_problem
+from .problem import POINT_COLUMNS, make_problem
 from .weighting import UNCENSORED
 
 LEVEL_COUNT = 13
@@ -119,8 +119,12 @@ class ExperimentPlan(Reported):
     def recording(self) -> Recording:
         """The points in order, as a set-point list for the test rig: run, pressure, contraction, expected force."""
         numbers = np.concatenate([np.full(r.force.size, i + 1.0) for i, r in enumerate(self.runs)])
-        columns = {n: np.concatenate([getattr(r, n) for r in self.runs]) for n in ("pressure", "contraction", "force")}
-        return Recording({"run": numbers, **columns}, "plan of static runs; force is that of the initial parameters")
+        origin = "plan of static runs; force is that of the initial parameters"
+        return Recording({"run": numbers, **_columns_of(self.runs)}, origin)
+
+
+def _columns_of(runs: Sequence[PlannedRun]) -> dict[str, Array]:
+    return {name: np.concatenate([getattr(run, name) for run in runs]) for name in POINT_COLUMNS}
 
 
 def run_table(runs: Sequence[PlannedRun], name: str, title: str) -> Table:
@@ -160,7 +164,7 @@ def optimal_design(
     candidates = candidate_runs(characteristic, bench, points)
     names, values, jacobians = _jacobians(characteristic, candidates, fixed)
     information = np.array([jacobian.T @ jacobian for jacobian in jacobians])
-    selected = _exchange(information, _select_greedily(information, runs))
+    selected = _select_runs(information, runs)
     selected.sort(key=lambda i: (candidates[i].constant != "pressure", candidates[i].level))
     even = np.unique(np.linspace(0, len(candidates) - 1, runs).astype(int))
     chosen, evenly = (_log_determinant(information, each) for each in (selected, even))
@@ -178,12 +182,10 @@ def candidate_runs(characteristic: Characteristic, bench: BenchLimits, points: i
     """Isobaric and isometric runs on evenly spaced levels, each limited to points at which the muscle pulls, up to the
     maximum force."""
     bench, pull = _pulling(characteristic, bench)
-    limits = {"pressure": bench.validity_range.pressure, "contraction": bench.validity_range.contraction}
-    runs = []
-    for constant, swept in (("pressure", "contraction"), ("contraction", "pressure")):
-        (low, high), (first, last) = limits[constant], limits[swept]
-        for level in np.linspace(low, high, LEVEL_COUNT):
-            sweep = np.linspace(first, last, 201)
+    pressures, contractions, runs = bench.validity_range.pressure, bench.validity_range.contraction, []
+    for constant, levels, swept in (("pressure", pressures, contractions), ("contraction", contractions, pressures)):
+        for level in np.linspace(*levels, LEVEL_COUNT):
+            sweep = np.linspace(*swept, 201)
             runs += _feasible_run(characteristic, bench, pull, constant, float(level), sweep, points)
     if not runs:
         raise IdentificationError(
@@ -234,8 +236,7 @@ def _jacobians(
     law: Characteristic, candidates: Sequence[PlannedRun], fixed: Collection[str]
 ) -> tuple[tuple[str, ...], Array, list[Array]]:
     """Names and values of the free parameters, and the Jacobian of every candidate by relative parameters."""
-    columns = {n: np.concatenate([getattr(r, n) for r in candidates]) for n in ("pressure", "contraction", "force")}
-    data = Recording(columns, "candidate runs")
+    data = Recording(_columns_of(candidates), "candidate runs")
     problem = make_problem(law, data, UNCENSORED, np.ones(len(data)), fixed)
     values = problem.initial_values
     jacobian = problem.jacobian(values) * np.where(values == 0, 1.0, np.abs(values))
@@ -256,23 +257,20 @@ def _log_determinant(information: Array, selected: Sequence[int] | Array) -> flo
     return float(np.linalg.slogdet(scaled + REGULARISATION * np.eye(size))[1])
 
 
-def _select_greedily(information: Array, runs: int) -> list[int]:
-    selected: list[int] = []
+def _select_runs(information: Array, runs: int) -> list[int]:
+    """Runs added one by one; single ones are then replaced as long as the determinant increases."""
+
+    def extended(others: list[int]) -> tuple[float, list[int]]:
+        determinants = [_log_determinant(information, [*others, i]) for i in range(len(information))]
+        return max(determinants), [*others, int(np.argmax(determinants))]
+
+    best, selected, improved = 0.0, list[int](), True
     for _ in range(runs):
-        determinants = [_log_determinant(information, [*selected, i]) for i in range(len(information))]
-        selected.append(int(np.argmax(determinants)))
-    return selected
-
-
-def _exchange(information: Array, selected: list[int]) -> list[int]:
-    """Replace single runs as long as the determinant increases."""
-    best, improved = _log_determinant(information, selected), True
+        best, selected = extended(selected)
     while improved:
         improved = False
-        for k in range(len(selected)):
-            rest = selected[:k] + selected[k + 1 :]
-            determinants = [_log_determinant(information, [*rest, i]) for i in range(len(information))]
-            if max(determinants) > best + 1e-9:
-                best, improved = max(determinants), True
-                selected = [*rest, int(np.argmax(determinants))]
+        for k in range(runs):
+            determinant, exchanged = extended(selected[:k] + selected[k + 1 :])
+            if determinant > best + 1e-9:
+                best, selected, improved = determinant, exchanged, True
     return selected

@@ -16,7 +16,6 @@ regression (Cook and Weisberg, Residuals and Influence in Regression (1982), sec
 
 import math
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -92,15 +91,6 @@ _MAX_ITERATIONS = 30
 """Maximum changes of the set of violated bounds in a linear refit; it took fewer than 10 in all tests."""
 
 
-class _Sums(NamedTuple):
-    """By group, in the basis: normal matrices, those of the uncensored rows, gradients, and the sums of squares."""
-
-    normal: Array
-    uncensored: Array
-    gradient: Array
-    squares: Array
-
-
 class KnownMinima:
     """Parameters found for other multiplicities of the groups, with the sum of squares of each group.
 
@@ -140,7 +130,13 @@ class GroupRefits:
         self._basis = basis
         if basis is not None:
             self._rows = weighted @ basis.directions
-            self._sums = self._sum_groups(residuals, count)
+            masked, uncensored = self._rows * self._active[:, None], problem.censoring == 0
+            groups = [group == i for i in range(count)]
+            # By group, in the basis: normal matrices, those of the uncensored rows, gradients, and sums of squares.
+            self._normal = np.array([rows.T @ rows for rows in (masked[own] for own in groups)])
+            self._uncensored = np.array([rows.T @ rows for rows in (self._rows[own & uncensored] for own in groups)])
+            self._gradient = np.array([masked[own].T @ residuals[own] for own in groups])
+            self._squares = np.array([float(residuals[own] @ residuals[own]) for own in groups])
             self._smallest = 1.0 / float(
                 np.linalg.norm(basis.directions * np.linalg.norm(weighted[self._active], axis=0)[:, None], 2)
             )
@@ -153,30 +149,19 @@ class GroupRefits:
         if self._basis is None:
             return None
         # A lower bound of the scaled singular values shows whether the uncensored rows determine all parameters.
-        lowest = float(np.linalg.eigvalsh(np.tensordot(counts, self._sums.uncensored, 1))[0])
+        lowest = float(np.linalg.eigvalsh(np.tensordot(counts, self._uncensored, 1))[0])
         if not (lowest > steps.MIN_EIGENVALUE and np.sqrt(lowest) * self._smallest > _RANK_MARGIN * RANK_TOLERANCE):
             return None
-        normal, gradient = (np.tensordot(counts, part, 1) for part in (self._sums.normal, self._sums.gradient))
+        normal, gradient = (np.tensordot(counts, part, 1) for part in (self._normal, self._gradient))
         step = steps.normal_step(normal, gradient)
         if step is None:
             return None
-        if not self._linear:
-            return self._iterate(counts, step, start)
-        return self._solve_linear(counts, step, normal, gradient)
-
-    def _sum_groups(self, residuals: Array, count: int) -> _Sums:
-        masked = self._rows * self._active[:, None]
-        uncensored = self._problem.censoring == 0
-        size = masked.shape[1]
-        sums = _Sums(*(np.zeros(shape) for shape in ((count, size, size),) * 2 + ((count, size), (count,))))
-        for i in range(count):
-            rows = self._group == i
-            own = masked[rows]
-            sums.normal[i], sums.gradient[i] = own.T @ own, own.T @ residuals[rows]
-            sums.squares[i] = float(residuals[rows] @ residuals[rows])
-            measured = self._rows[rows & uncensored]
-            sums.uncensored[i] = measured.T @ measured
-        return sums
+        if self._linear:
+            return self._solve_linear(counts, step, normal, gradient)
+        first = steps.FirstStep(self._basis, step, float(counts @ self._squares)) if start is None else None
+        start, drawn = self._solution.values if start is None else start, self._problem.repeated(counts[self._group])
+        solution = steps.gauss_newton(drawn, start, first, RELATIVE_STEP)
+        return None if solution is None else solution.values
 
     def _solve_linear(self, counts: Array, step: Array, normal: Array, gradient: Array) -> Array | None:
         """Newton steps of the one-sided squares: the rows whose bound is violated are those of the previous step.
@@ -202,11 +187,3 @@ class GroupRefits:
                 return None
             step, previous = next_step, active
         return None
-
-    def _iterate(self, counts: Array, step: Array, start: Array | None) -> Array | None:
-        """Gauss-Newton steps on the drawn rows."""
-        assert self._basis is not None
-        problem = self._problem.repeated(counts[self._group])
-        first = steps.FirstStep(self._basis, step, float(counts @ self._sums.squares)) if start is None else None
-        solution = steps.gauss_newton(problem, self._solution.values if start is None else start, first, RELATIVE_STEP)
-        return None if solution is None else solution.values

@@ -98,10 +98,8 @@ def corrected_length(run: Recording, offset: float) -> Recording:
             f"cannot be corrected by {offset:g} m; allowed: a sum greater than 0."
         )
     corrected = float(length) + offset
-    columns = {name: run[name] for name in ("pressure", "force") if name in run}
+    columns = {name: run[name] for name in ("pressure", "force", "contraction", "time") if name in run}
     columns["contraction"] = run["contraction"] * float(length) / corrected
-    if "time" in run.columns:
-        columns["time"] = run["time"]
     return Recording(columns, run.origin, {**run.constants, "resting_length": corrected}, references=run.references)
 
 
@@ -153,7 +151,13 @@ def find_length_errors(law: Characteristic, recordings: Sequence[Recording]) -> 
     if len(names) < 3 or not complete or not hasattr(model, "with_resting_length"):
         return ()
     try:
-        separate, problem = _separate_rmse(recordings, names), FitPoints.from_recordings(recordings).problem(model)
+        alone = []  # the residuals of surfaces that are fitted to each specimen alone
+        for name in names:
+            points = FitPoints.from_recordings([run for run in recordings if specimen_name(run) == name])
+            problem = points.problem(blank_surface(_SEPARATE_DEGREE))
+            alone.append(problem.residuals(solve_least_squares(problem, LeastSquares()).modelled))
+        separate = float(np.sqrt(np.mean(np.concatenate(alone) ** 2)))
+        problem = FitPoints.from_recordings(recordings).problem(model)
         rmse = float(np.sqrt(np.mean(problem.residuals(problem.predict(problem.initial_values)) ** 2)))
         if rmse <= MIN_MISFIT * separate:
             return ()
@@ -164,27 +168,16 @@ def find_length_errors(law: Characteristic, recordings: Sequence[Recording]) -> 
     return tuple(sorted((e for e in estimates if e.explains(separate)), key=lambda e: abs(e.offset)))
 
 
-def _separate_rmse(recordings: Sequence[Recording], names: Sequence[str]) -> float:
-    """Root mean square residual [N] of surfaces fitted to each specimen alone."""
-    residuals = []
-    for name in names:
-        points = FitPoints.from_recordings([run for run in recordings if specimen_name(run) == name])
-        problem = points.problem(blank_surface(_SEPARATE_DEGREE))
-        residuals.append(problem.residuals(solve_least_squares(problem, LeastSquares()).modelled))
-    return float(np.sqrt(np.mean(np.concatenate(residuals) ** 2)))
-
-
 class _Step(NamedTuple):
-    """The fit with one correction, and the Newton step from it."""
+    """The fit with one correction, and the Newton step from it: reduction of the mean square residual by the best
+    correction, if the law is linear in it; change of the correction [m] that minimises the squares and the prior, with
+    its standard error [m]."""
 
     model: Characteristic
     rmse: float
     reduction: float
-    """Reduction of the mean square residual by the best correction, if the law is linear in it."""
     change: float
-    """Change of the correction [m] that minimises the squares and the prior."""
     standard_error: float
-    """That of the correction [m]."""
 
 
 def _newton_step(

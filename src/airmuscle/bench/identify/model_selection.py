@@ -11,7 +11,7 @@ from ...engine.processes import Workers
 from ...recording import Recording
 from ...report.chapter import Chapter, NamedValue, Table, TableColumn
 from ..reported import Reported
-from .candidate_scores import MAX_RECOMMENDED_EXCESS, RankedModel, Score, score_candidates
+from .candidate_scores import MAX_RECOMMENDED_EXCESS, RankedModel, score_candidates
 from .candidates import Candidate, ExcludedModel, started_candidates
 from .compared_points import ComparedPoints
 from .cross_validation import GroupSplit, default_split
@@ -241,22 +241,20 @@ def compare_splits(
     folds = [ComparedPoints.of(runs, split, points) for split in splits]
     compared, unavailable = started_candidates(runs) if candidates is None else (candidates, ())
     scores = score_candidates(compared, folds, loss, workers, progress, can_exclude=candidates is None)
-    return tuple(_comparison(runs, split, [each[i] for each in scores], unavailable) for i, split in enumerate(splits))
-
-
-def _comparison(
-    runs: Sequence[Recording], split: GroupSplit, scores: Sequence[Score], unavailable: tuple[ExcludedModel, ...]
-) -> Comparison:
-    ranking = [each for each in scores if isinstance(each, RankedModel)]
-    excluded = tuple(each for each in scores if isinstance(each, ExcludedModel))
-    if not ranking:
-        reasons = [part for e in excluded for part in (f"\n{e.name}: ", e.reason)]
-        raise IdentificationError(HintedText(f"the data determine none of the {len(excluded)} candidates.", *reasons))
-    ranking.sort(key=lambda m: (m.cross_validated_rmse, m.parameter_count))
-    recommended, reason = recommend(ranking, split)
-    of_lengths = length_notes(find_length_errors(recommended.fit.model, runs))
-    remarks = (*recommended.fit.notes, *of_lengths, *_limit_notes(recommended))
-    return Comparison(tuple(ranking), excluded, split, recommended, reason, unavailable, remarks)
+    comparisons = []
+    for split, of_split in zip(splits, zip(*scores, strict=True), strict=True):
+        ranking = [each for each in of_split if isinstance(each, RankedModel)]
+        excluded = tuple(each for each in of_split if isinstance(each, ExcludedModel))
+        if not ranking:
+            reasons = [part for e in excluded for part in (f"\n{e.name}: ", e.reason)]
+            text = f"the data determine none of the {len(excluded)} candidates."
+            raise IdentificationError(HintedText(text, *reasons))
+        ranking.sort(key=lambda m: (m.cross_validated_rmse, m.parameter_count))
+        recommended, reason = recommend(ranking, split)
+        of_lengths = length_notes(find_length_errors(recommended.fit.model, runs))
+        remarks = (*recommended.fit.notes, *of_lengths, *_limit_notes(recommended))
+        comparisons.append(Comparison(tuple(ranking), excluded, split, recommended, reason, unavailable, remarks))
+    return tuple(comparisons)
 
 
 def _limit_notes(model: RankedModel) -> tuple[str, ...]:

@@ -163,7 +163,23 @@ def estimate_pooled_covariance(
     """
     counts = [np.unique(runs.run[rows.member == i]).size for i in range(rows.specimens)]
     run_count = int(np.unique(runs.run).size)
-    independent = _independent(rows.sums(), ratio, deviation, freedom, run_count)
+    total = rows.sums()
+    population = np.linalg.inv(total.xx)
+    shrunk = np.linalg.inv(total.zz + ratio * np.eye(len(total.zz)))
+    projected = population @ total.xz  # effects of the rows that the population law takes up
+    smoother = shrunk @ (total.zz - total.xz.T @ projected)
+    by_rows = np.block([[population, np.zeros(projected.shape)], [-shrunk @ projected.T, shrunk]])
+    values, vectors = np.linalg.eigh(by_rows @ total.moments @ by_rows.T)
+    independent = PooledCovariance(
+        by_effects=deviation * np.vstack([projected, smoother - np.eye(len(smoother))]),
+        freedom=freedom,
+        by_rows=by_rows,
+        moments=total.moments[None],
+        shifts=(vectors * np.sqrt(ratio * np.maximum(values, 0.0))).T * deviation,
+        unit=rows_of.ROWS,
+        run_count=run_count,
+        rows=int(total.rows),
+    )
     found = _by_groups(independent, rows, ratio, runs.run, rows_of.RUNS) if min(counts) >= rows_of.MIN_GROUPS else None
     parts, in_order = 2, runs.in_time or rows_of.is_correlated(rows.residuals, runs.run)
     while found is None and in_order and run_count * parts * rows_of.MIN_GROUP_ROWS <= len(rows.member):
@@ -185,23 +201,3 @@ def _by_groups(
     found = dataclasses.replace(independent, shifts=shifts, unit=unit, moments=moments)
     freedoms = found.group_freedoms(np.eye(shifts.shape[1]))
     return found if float(np.median(freedoms)) >= MIN_DEGREES_OF_FREEDOM else None
-
-
-def _independent(total: Sums, ratio: float, deviation: float, freedom: float, run_count: int) -> PooledCovariance:
-    """The covariance for independent rows, whose number is the effective one in the ratio of variances."""
-    population = np.linalg.inv(total.xx)
-    shrunk = np.linalg.inv(total.zz + ratio * np.eye(len(total.zz)))
-    projected = population @ total.xz  # effects of the rows that the population law takes up
-    smoother = shrunk @ (total.zz - total.xz.T @ projected)
-    by_rows = np.block([[population, np.zeros(projected.shape)], [-shrunk @ projected.T, shrunk]])
-    values, vectors = np.linalg.eigh(by_rows @ total.moments @ by_rows.T)
-    return PooledCovariance(
-        by_effects=deviation * np.vstack([projected, smoother - np.eye(len(smoother))]),
-        freedom=freedom,
-        by_rows=by_rows,
-        moments=total.moments[None],
-        shifts=(vectors * np.sqrt(ratio * np.maximum(values, 0.0))).T * deviation,
-        unit=rows_of.ROWS,
-        run_count=run_count,
-        rows=int(total.rows),
-    )

@@ -226,11 +226,7 @@ class FitProblem:
         if all(autodiff.is_traceable(type(part)) for _, part in parts_of(self.law)):
             leaves, method = [self.free[i] for i in which], self.fitted_quantity.method
             return self._join([autodiff.parameter_derivatives(law, method, x, leaves) for law, x in self._laws(values)])
-        return self._finite_differences(values, which)
-
-    def _finite_differences(self, values: Array, which: Sequence[int]) -> Array:
-        low, high = self.bounds
-        columns = []
+        (low, high), columns = self.bounds, []
         for i in which:
             value = values[i]
             step = np.cbrt(np.finfo(float).eps) * max(abs(value), abs(self.initial_values[i]), 1e-8)
@@ -255,21 +251,17 @@ def make_problem(
     elif quantity == PRESSURE:
         signs = -signs  # a smaller force at the same pressure means that the stated force needs a higher pressure
     leaves = tuple(tree.leaves(law))
-    _check_known(law, leaves, fixed)
-    kept = {leaf.path for leaf in leaves if fixed and {leaf.path, leaf.path.partition("[")[0]} & set(fixed)}
-    free = tuple(i for i, leaf in enumerate(leaves) if leaf.declared.fitted and leaf.path not in kept)
-    _check_row_count(law, data, len(free), int(np.count_nonzero(signs == 0)))
-    return FitProblem(law, quantity, data, target, signs, weights, leaves, free)
-
-
-def _check_known(law: Characteristic, leaves: Sequence[tree.Leaf], fixed: Collection[str]) -> None:
+    fields = list(dict.fromkeys(leaf.path.partition("[")[0] for leaf in leaves))
     for name in fixed:
-        fields = list(dict.fromkeys(leaf.path.partition("[")[0] for leaf in leaves))
         if name not in fields and name not in (leaf.path for leaf in leaves):
             raise ParameterError(
                 f"{type(law).__name__} has no parameter '{name}' to be fixed"
                 f"{alternatives(name, fields, 'its parameters are')}"
             )
+    kept = {leaf.path for leaf in leaves if fixed and {leaf.path, leaf.path.partition("[")[0]} & set(fixed)}
+    free = tuple(i for i, leaf in enumerate(leaves) if leaf.declared.fitted and leaf.path not in kept)
+    _check_row_count(law, data, len(free), int(np.count_nonzero(signs == 0)))
+    return FitProblem(law, quantity, data, target, signs, weights, leaves, free)
 
 
 def _check_row_count(law: Characteristic, data: Recording, free: int, measured: int) -> None:

@@ -1,7 +1,7 @@
 """Fit of a static characteristic to measured points, `fit`, with notes on what affects its interpretation."""
 
 import dataclasses
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from functools import partial
 from typing import Any
 
@@ -164,24 +164,21 @@ def examine(
     scatter = dataclasses.replace(checks.scatter, branches=distance)
     branches = branch_notes(points.recordings, distance, quantity.name, delayed=checks.delay is not None)
     own = collect_notes(problem, solution, fit, by_recording)
-    notes = (*checks.notes, *map(str, points.repeated), *own, *branches, *_level_notes(fit.data_ranges))
-    notes += () if fit.effects is None else (_effect_note(fit.effects),)
+    notes = (*checks.notes, *map(str, points.repeated), *own, *branches)
+    ranges = fit.data_ranges
+    notes += tuple(
+        f"The {name} was measured at one level, {level_text(name, sum(ranges[name]) / 2)}: how the force depends on it "
+        "follows from the form of the law, not from the data. Measure other levels before the law is used there."
+        for name, band in (("pressure", RIPPLE_BAND * ranges["pressure"][1]), ("contraction", HELD))
+        if np.ptp(ranges[name]) < band
+    )
+    if fit.effects is not None:
+        notes += (_effect_note(fit.effects),)
     if quantity == FORCE:
         lengths = {run.constants.get(RESTING_LENGTH) for run in points.recordings} - {None}
         count = 1 if hasattr(fit.model, "with_resting_length") else len(lengths)
-        notes += tuple(scatter.misfit_notes(fit.rmse, fit.data_ranges["force"][1], count))
+        notes += tuple(scatter.misfit_notes(fit.rmse, ranges["force"][1], count))
     return dataclasses.replace(checks, notes=notes, scatter=scatter)
-
-
-def _level_notes(ranges: Mapping[str, tuple[float, float]]) -> list[str]:
-    """The remark that the pressure or the contraction was measured at one level only."""
-    bands = {"pressure": RIPPLE_BAND * ranges["pressure"][1], "contraction": HELD}
-    return [
-        f"The {name} was measured at one level, {level_text(name, sum(ranges[name]) / 2)}: how the force depends on it "
-        "follows from the form of the law, not from the data. Measure other levels before the law is used there."
-        for name, band in bands.items()
-        if np.ptp(ranges[name]) < band
-    ]
 
 
 def _effect_note(effects: SpecimenEffects) -> str:
@@ -232,10 +229,8 @@ def collect_notes(
     length = problem.data.constants.get(RESTING_LENGTH)  # to which the contraction is relative
     for leaf in problem.leaves:
         if leaf.declared.name == RESTING_LENGTH and length is not None and abs(leaf.value - float(length)) > 1e-6:
-            yield (
-                f"The muscle in the recording has a resting length of {length:.4g} m, but {leaf.path} is "
-                f"{leaf.value:.4g} m."
-            )
+            text = f"The muscle in the recording has a resting length of {length:.4g} m"
+            yield f"{text}, but {leaf.path} is {leaf.value:.4g} m."
     for estimate in fit.estimates:
         if estimate.on_bound:
             yield f"{estimate.name} is on its bound; its value is not determined by the data."

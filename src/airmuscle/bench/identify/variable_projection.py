@@ -119,14 +119,19 @@ def find_initial_values(problem: FitProblem, multi_start: bool = True) -> Array:
     projection, thinned, count = _Projection(problem, linear), problem, len(problem.data)
     if count > _MAX_ROWS:  # drawn, as a regular choice could miss levels
         thinned = problem.rows(np.sort(np.random.default_rng(1).permutation(count)[:_MAX_ROWS]))
-    best = problem.initial_values[~linear]
+    best, (low, high) = problem.initial_values[~linear], problem.bounds
     if multi_start:
         preview = projection if thinned is problem else _Projection(thinned, linear)
-        guesses = sorted(_initial_guesses(problem, ~linear), key=preview.sum_of_squares)[:_SEARCH_COUNT]
+        # The given nonlinear parameters, and random guesses around them within the bounds, with a constant seed.
+        random, guesses, (bottom, top) = np.random.default_rng(1), [best], (bound[~linear] for bound in (low, high))
+        width = np.where(np.isfinite(top - bottom), top - bottom, 0.0)
+        for _ in range(_GUESS_COUNT - 1):
+            factor, shift = _SPREAD_FACTOR ** random.uniform(-1, 1, best.size), random.uniform(-1, 1, best.size)
+            guesses.append(np.clip(best * factor + _RANGE_FRACTION * width * shift, bottom, top))
+        guesses = sorted(guesses, key=preview.sum_of_squares)[:_SEARCH_COUNT]
         best = min((preview.search(guess) for guess in guesses), key=preview.sum_of_squares)
     if not multi_start or thinned is not problem:
         best = projection.search(best)
-    low, high = problem.bounds
     values = np.clip(projection.solve(best)[0], low, high)
     after, before = (_sum_of_squares(problem.residuals(problem.predict(v))) for v in (values, problem.initial_values))
     return values if after < before else problem.initial_values
@@ -195,19 +200,6 @@ class _Projection:
         except (ValueError, np.linalg.LinAlgError):  # the law is not finite at a trial point
             return start
         return np.asarray(result.x * self._scale)
-
-
-def _initial_guesses(problem: FitProblem, nonlinear: npt.NDArray[np.bool_]) -> list[Array]:
-    """The given nonlinear parameters and random guesses around them within the bounds, with a constant seed."""
-    start = problem.initial_values[nonlinear]
-    low, high = (bound[nonlinear] for bound in problem.bounds)
-    random = np.random.default_rng(1)
-    width = np.where(np.isfinite(high - low), high - low, 0.0)
-    guesses = [start]
-    for _ in range(_GUESS_COUNT - 1):
-        factor, shift = _SPREAD_FACTOR ** random.uniform(-1, 1, start.size), random.uniform(-1, 1, start.size)
-        guesses.append(np.clip(start * factor + _RANGE_FRACTION * width * shift, low, high))
-    return guesses
 
 
 def _sum_of_squares(residuals: Array) -> float:

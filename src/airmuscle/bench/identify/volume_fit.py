@@ -59,8 +59,12 @@ class VolumeFit:
     def standard_deviation(self, contraction: Array) -> Array:
         """Standard deviation of the fitted volume [m3] at contractions (N,)."""
         design = _design(self.geometry, np.asarray(contraction, dtype=float))
-        deviation: Array = np.sqrt(np.sum(design @ self.covariance * design, axis=1))
-        return deviation
+        return np.asarray(np.sqrt(np.sum(design @ self.covariance * design, axis=1)))
+
+    @property
+    def largest_deviation(self) -> float:
+        """The greatest standard deviation of the volume [m3] at the measured contractions."""
+        return float(self.standard_deviation(self.points.contraction).max())
 
 
 def volume_points(recordings: Sequence[Recording], temperature: float = 293.15) -> VolumePoints:
@@ -77,7 +81,8 @@ def volume_points(recordings: Sequence[Recording], temperature: float = 293.15) 
 
 
 def _measured(recording: Recording, temperature: float) -> tuple[Array, Array]:
-    """Contractions and volumes [m3] of a water column, or the one contraction and volume of a fill."""
+    """Contractions and volumes [m3] of a water column, or the one contraction and volume of a fill, from the mass of
+    air and the pressures at both ends."""
     if not len(recording):
         raise ColumnError(f"{recording.origin}: the recording has no rows. Give one with measured values.")
     contraction = recording["contraction"]
@@ -89,11 +94,6 @@ def _measured(recording: Recording, temperature: float) -> tuple[Array, Array]:
             f"must be held within {100 * HELD:.1f} %. Hold the muscle, or measure the volume in a water column "
             "(a column 'volume')."
         )
-    return np.array([float(np.mean(contraction))]), np.array([_fill_volume(recording, temperature)])
-
-
-def _fill_volume(recording: Recording, temperature: float) -> float:
-    """Volume [m3] from the mass of air and the pressures at both ends of a fill."""
     if "air_mass" in recording.columns:
         mass = recording["air_mass"]
     elif "mass_flow" in recording.columns:
@@ -114,7 +114,8 @@ def _fill_volume(recording: Recording, temperature: float) -> float:
             f"{MIN_RISE / 1e3:g} kPa between settled ends."
         )
     entered = float(np.mean(mass[-count:]) - np.mean(mass[:count]))
-    return entered * GAS_CONSTANT * temperature / rise
+    volume = entered * GAS_CONSTANT * temperature / rise
+    return np.array([float(np.mean(contraction))]), np.array([volume])
 
 
 def fit_volume(points: VolumePoints, resting_length: float) -> VolumeFit:
@@ -136,7 +137,7 @@ def fit_volume(points: VolumePoints, resting_length: float) -> VolumeFit:
     degrees = range(1, min(MAX_DEGREE, levels - 2, points.volume.size - 3) + 1)
     polynomials = {f"polynomial of degree {n}": _polynomial(points, resting_length, n) for n in degrees}
     braid = _braid(points, resting_length)
-    laws: dict[str, Geometry] = {"Braid": braid, **polynomials} if braid is not None else {**polynomials}
+    laws: dict[str, Geometry] = {**({} if braid is None else {"Braid": braid}), **polynomials}
     criteria = {name: _aicc(law, points) for name, law in laws.items()}
     equivalent = [laws[name] for name, value in criteria.items() if value <= min(criteria.values()) + EQUIVALENT]
     best = min(equivalent, key=lambda law: _design(law, points.contraction).shape[1])
@@ -161,10 +162,10 @@ def _braid(points: VolumePoints, resting_length: float) -> Braid | None:
 
 
 def _polynomial(points: VolumePoints, resting_length: float, degree: int) -> ChebyshevGeometry:
-    low, high = float(points.contraction.min()), float(points.contraction.max())
-    terms = _chebyshev_terms(points.contraction, low, high, degree)
+    ends = float(points.contraction.min()), float(points.contraction.max())
+    terms = _chebyshev_terms(points.contraction, *ends, degree)
     coefficients = np.linalg.lstsq(terms, points.volume, rcond=None)[0]
-    return ChebyshevGeometry(tuple(map(float, coefficients)), low, high, resting_length)
+    return ChebyshevGeometry(tuple(map(float, coefficients)), *ends, resting_length)
 
 
 def _design(law: Geometry, contraction: Array) -> Array:
@@ -197,9 +198,8 @@ def volume_chapter(
     defect: EnergyDefect | None = None,
 ) -> Chapter:  # fmt: skip
     """Return the chapter of a volume fit; with a force law also dF/dp against -dV/dL and the Maxwell defect."""
-    plots = [
-        Plot("volume", "Measured volumes, and the law with two standard deviations.", partial(_volume_figure, fit))
-    ]
+    caption = "Measured volumes, and the law with two standard deviations."
+    plots = [Plot("volume", caption, partial(_volume_figure, fit))]
     if law is not None and validity_range is not None:
         caption = (
             "Reciprocity: dF/dp of the force law (lines, at several pressures) and -dV/dL of the volume law (thick). "
@@ -216,11 +216,10 @@ def volume_chapter(
             NamedValue("points", len(fit.points.contraction), brief=False),
             NamedValue("fills", fit.points.fills, brief=False),
             NamedValue("rms residual", fit.rmse, "m3", "cm3", brief=False),
-            NamedValue("maximum standard deviation", _largest_deviation(fit), "m3", "cm3", brief=False),
+            NamedValue("maximum standard deviation", fit.largest_deviation, "m3", "cm3", brief=False),
             *([] if defect is None else defect_values(defect)),
         ),
-        tables=(_volumes(fit), _compared(fit),
-                parameter_table(fit.geometry, "volume-parameters", f"Parameters of {model}")),
+        tables=(*_tables(fit), parameter_table(fit.geometry, "volume-parameters", f"Parameters of {model}")),
         plots=tuple(plots),
         references=tuple(cite(fit.geometry)),
     )  # fmt: skip
@@ -238,31 +237,22 @@ def volume_summary(fit: VolumeFit) -> str:
     """The law with its residual and its standard deviation."""
     return (
         f"{type(fit.geometry).__name__}, rms residual {1e6 * fit.rmse:.4g} cm3, standard deviation of the volume at "
-        f"most {1e6 * _largest_deviation(fit):.4g} cm3"
+        f"most {1e6 * fit.largest_deviation:.4g} cm3"
     )
 
 
-def _largest_deviation(fit: VolumeFit) -> float:
-    return float(fit.standard_deviation(fit.points.contraction).max())
-
-
-def _volumes(fit: VolumeFit) -> Table:
+def _tables(fit: VolumeFit) -> tuple[Table, Table]:
+    """The fitted volumes, and the ranking of the laws."""
     contraction = np.linspace(fit.points.contraction.min(), fit.points.contraction.max(), VOLUMES)
-    columns = {
+    volumes = {
         "contraction": TableColumn(contraction, "1", "%"),
         "volume": TableColumn(np.asarray(fit.geometry.volume(contraction)), "m3", "cm3"),
         "standard deviation": TableColumn(fit.standard_deviation(contraction), "m3", "cm3", digits=2),
     }
-    return Table("volume", "Volume of the muscle", columns, brief=(0, VOLUMES // 2, VOLUMES - 1))
-
-
-def _compared(fit: VolumeFit) -> Table:
-    ranked = sorted(fit.aicc.items(), key=lambda item: item[1])
-    columns = {
-        "law": [name for name, _ in ranked],
-        "AICc above the best": [value - ranked[0][1] for _, value in ranked],
-    }
-    return Table("volume-laws", "Volume laws", columns)
+    names, least = sorted(fit.aicc, key=lambda name: fit.aicc[name]), min(fit.aicc.values())
+    laws = {"law": names, "AICc above the best": [fit.aicc[name] - least for name in names]}
+    brief = (0, VOLUMES // 2, VOLUMES - 1)
+    return Table("volume", "Volume of the muscle", volumes, brief=brief), Table("volume-laws", "Volume laws", laws)
 
 
 def _volume_figure(fit: VolumeFit) -> Any:
@@ -281,9 +271,8 @@ def _volume_figure(fit: VolumeFit) -> Any:
 def _reciprocity_figure(fit: VolumeFit, law: Characteristic, validity_range: ValidityRange) -> Any:
     figure, axes = plotting.new_figure()
     low, high = validity_range.contraction
-    contraction = np.linspace(
-        max(low, float(fit.points.contraction.min())), min(high, float(fit.points.contraction.max())), 121
-    )
+    measured = fit.points.contraction
+    contraction = np.linspace(max(low, float(measured.min())), min(high, float(measured.max())), 121)
     for i, pressure in enumerate(np.linspace(*validity_range.pressure, LEVELS + 2)[1:-1]):
         pressures = np.full(contraction.size, pressure)
         taut = np.asarray(law.force(pressures, contraction)) > 0

@@ -83,7 +83,7 @@ def _compare(
         recordings, candidates, leave_out=request.split, both=both, loss=request.loss("N"), workers=workers,
         progress=progress,
     )  # fmt: skip
-    best = selection.recommended
+    best = selection.recommended[0]
     geometry = named.geometry if named and candidates and best.candidate is candidates[-1] else None
     initial = Entry(best.candidate.name, best.candidate.name, "chosen", best.candidate.law, geometry)
     unused = []

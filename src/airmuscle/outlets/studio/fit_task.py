@@ -166,7 +166,7 @@ def _pack(folder: Path) -> list[str]:
 
 def result_sheet(selection: LawSelection, fit: am.Fit) -> dict[str, Any]:
     """The selection and the recommended fit as plain data."""
-    best, (equations, _) = selection.recommended, equation_section(fit)
+    best, (equations, _) = selection.recommended[0], equation_section(fit)
     quantity, step = fit.fitted_quantity, max(1, math.ceil(fit.rows_used / MAX_PARITY_POINTS))
     columns = {
         "measured": fit.recording[quantity.name], "modelled": fit.modelled, "residual": fit.residuals,
