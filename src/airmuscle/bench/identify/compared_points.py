@@ -109,6 +109,7 @@ class ComparedPoints:
     """Index of the fold of each row; one more than the last for rows that are never left out."""
     points: FitPoints
     """The rows of all recordings."""
+    _kept_refits: "list[_FoldRefits]" = dataclasses.field(default_factory=list)
 
     @classmethod
     def of(cls, runs: Sequence[Recording], split: GroupSplit, points: FitPoints | None = None) -> "ComparedPoints":
@@ -188,10 +189,6 @@ class ComparedPoints:
             group = self.fold_of_rows[~self.points.missing]
             self._kept_refits[:] = [_FoldRefits(fit, group, len(self.folds), self.points)]
         return self._kept_refits[0]
-
-    @functools.cached_property
-    def _kept_refits(self) -> "list[_FoldRefits]":
-        return []
 
     def _refit_exactly(self, candidate: Candidate, fit: Fit, fold: int, loss: Loss) -> Characteristic:
         """The refit by a search of its own."""

@@ -107,7 +107,11 @@ class FitPoints:
         levels: dict[str, Array] = {}
         for name in ("pressure", "contraction"):
             values, held = (np.concatenate([each[name] for each in part]) for part in zip(*columns, strict=True))
-            values[held] = _merged_levels(values[held])
+            distinct, member = np.unique(values[held], return_inverse=True)
+            merged, band = distinct.copy(), RELATIVE_BAND * float(np.max(np.abs(distinct), initial=0.0))
+            for interval in level_intervals(distinct, band):  # those within the band count as the lowest of them
+                merged[interval.rows] = distinct[interval.start]
+            values[held] = merged[member]
             levels[name] = values[~self.missing]
         return self.data.with_columns(**levels)
 
@@ -115,10 +119,6 @@ class FitPoints:
     def kept(self) -> dict[str, Any]:
         """What was computed last for one law and all points, which laws with the same population share."""
         return {}
-
-    @functools.cached_property
-    def _force_limits(self) -> Censoring:
-        return force_limits(self.recordings)
 
     def problem(
         self, characteristic: Characteristic, *, censoring: Censoring | None = None, sigma: npt.ArrayLike | None = None,
@@ -130,10 +130,10 @@ class FitPoints:
             by_recording = self.deviations(fitted_quantity_of(characteristic).name)
             if by_recording is not None:
                 sigma = np.repeat(by_recording, [len(run) for run in self.recordings])
-        weights = _row_weights(self.joined, self.missing, sigma)[~self.missing]
+        weights = np.ones(len(self.data)) if sigma is None else _row_weights(self.joined, self.missing, sigma)
         if censoring is None:
             censoring = default_censoring(law)
-            censoring = censoring.within(self._force_limits) if isinstance(law, ForceLaw) else censoring
+            censoring = censoring.within(force_limits(self.recordings)) if isinstance(law, ForceLaw) else censoring
         return make_problem(law, self.data, censoring, weights, fixed)
 
 
@@ -154,15 +154,6 @@ def _columns_at_levels(recording: Recording) -> tuple[dict[str, Array], dict[str
     return columns, held
 
 
-def _merged_levels(levels: Array) -> Array:
-    """The levels (N,) of runs, those within the band of a constant quantity replaced by the lowest of them."""
-    distinct, member = np.unique(levels, return_inverse=True)
-    band, merged = RELATIVE_BAND * float(np.max(np.abs(distinct), initial=0.0)), distinct.copy()
-    for interval in level_intervals(distinct, band):
-        merged[interval.rows] = distinct[interval.start]
-    return np.asarray(merged[member])
-
-
 def _may_be_constant(values: Array, band: float) -> bool:
     """Whether the values, but for one at each end, of some `MIN_ROWS_OF_RUN` consecutive rows fit into a band.
 
@@ -180,20 +171,19 @@ def _may_be_constant(values: Array, band: float) -> bool:
     return bool((ordered[:, -2] - ordered[:, 1] <= band * (1 + 1e-9)).any())
 
 
-def _row_weights(data: Recording, dropped: npt.NDArray[np.bool_], sigma: npt.ArrayLike | None) -> Array:
-    if sigma is None:
-        return np.ones(len(data))
+def _row_weights(data: Recording, dropped: npt.NDArray[np.bool_], sigma: npt.ArrayLike) -> Array:
+    """The weights of the rows that are not dropped, with a root mean square of 1."""
     deviations = np.asarray(sigma, dtype=float)
     if deviations.shape not in ((), (1,), (len(data),)):
         raise IdentificationError(
             f"{data.origin}: sigma has the shape {deviations.shape}; give one number, or one for each "
             f"of the {len(data)} rows."
         )
-    deviations = np.broadcast_to(deviations, (len(data),))
-    if not (np.isfinite(deviations) & (deviations > 0))[~dropped].all():
+    deviations = np.broadcast_to(deviations, (len(data),))[~dropped]
+    if not (np.isfinite(deviations) & (deviations > 0)).all():
         raise IdentificationError(f"{data.origin}: every sigma must be finite and positive.")
     weights = 1.0 / deviations
-    return np.asarray(weights / np.sqrt(np.mean(weights[~dropped] ** 2)))
+    return np.asarray(weights / np.sqrt(np.mean(weights**2)))
 
 
 def _with_validity_range(law: Characteristic, data: Recording) -> Characteristic:

@@ -134,35 +134,29 @@ def _sum_of_squares(problem: FitProblem, values: np.ndarray) -> float:
 
 
 def _find_limit(fit: Fit, index: int, step: float, threshold: float) -> float:
-    """The value at which the profile exceeds the threshold on one side.
-
-    Infinite where it never does, or where a bound is reached first.
-    """
+    """The value at which the profile exceeds the threshold on one side; infinite where it never does, or where a bound
+    is reached first."""
     problem, estimate = fit.problem, fit.estimates[index]
-    leaf = problem.free[index]
-    low, high = problem.leaves[leaf].declared.bounds
+    leaf, bounds = problem.free[index], problem.free_leaves[index].declared.bounds
     others = tuple(i for i in problem.free if i != leaf)
+
+    def is_beyond(value: float) -> bool:
+        leaves = list(problem.leaves)
+        leaves[leaf] = dataclasses.replace(leaves[leaf], value=value)
+        constrained = dataclasses.replace(problem, leaves=tuple(leaves), free=others)
+        values = solve_least_squares(constrained, LeastSquares()).values if others else np.zeros(0)
+        return _sum_of_squares(constrained, values) > threshold
+
     inside, outside, unbounded = estimate.value, estimate.value, float(np.copysign(np.inf, step))
     for doubling in range(_MAX_DOUBLINGS):
-        inside, outside = outside, float(np.clip(estimate.value + step * 2.0**doubling, low, high))
+        inside, outside = outside, float(np.clip(estimate.value + step * 2.0**doubling, *bounds))
         if inside == outside:  # the bound is reached below the threshold
             return unbounded
-        if _constrained_sum_of_squares(problem, others, leaf, outside) > threshold:
+        if is_beyond(outside):
             break
     else:
         return unbounded
     for _ in range(_BISECTIONS):
         middle = (inside + outside) / 2
-        above = _constrained_sum_of_squares(problem, others, leaf, middle) > threshold
-        inside, outside = (inside, middle) if above else (middle, outside)
+        inside, outside = (inside, middle) if is_beyond(middle) else (middle, outside)
     return (inside + outside) / 2
-
-
-def _constrained_sum_of_squares(problem: FitProblem, others: tuple[int, ...], leaf: int, value: float) -> float:
-    """The minimum sum of squares with one leaf fixed at a value."""
-    leaves = list(problem.leaves)
-    leaves[leaf] = dataclasses.replace(leaves[leaf], value=value)
-    constrained = dataclasses.replace(problem, leaves=tuple(leaves), free=others)
-    return _sum_of_squares(
-        constrained, solve_least_squares(constrained, LeastSquares()).values if others else np.zeros(0)
-    )

@@ -19,6 +19,7 @@ from ...recording import Recording
 from ...recording.columns import quantity_of
 from ..segment import branch_directions, find_branches, find_runs
 from .cross_validation import specimen_name
+from .problem import POINT_COLUMNS
 
 PRESSURE_REACH, CONTRACTION_REACH = 0.015, 0.004
 """Maximum distance of matched rows: in pressure, as a fraction of the highest, and in contraction (chosen)."""
@@ -108,7 +109,7 @@ class Matches(NamedTuple):
 def match_rows(recordings: Sequence[Recording], *, by_branch: bool = False) -> Matches:
     """The matched runs of recordings with pressure, contraction and force, by specimen; with `by_branch` each branch of
     a run is matched with its other branches of the same direction, too."""
-    given = [run for run in recordings if len(run) and all(n in run for n in ("pressure", "contraction", "force"))]
+    given = [run for run in recordings if len(run) and all(name in run for name in POINT_COLUMNS)]
     greatest = max((float(np.nanquantile(run["force"], 0.99)) for run in given), default=0.0)
     if not greatest > 0:
         return Matches((), 0.0)
@@ -116,23 +117,18 @@ def match_rows(recordings: Sequence[Recording], *, by_branch: bool = False) -> M
     matched: list[MatchedRuns] = []
     for name in dict.fromkeys(names):
         members = [run for run, own in zip(given, names, strict=True) if own == name]
-        matched += _matched_runs(_blocks(members, greatest, by_branch), members)
+        step = -(-sum(map(len, members)) // MAX_ROWS)
+        blocks = [block for run in members for block in _blocks_of(run, MIN_FORCE * greatest, step, by_branch)]
+        usable = [block for block in blocks if len(block.rows) >= MIN_MATCHES][:MAX_BLOCKS]
+        matched += _matched_runs(_with_residuals(usable), members)
     return Matches(tuple(matched), greatest)
-
-
-def _blocks(recordings: Sequence[Recording], greatest: float, by_branch: bool) -> list[Block]:
-    step, least = -(-sum(map(len, recordings)) // MAX_ROWS), MIN_FORCE * greatest
-    blocks = [block for run in recordings for block in _blocks_of(run, least, step, by_branch)]
-    return _with_residuals([block for block in blocks if len(block.rows) >= MIN_MATCHES][:MAX_BLOCKS])
 
 
 def _blocks_of(recording: Recording, least: float, step: int, by_branch: bool) -> Iterator[Block]:
     """The blocks of a recording: rows of one run, direction and combination of labels; every n-th row."""
-    columns = np.stack([recording[name] for name in ("pressure", "contraction", "force")])
-    complete = np.isfinite(columns).all(axis=0)
-    pulls = complete & (columns[2] > least)
-    if not complete.all():
-        recording, pulls = recording.rows(complete), pulls[complete]
+    complete = np.isfinite(np.stack([recording[name] for name in POINT_COLUMNS])).all(axis=0)
+    recording = recording if complete.all() else recording.rows(complete)
+    pulls = recording["force"] > least
     branches = tuple(b for b in find_branches(recording) if len(b.interval) >= MIN_BRANCH_ROWS)
     keys = [branch_directions(recording, branches), np.full(len(recording), -1.0)]
     for i, run in enumerate(find_runs(recording)):
@@ -153,10 +149,8 @@ def _with_residuals(blocks: list[Block]) -> list[Block]:
     """The blocks with residuals and slopes of the polynomial of all their rows."""
     if not blocks:
         return []
-    p, c, force = (
-        np.concatenate([block.recording[name][block.rows] for block in blocks])
-        for name in ("pressure", "contraction", "force")
-    )
+    columns = ([block.recording[name][block.rows] for block in blocks] for name in POINT_COLUMNS)
+    p, c, force = map(np.concatenate, columns)
     scale = max(float(np.max(np.abs(p))), 1.0)
     (low, high) = float(np.min(c)), float(np.max(c))
     x, y = p / scale, (c - low) / max(high - low, 1e-6)

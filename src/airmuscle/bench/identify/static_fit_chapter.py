@@ -2,7 +2,7 @@
 
 import contextlib
 import dataclasses
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from functools import partial
 from typing import Any, NamedTuple, Protocol
 
@@ -69,25 +69,21 @@ def fit_chapter(
     parameters, correlations = chapter.tables
     violations, title = shape_violations_of_fit(fit), "Monotonicity violations of the fitted law"
     broken = (violation_table(violations, "shape", title),) if violations else ()
+    consistency: list[NamedValue] = []  # of the law with the volume of the muscle
+    if entry.geometry is not None and entry.validity_range is not None:
+        with contextlib.suppress(AirmuscleError):  # slack everywhere, or contractions outside the geometry
+            consistency = defect_values(maxwell_defect(fit.model, entry.geometry, entry.validity_range))
     return dataclasses.replace(
         chapter,
         title=entry.title,
         summary=(*chapter.paragraphs, entry.note, *of_recordings),
-        values=(*chapter.values, *(dataclasses.replace(each, brief=False) for each in _energy_consistency(fit, entry))),
+        values=(*chapter.values, *(dataclasses.replace(each, brief=False) for each in consistency)),
         equations=equations,
         tables=(*symbols, parameters, *broken, correlations, _rows(fit)),
         plots=tuple(plot for plot in plots if plot is not None),
         notes=(*chapter.notes, *notes),
         references=tuple(cite(entry)),
     )
-
-
-def _energy_consistency(fit: Fit, entry: MuscleDescription) -> list[NamedValue]:
-    """The Maxwell defect of the law with the volume of the muscle, if it has one."""
-    if entry.geometry is not None and entry.validity_range is not None:
-        with contextlib.suppress(AirmuscleError):  # slack everywhere, or contractions outside the geometry
-            return defect_values(maxwell_defect(fit.model, entry.geometry, entry.validity_range))
-    return []
 
 
 def _rows(fit: Fit) -> Table:
@@ -113,7 +109,14 @@ def equation_section(fit: Fit) -> tuple[tuple[DisplayedEquation, ...], tuple[Tab
     equations = law_equation(fit.model, quantity.name, quantity.arguments, fit.data_ranges)
     if not equations:
         return (_definition(type(fit.model)),), ()
-    validity = _validity(fit.data_ranges, quantity.arguments)
+    scales = {"pressure": (1e-3, " kPa"), "contraction": (1.0, ""), "force": (1.0, " N")}
+    ranges = []
+    for name in quantity.arguments:
+        (factor, unit), ends = scales[name], fit.data_ranges[name]
+        low, high = (format_number(end * factor) for end in ends)
+        ranges.append(f"{name} {low} to {high}{unit}")
+    span = " and ".join(ranges)
+    validity = f"Valid for {span}, the range of the data; outside it the law may be continued differently."
     shown = tuple(_displayed(equation, f"equation-{i}", validity) for i, equation in enumerate(equations, 1))
     effects, tables = _specimen_effects(fit, validity)
     parameters = equations[0].parameters
@@ -157,16 +160,6 @@ def _displayed(equation: LawEquation, name: str, validity: str) -> DisplayedEqua
     return DisplayedEquation(name, equation.title, tuple(displayed_lines(equation)), note, texts)
 
 
-def _validity(ranges: Mapping[str, tuple[float, float]], arguments: tuple[str, ...]) -> str:
-    scales = {"pressure": (1e-3, " kPa"), "contraction": (1.0, ""), "force": (1.0, " N")}
-    parts = [
-        f"{name} {format_number(ranges[name][0] * factor)} to {format_number(ranges[name][1] * factor)}{unit}"
-        for name in arguments
-        for factor, unit in [scales[name]]
-    ]
-    return f"Valid for {' and '.join(parts)}, the range of the data; outside it the law may be continued differently."
-
-
 def _definition(law: type[Any]) -> DisplayedEquation:
     """Return the definition of a law whose expression has no closed form, or is too long to be shown."""
     text = " ".join((law.__doc__ or law.__name__).split("\n\n")[0].split())
@@ -183,7 +176,7 @@ def ramp_plot(fit: Fit) -> Plot | None:
     if not is_pressure_ramp(data["pressure"], data["contraction"]):
         return None
     lengths = data.columns.get("resting_length")
-    panels: list[float | None] = [None] if lengths is None else [float(x) for x in levels_of(lengths, MAX_PANELS)]
+    panels: list[float | None] = [None] if lengths is None else levels_of(lengths, MAX_PANELS).tolist()
     columns, rows = min(2, len(panels)), -(-len(panels) // 2)
     width, height = (6.3, 3.6) if len(panels) == 1 else (7.4, 2.9 * rows + 0.4)
     figure, axes = plotting.new_figure(rows, columns, width=width, height=height, squeeze=False, sharey=True)

@@ -123,6 +123,7 @@ def default_censoring(law: Characteristic) -> Censoring:
     return Censoring(getattr(law, "min_force", 0.0), getattr(law, "max_force", math.inf))
 
 
+@remembered
 def force_limits(runs: Sequence[Recording]) -> Censoring:
     """The range of the force sensor, where the recordings show a limit at which it saturates.
 
