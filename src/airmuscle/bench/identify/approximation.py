@@ -71,20 +71,18 @@ class ModelApproximation(Reported):
 
     def _band_table(self) -> Table:
         """The errors in intervals of pressure; the maximum force is that of the original."""
-        points, rows = self.check_points, []
+        points, bands = self.check_points, []
         for low, high in itertools.pairwise(np.linspace(*self.validity_range.pressure, BANDS + 1).tolist()):
-            inside = (points["pressure"] >= low) & (points["pressure"] <= high)
-            if inside.any():
-                error, force = points["error"][inside], points["force"][inside]
-                rms, most = float(np.sqrt(np.mean(error**2))), float(np.abs(error).max())
-                rows.append(((low, high), rms, most, float(force.max())))
+            inside = points.rows((points["pressure"] >= low) & (points["pressure"] <= high))
+            if len(inside):
+                bands.append(((low, high), inside["error"], inside["force"]))
         columns: dict[str, Any] = {
-            "pressure": TableColumn([row[0] for row in rows], "Pa", "kPa"),
-            "rms error": TableColumn([row[1] for row in rows], "N"),
-            "maximum error": TableColumn([row[2] for row in rows], "N"),
-            "maximum force": TableColumn([row[3] for row in rows], "N"),
+            "pressure": TableColumn([limits for limits, _, _ in bands], "Pa", "kPa"),
+            "rms error": TableColumn([float(np.sqrt(np.mean(error**2))) for _, error, _ in bands], "N"),
+            "maximum error": TableColumn([float(np.abs(error).max()) for _, error, _ in bands], "N"),
+            "maximum force": TableColumn([float(force.max()) for _, _, force in bands], "N"),
         }
-        return Table("bands", "Errors by pressure", columns, brief=len(rows))
+        return Table("bands", "Errors by pressure", columns, brief=len(bands))
 
 
 def approximate(law: Characteristic, other: Characteristic, validity_range: ValidityRange) -> ModelApproximation:
@@ -95,9 +93,9 @@ def approximate(law: Characteristic, other: Characteristic, validity_range: Vali
     SolveError where `law` gives no positive force on it.
     """
     data = sample_on_grid(law, validity_range, GRID_POINTS)
-    target: Any = other
-    if hasattr(target, "max_force") and target.max_force <= float(data["force"].max()):
-        target = dataclasses.replace(target, max_force=2.0 * float(data["force"].max()))
+    target, most = other, float(data["force"].max())
+    if getattr(target, "max_force", np.inf) <= most:
+        target = dataclasses.replace(target, max_force=2.0 * most)  # type: ignore[type-var]
     model = fit(target, data, censoring=UNCENSORED).model
     check_points = sample_on_grid(law, validity_range, GRID_POINTS + 1)
     predicted = values_or_nan(model.force, check_points["pressure"], check_points["contraction"])
@@ -119,10 +117,8 @@ def approximate(law: Characteristic, other: Characteristic, validity_range: Vali
 
 
 def sample_on_grid(law: Characteristic, validity_range: ValidityRange, count: int) -> Recording:
-    """The forces of a law on a Chebyshev-Lobatto grid of the validity range, `count` points in each direction.
-
-    Points without a positive force are omitted. Raises SolveError where no point is left.
-    """
+    """The forces of a law on a Chebyshev-Lobatto grid of the validity range, `count` points in each direction. Points
+    without a positive force are omitted. Raises SolveError where no point is left."""
     nodes = (1 - np.cos(np.pi * np.arange(count) / (count - 1))) / 2
     (p_low, p_high), (c_low, c_high) = validity_range.pressure, validity_range.contraction
     pressure, contraction = np.meshgrid(p_low + (p_high - p_low) * nodes, c_low + (c_high - c_low) * nodes)

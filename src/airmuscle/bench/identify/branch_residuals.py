@@ -171,9 +171,7 @@ def branch_distance(runs: Sequence[Recording], residuals: Sequence[Array], quant
 
 def branch_notes(runs: Sequence[Recording], distance: float, quantity: str, *, delayed: bool = False) -> list[str]:
     """The remark that the residuals of a fit follow two branches at a distance [SI]; empty without a distance.
-
-    `delayed` is whether a delay of a sensor explains them, so that they are not friction.
-    """
+    `delayed` is whether a delay of a sensor explains them, so that they are not friction."""
     if not distance:
         return []
     unit = QUANTITIES[quantity].unit

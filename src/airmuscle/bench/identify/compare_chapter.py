@@ -120,9 +120,7 @@ def compare_chapter(
     comparison: Comparison, recommended: RankedModel | None = None, reason: str = "", *, figures_of_fit: bool = True
 ) -> Chapter:
     """Return the chapter of a comparison: ranking, exclusions, errors by fold, figures of the recommended fit.
-
-    `recommended` is the law that was selected for several purposes, for the given reason.
-    """
+    `recommended` is the law that was selected for several purposes, for the given reason."""
     fit, chapter = (recommended or comparison.recommended).fit, comparison.chapter()
     joint = () if reason in ("", comparison.reason) else (reason,)
     plots = [Plot("left-out", "Cross-validation error of the laws on each fold.", partial(_fold_figure, comparison))]

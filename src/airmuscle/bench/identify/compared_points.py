@@ -70,9 +70,7 @@ def law_of_length(law: Characteristic, length: float | None, specimen: str = "")
 
 def force_residuals(model: Characteristic, runs: Sequence[Recording], max_force: float) -> Array:
     """Residuals (model - measured) in force [N] at the rows with a positive force, with the law of each run's length.
-
-    `max_force` [N] limits the force of laws that give contraction or pressure.
-    """
+    `max_force` [N] limits the force of laws that give contraction or pressure."""
     rows = evaluated_rows(runs)
     return residuals_of_rows(model, rows.at(rows.measured), max_force)
 
@@ -113,10 +111,8 @@ class ComparedPoints:
 
     @classmethod
     def of(cls, runs: Sequence[Recording], split: GroupSplit, points: FitPoints | None = None) -> "ComparedPoints":
-        """The points divided into the groups of a split; `points` are those of the recordings, if they exist.
-
-        Raises IdentificationError for fewer than two groups.
-        """
+        """The points divided into the groups of a split; `points` are those of the recordings, if they exist. Raises
+        IdentificationError for fewer than two groups."""
         labels, names = label_folds(runs, split)
         joined = np.concatenate(labels)
         fold_of_rows = np.full(joined.size, len(names))
@@ -155,10 +151,8 @@ class ComparedPoints:
         return slack_pull(rows.pressure, rows.contraction, rows.force, modelled, limit, specimen)
 
     def slack_notes(self, model: Characteristic) -> tuple[str, ...]:
-        """A remark where the law is slack at points with a positive force.
-
-        Raises IdentificationError where it gives no force although it is not slack.
-        """
+        """A remark where the law is slack at points with a positive force. Raises IdentificationError where it gives no
+        force although it is not slack."""
         rows, slack, count = self.rows, 0, int(np.count_nonzero(self.rows.measured))
         for i, (length, _) in enumerate(rows.muscles):
             own = rows.at(self.rows.measured & (rows.run == i))

@@ -37,9 +37,7 @@ class RepeatedRows(NamedTuple):
 
 def find_repeated_rows(recordings: Sequence[Recording], columns: Sequence[str]) -> tuple[RepeatedRows, ...]:
     """The stretches of rows whose columns are equal, digit by digit, to those of successive rows of another recording.
-
-    Those of the later recording are given. Equal rows within one recording are not searched.
-    """
+    Those of the later recording are given. Equal rows within one recording are not searched."""
     if len(recordings) < 2:
         return ()
     found = []
@@ -205,9 +203,7 @@ def two_muscle_notes(matches: Matches) -> list[str]:
 
 def _two_groups(runs: Sequence[MatchedRuns], least: float) -> TwoGroups | None:
     """The two levels of force of runs; None unless a gap wider than `least` and three times the scatter divides them.
-
-    The levels, of mean zero where matched rows connect them, solve the relative differences by least squares.
-    """
+    The levels, of mean zero where matched rows connect them, solve the relative differences by least squares."""
     blocks = list({id(b): b for each in runs for b in (each.first, each.second)}.values())
     if len(blocks) < MIN_GROUPED:
         return None

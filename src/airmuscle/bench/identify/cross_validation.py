@@ -174,10 +174,8 @@ class BlockSplit(GroupSplit):
 
 
 def label_folds(recordings: Sequence[Recording], leave_out: GroupSplit) -> tuple[list[Labels], list[str]]:
-    """The label of each row, and the names of the folds in order.
-
-    Raises IdentificationError where there are fewer than two groups.
-    """
+    """The label of each row, and the names of the folds in order. Raises IdentificationError where there are fewer than
+    two groups."""
     labels = leave_out.labels(recordings)
     names = list(dict.fromkeys(str(name) for array in labels for name in dict.fromkeys(array.tolist())))
     names = [name for name in names if name != ALWAYS_FITTED]
@@ -193,10 +191,8 @@ def label_folds(recordings: Sequence[Recording], leave_out: GroupSplit) -> tuple
 
 
 def default_split(recordings: Sequence[Recording], least: int = 3) -> GroupSplit:
-    """The first split with `least` groups or more: specimens, runs, levels of contraction, levels of pressure.
-
-    Raises IdentificationError where there is none.
-    """
+    """The first split with `least` groups or more: specimens, runs, levels of contraction, levels of pressure. Raises
+    IdentificationError where there is none."""
     splits: tuple[GroupSplit, ...] = (SpecimenSplit(), RunSplit(), LevelSplit("contraction"), LevelSplit("pressure"))
     for split in splits:
         if len({name for array in split.labels(recordings) for name in array.tolist()}) >= least:

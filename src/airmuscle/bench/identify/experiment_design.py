@@ -53,10 +53,8 @@ class BenchLimits:
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class PlannedRun:
-    """A static run: `constant` names the quantity that is kept constant while the other is swept.
-
-    The columns are gauge pressure [Pa], contraction [1] and the expected force [N], shape (points,) each.
-    """
+    """A static run: `constant` names the quantity that is kept constant while the other is swept. The columns are gauge
+    pressure [Pa], contraction [1] and the expected force [N], shape (points,) each."""
 
     constant: str
     pressure: Array

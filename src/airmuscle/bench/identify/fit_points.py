@@ -155,11 +155,9 @@ def _columns_at_levels(recording: Recording) -> tuple[dict[str, Array], dict[str
 
 
 def _may_be_constant(values: Array, band: float) -> bool:
-    """Whether the values, but for one at each end, of some `MIN_ROWS_OF_RUN` consecutive rows fit into a band.
-
-    It is necessary for a run at a level, and quickly answered for single points: up to 101 rows have at most one value
-    at each end outside the band of 98 %, and longer runs have as many rows in succession without any.
-    """
+    """Whether the values, but for one at each end, of some `MIN_ROWS_OF_RUN` consecutive rows fit into a band. It is
+    necessary for a run at a level, and quickly answered for single points: up to 101 rows have at most one value at
+    each end outside the band of 98 %, and longer runs have as many rows in succession without any."""
     if not MIN_ROWS_OF_RUN <= len(values) <= _MAX_ROWS_OF_POINTS:
         return len(values) > _MAX_ROWS_OF_POINTS
     # Ten rows of twelve are in the band, and so at least four in succession.

@@ -109,11 +109,9 @@ def _evaluate(problem: FitProblem, values: Array) -> _Point:
 
 
 def _linearise(problem: FitProblem, point: _Point, jacobian: Array, basis: StepBasis | None) -> _Linearisation | None:
-    """The normal equations of the parameters that are not held on a bound; None for redundant parameters.
-
-    A parameter on a bound is held where the gradient or the step of all free parameters points outwards: a step that
-    the bound cuts off, along a narrow valley, would make no progress in the others.
-    """
+    """The normal equations of the parameters that are not held on a bound; None for redundant parameters. A parameter
+    on a bound is held where the gradient or the step of all free parameters points outwards: a step that the bound cuts
+    off, along a narrow valley, would make no progress in the others."""
     matrix = (problem.weights * problem.active_rows(point.modelled))[:, None] * jacobian
     free = ~held_on_bounds(problem, point.values, matrix.T @ point.residuals)
     linear = _in_basis(matrix, point, free, basis)

@@ -92,10 +92,8 @@ _MAX_ITERATIONS = 30
 
 
 class KnownMinima:
-    """Parameters found for other multiplicities of the groups, with the sum of squares of each group.
-
-    The best of them for given multiplicities is close to the minimum where the minima lie far apart along a valley.
-    """
+    """Parameters found for other multiplicities of the groups, with the sum of squares of each group. The best of them
+    for given multiplicities is close to the minimum where the minima lie far apart along a valley."""
 
     def __init__(self, problem: FitProblem, values: Array, group: RowIndices, count: int) -> None:
         self._problem, self._group, self._count = problem, group, count
@@ -164,10 +162,8 @@ class GroupRefits:
         return None if solution is None else solution.values
 
     def _solve_linear(self, counts: Array, step: Array, normal: Array, gradient: Array) -> Array | None:
-        """Newton steps of the one-sided squares: the rows whose bound is violated are those of the previous step.
-
-        The normal equations of the rows that are active in the fit to all rows are corrected for those that change.
-        """
+        """Newton steps of the one-sided squares: the rows whose bound is violated are those of the previous step. The
+        normal equations of the rows that are active in the fit to all rows are corrected for those that change."""
         assert self._basis is not None
         problem, solution, directions = self._problem, self._solution, self._basis.directions
         if not problem.censoring.any():

@@ -70,9 +70,7 @@ class UndeterminedCombination:
 @dataclasses.dataclass(frozen=True, eq=False)
 class Identifiability:
     """Singular value decomposition of the scaled sensitivity matrix, and the undetermined combinations.
-
-    `singular_values` are in decreasing order, `right_singular_vectors` are rows.
-    """
+    `singular_values` are in decreasing order, `right_singular_vectors` are rows."""
 
     singular_values: Array
     right_singular_vectors: Array
@@ -102,10 +100,8 @@ class Identifiability:
 
 
 def singular_vectors(matrix: Array) -> tuple[Array, Array]:
-    """The singular values (P,) and the right singular vectors (P, P), one a row, of a matrix (R, P).
-
-    R of the QR factorisation of a tall matrix has the same ones, at less cost; of a wide matrix the last values are 0.
-    """
+    """The singular values (P,) and the right singular vectors (P, P), one a row, of a matrix (R, P). R of the QR
+    factorisation of a tall matrix has the same ones, at less cost; of a wide matrix the last values are 0."""
     triangle = np.linalg.qr(matrix, mode="r")
     missing = np.zeros((matrix.shape[1] - len(triangle), matrix.shape[1]))
     _, singular, vectors = np.linalg.svd(np.vstack([triangle, missing]))

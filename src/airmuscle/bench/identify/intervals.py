@@ -87,10 +87,8 @@ class ProfileLikelihood:
 
 
 def weakly_determined(fit: Fit) -> tuple[str, ...]:
-    """Names of the parameters whose standard error is not reliable.
-
-    These are highly correlated with another parameter or, in a nonlinear fit, have a large relative standard error.
-    """
+    """Names of the parameters whose standard error is not reliable. These are highly correlated with another parameter
+    or, in a nonlinear fit, have a large relative standard error."""
     correlation = fit.parameter_covariance.greatest_correlations()
     nonlinear = not is_linear(fit.problem)  # in a linear fit a standard error is exact, however large
     return tuple(

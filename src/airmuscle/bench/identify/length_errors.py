@@ -57,9 +57,7 @@ class LengthError(ShortRepr):
 
     def explains(self, separate_rmse: float) -> bool:
         """Whether the correction exceeds three standard errors and explains the misfit of one law for all specimens.
-
-        `separate_rmse` is the root mean square residual of separate fits of the specimens.
-        """
+        `separate_rmse` is the root mean square residual of separate fits of the specimens."""
         excess = self.rmse_before**2 - separate_rmse**2
         explained = self.rmse_before**2 - self.rmse_after**2 >= MIN_EXPLAINED * excess
         significant = abs(self.offset) > MIN_STANDARD_ERRORS * self.standard_error
@@ -87,10 +85,8 @@ def length_notes(errors: Sequence[LengthError]) -> tuple[str, ...]:
 
 
 def corrected_length(run: Recording, offset: float) -> Recording:
-    """The recording with a resting length that is greater by `offset` [m] at the same shortening.
-
-    Raises ParameterError where the recording states no resting length, or the corrected one is not positive.
-    """
+    """The recording with a resting length that is greater by `offset` [m] at the same shortening. Raises ParameterError
+    where the recording states no resting length, or the corrected one is not positive."""
     length = run.constants.get("resting_length")
     if length is None or not float(length) + offset > 0:
         raise ParameterError(

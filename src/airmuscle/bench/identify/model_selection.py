@@ -93,10 +93,8 @@ def is_equivalent(model: RankedModel, best: RankedModel) -> bool:
 
 
 def is_contradicted(model: RankedModel, best: RankedModel) -> bool:
-    """Whether there are few folds and AICc on the rows of the fit gives a law no support against the best one.
-
-    The rows count with their effective number, because their residuals are correlated.
-    """
+    """Whether there are few folds and AICc on the rows of the fit gives a law no support against the best one. The rows
+    count with their effective number, because their residuals are correlated."""
     if len(best.fold_scores) >= MIN_FOLDS:
         return False
     own, other = (aicc(each.in_sample_rmse**2, best.effective_rows, each.parameter_count) for each in (model, best))

@@ -72,10 +72,8 @@ class Groups(NamedTuple):
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class ParameterCovariance:
-    """Covariance of P parameters, and of any combination of them.
-
-    These are all fitted parameters, or those that are not on a bound where the rows do not determine all.
-    """
+    """Covariance of P parameters, and of any combination of them. These are all fitted parameters, or those that are
+    not on a bound where the rows do not determine all."""
 
     parameters: Mask
     """Mask of the P parameters among all fitted ones, whose number is Q."""
@@ -266,11 +264,9 @@ def _split(rows: Array, group: Indices) -> list[Array]:
 
 
 def _degrees_of_freedom(groups: Groups, rows: Array) -> Array:
-    """tr(M)^2/tr(M^2) of the quadratic forms M (G, G) in independent errors, for combinations (K, P): 1 to G.
-
-    The upper bound is that of the rank of M, which rounding in tr(M^2) would exceed. With u_g = H_g (I - H_g)^-1/2 a
-    and m_g = a^T H_g a it is M = diag(m_g + |u_g|^2) - U U^T.
-    """
+    """tr(M)^2/tr(M^2) of the quadratic forms M (G, G) in independent errors, for combinations (K, P): 1 to G. The upper
+    bound is that of the rank of M, which rounding in tr(M^2) would exceed. With u_g = H_g (I - H_g)^-1/2 a and m_g =
+    a^T H_g a it is M = diag(m_g + |u_g|^2) - U U^T."""
     projected = np.einsum("gij,kj->kgi", groups.adjusted, rows, optimize=True)
     shares = np.einsum("ki,gij,kj->kg", rows, groups.leverages, rows, optimize=True)
     products = np.swapaxes(projected, 1, 2) @ projected

@@ -86,9 +86,7 @@ class EffectRows(NamedTuple):
 @dataclasses.dataclass(frozen=True, eq=False)
 class PooledCovariance:
     """Covariance of the errors of the P population parameters and, after them, of the S K coefficients of the effects.
-
-    T = P + S K; G groups of rows, between which the errors are independent.
-    """
+    T = P + S K; G groups of rows, between which the errors are independent."""
 
     by_effects: Array
     """Errors of the estimates for an effect of one standard deviation, shape (T, S K)."""
@@ -109,6 +107,11 @@ class PooledCovariance:
     def matrix(self) -> Array:
         """The covariance, shape (T, T); an interval has the half width of `half_widths`."""
         return np.asarray(self.by_effects @ self.by_effects.T + self._factor * self.shifts.T @ self.shifts)
+
+    @functools.cached_property
+    def standard_errors(self) -> Array:
+        """Standard errors (T,) of the estimates: 1.96 of them are the half width of a 95 % interval."""
+        return self.half_widths(np.eye(len(self.by_rows)), 0.95) / rows_of.NORMAL_QUANTILE
 
     def half_widths(self, combinations: Array, level: float, scatter: Array | float = 0.0) -> Array:
         """Half widths (N,) of the intervals of combinations (N, T) of the estimates at a confidence level.

@@ -14,7 +14,7 @@ from .candidates import UNREACHED_FORCE
 from .cross_validation import specimen_name
 from .fit_points import FitPoints
 from .model_evidence import batch_sample_size
-from .parameter_covariance import Runs
+from .parameter_covariance import Runs, normalised
 from .pooled_covariance import EffectRows, PooledCovariance, estimate_pooled_covariance
 from .problem import RESTING_LENGTH, SPECIMEN, FitProblem, evaluate, of_length
 from .result import Fit
@@ -35,32 +35,6 @@ class Specimens(NamedTuple):
     names: tuple[str, ...]
     lengths: tuple[float, ...]
     member: npt.NDArray[np.intp]
-
-    @classmethod
-    def of(cls, points: FitPoints) -> "Specimens":
-        """The specimens of the complete rows.
-
-        Raises IdentificationError for fewer than two, or a resting length that is missing or has two values.
-        """
-        names, lengths = [specimen_name(run) for run in points.recordings], dict[str, float]()
-        for run, name in zip(points.recordings, names, strict=True):
-            stated = run.constants.get(RESTING_LENGTH)
-            if stated is None or abs(lengths.setdefault(name, float(stated)) - float(stated)) > 1e-6:
-                what = f"two resting lengths, {lengths[name]:g} and {stated:g} m" if stated else "no resting length"
-                raise IdentificationError(
-                    f"{run.origin}: specimen {name} has {what}. State one resting length for each specimen, or "
-                    "different names of specimens.",
-                    cause=f"specimen {name} has {what}",
-                )
-        if len(lengths) < 2:
-            raise IdentificationError(
-                f"{points.joined.origin}: partial pooling needs two specimens or more, but there is one, "
-                f"{names[0] if names else 'none'}. Give recordings of several muscles of the type, or a law of one.",
-                cause="it needs recordings of two specimens or more",
-            )
-        order = list(lengths)
-        member = np.repeat([order.index(name) for name in names], [len(run) for run in points.recordings])
-        return cls(tuple(order), tuple(lengths.values()), member[~points.missing])
 
 
 class PredictedEffects(NamedTuple):
@@ -138,10 +112,9 @@ class Pooling:
         region = steps.region(surface.min_pressure, surface.max_contraction)
         law = tree.with_parameters(problem.law, problem.leaf_values(values))
         modelled = np.asarray(of_length(law, self.specimens.lengths[index]).unclamped_force(*region))
-        count = modelled.size
-        equal = np.full(count, np.sqrt(float(weights @ weights) / max(count, 1)))
+        equal = np.full(modelled.size, np.sqrt(float(weights @ weights) / max(modelled.size, 1)))
         basis = _decayed(np.array(surface.basis(*region)).T, modelled, predicted.decay)
-        return BoundedRows(basis, -modelled, np.ones(count), equal)
+        return BoundedRows(basis, -modelled, np.ones(modelled.size), equal)
 
     def covariance(self, values: Array, predicted: PredictedEffects, runs: Runs) -> PooledCovariance:
         """The covariance of the errors of the population parameters (P,) and of the effects predicted for them."""
@@ -153,8 +126,9 @@ class Pooling:
         left = (problem.target - modelled)[used] - np.sum(basis[used] * effects.coefficients[member], axis=1)
         matrix, basis, count = weights[:, None] * matrix[used], weights[:, None] * basis[used], len(effects.specimens)
         rows = EffectRows(matrix, basis, weights * left, member, count)
-        scatter = effects.deviation, effects.degrees_of_freedom
-        return estimate_pooled_covariance(rows, runs.rows(used), predicted.ratio, *scatter)
+        return estimate_pooled_covariance(
+            rows, runs.rows(used), predicted.ratio, effects.deviation, effects.degrees_of_freedom
+        )
 
     @functools.cached_property
     def _design(self) -> tuple[Array, Array]:
@@ -165,18 +139,36 @@ class Pooling:
         limits: dict[str, Any] = {"min_force": -UNREACHED_FORCE, "max_force": UNREACHED_FORCE}
         rows, surface = predicted.effects.coefficients.tolist(), predicted.surface
         effects = tuple(dataclasses.replace(surface, coefficients=tuple(row), **limits) for row in rows)
-        names, lengths = self.specimens.names, self.specimens.lengths
-        return PooledLengthLaw(population, effects, names, lengths, effect_decay=predicted.decay)
+        return PooledLengthLaw(population, effects, *self.specimens[:2], effect_decay=predicted.decay)
 
 
 def check_poolable(law: PooledLengthLaw, points: FitPoints) -> Specimens:
-    """The specimens of the points. Raises IdentificationError for fewer than two, or an effect that is no surface."""
+    """The specimens of the complete rows. Raises IdentificationError for fewer than two, a resting length that is
+    missing or has two values, or an effect that is no surface."""
     if not isinstance(law.effects[0], ContractileSurface):
         raise IdentificationError(
             f"{points.joined.origin}: the effects of a PooledLengthLaw are {type(law.effects[0]).__name__}; only those "
             "of a ContractileSurface can be fitted. Give ContractileSurface.blank(2)."
         )
-    return Specimens.of(points)
+    names, lengths = [specimen_name(run) for run in points.recordings], dict[str, float]()
+    for run, name in zip(points.recordings, names, strict=True):
+        stated = run.constants.get(RESTING_LENGTH)
+        if stated is None or abs(lengths.setdefault(name, float(stated)) - float(stated)) > 1e-6:
+            what = f"two resting lengths, {lengths[name]:g} and {stated:g} m" if stated else "no resting length"
+            raise IdentificationError(
+                f"{run.origin}: specimen {name} has {what}. State one resting length for each specimen, or different "
+                "names of specimens.",
+                cause=f"specimen {name} has {what}",
+            )
+    if len(lengths) < 2:
+        raise IdentificationError(
+            f"{points.joined.origin}: partial pooling needs two specimens or more, but there is one, "
+            f"{names[0] if names else 'none'}. Give recordings of several muscles of the type, or a law of one.",
+            cause="it needs recordings of two specimens or more",
+        )
+    order = list(lengths)
+    member = np.repeat([order.index(name) for name in names], [len(run) for run in points.recordings])
+    return Specimens(tuple(order), tuple(lengths.values()), member[~points.missing])
 
 
 def make_pooling(law: PooledLengthLaw, points: FitPoints, problem: FitProblem) -> Pooling:
@@ -194,16 +186,16 @@ def pool(law: PooledLengthLaw, population: Fit, points: FitPoints) -> Fit:
     pooling = make_pooling(law, points, population.problem)
     predicted = pooling.predict(population.values)
     covariance = pooling.covariance(population.values, predicted, points.runs)
-    effects = dataclasses.replace(predicted.effects, covariance=covariance)
+    effects, count = dataclasses.replace(predicted.effects, covariance=covariance), len(population.estimates)
     model = pooling.law(population.model, predicted)
     data = population.recording.with_columns(**{SPECIMEN: pooling.specimens.member.astype(float)})
     modelled = evaluate(model, "force", population.fitted_quantity.arguments, data)
-    estimates = zip(population.estimates, effects.population_errors.tolist(), strict=True)
+    estimates = zip(population.estimates, covariance.standard_errors[:count].tolist(), strict=True)
     return dataclasses.replace(
         population,
         model=model,
         estimates=tuple(dataclasses.replace(each, stderr=error) for each, error in estimates),
-        correlations=effects.population_correlations,
+        correlations=normalised(covariance.matrix[:count, :count]),
         sigma=effects.sigma,
         recording=data,
         effects=effects,
@@ -226,14 +218,14 @@ def pooled_band(fit: Fit, points: Recording, jacobian: Array, level: float) -> t
     length = points.constants.get(RESTING_LENGTH)
     law = of_length(model.population, None if length is None else float(length))
     basis = np.array(surface.basis(*state)).T * np.asarray(model.effect_share(law.unclamped_force(*state)))[:, None]
-    name, (count, size) = specimen_name(points), effects.coefficients.shape
-    gradient = np.hstack([jacobian, np.zeros((len(points), count * size))])
-    offset, scatter = np.zeros(len(points)), effects.deviation**2 * np.sum(basis**2, axis=1)
+    name, nothing = specimen_name(points), np.zeros(len(points))
+    by_specimen = np.zeros((len(points), *effects.coefficients.shape))
+    offset, scatter = nothing, effects.deviation**2 * np.sum(basis**2, axis=1)
     if name in effects.specimens:
         index = effects.specimens.index(name)
-        start = jacobian.shape[1] + index * size
-        gradient[:, start : start + size] = basis
-        offset, scatter = basis @ effects.coefficients[index], np.zeros(len(points))
+        by_specimen[:, index] = basis
+        offset, scatter = basis @ effects.coefficients[index], nothing
+    gradient = np.hstack([jacobian, by_specimen.reshape(len(points), -1)])
     return offset, effects.covariance.half_widths(gradient, level, scatter)
 
 

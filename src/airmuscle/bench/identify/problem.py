@@ -218,10 +218,8 @@ class FitProblem:
         return LeastSquaresSolution(values, self.predict(values), self.jacobian(values))
 
     def jacobian(self, values: Array, which: Sequence[int] | None = None) -> Array:
-        """Derivatives of `predict` with respect to the free parameters, or to these ones, shape (N, P).
-
-        Exact if the law is traceable, otherwise by central differences.
-        """
+        """Derivatives of `predict` with respect to the free parameters, or to these ones, shape (N, P). Exact if the
+        law is traceable, otherwise by central differences."""
         which = range(len(self.free)) if which is None else which
         if all(autodiff.is_traceable(type(part)) for _, part in parts_of(self.law)):
             leaves, method = [self.free[i] for i in which], self.fitted_quantity.method
@@ -239,10 +237,8 @@ class FitProblem:
 def make_problem(
     law: Characteristic, data: Recording, censoring: Censoring, weights: Array, fixed: Collection[str]
 ) -> FitProblem:
-    """The problem of fitting a law to data points; `fixed` names parameters that are not fitted.
-
-    Raises IdentificationError where there are too few rows, ParameterError for an unknown name.
-    """
+    """The problem of fitting a law to data points; `fixed` names parameters that are not fitted. Raises
+    IdentificationError where there are too few rows, ParameterError for an unknown name."""
     quantity = fitted_quantity_of(law)
     signs = censoring.signs(data["force"])
     target = data[quantity.name]

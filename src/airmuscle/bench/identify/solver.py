@@ -112,11 +112,9 @@ def solve_iteratively(problem: FitProblem, loss: Loss, start: Array) -> LeastSqu
 
 
 def _is_converged(result: Any) -> bool:
-    """Whether the residuals are nearly orthogonal to the tangent space, though the search has not stopped.
-
-    With redundant parameters it moves on without converging. The criterion is the relative offset of Bates and Watts,
-    Technometrics 23:179 (1981).
-    """
+    """Whether the residuals are nearly orthogonal to the tangent space, though the search has not stopped. With
+    redundant parameters it moves on without converging. The criterion is the relative offset of Bates and Watts,
+    Technometrics 23:179 (1981)."""
     norms = np.linalg.norm(result.jac, axis=0)
     norms[norms == 0] = 1.0
     projection = np.linalg.lstsq((result.jac / norms).T, result.grad / norms, rcond=_SINGULAR_TOLERANCE)[0]

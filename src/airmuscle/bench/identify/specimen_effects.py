@@ -16,7 +16,6 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core import Array
-from .parameter_covariance import NORMAL_QUANTILE, normalised
 from .pooled_covariance import PooledCovariance, Sums
 from .variable_projection import shortened_step
 
@@ -25,10 +24,8 @@ _MAX_ITERATIONS = 100
 
 
 class BoundedRows(NamedTuple):
-    """Rows of one specimen: basis (N, K) of its effect, values (N,) that it should have, sides and weights (N,).
-
-    The side is 0 for a value, 1 for an upper and -1 for a lower bound.
-    """
+    """Rows of one specimen: basis (N, K) of its effect, values (N,) that it should have, sides and weights (N,). The
+    side is 0 for a value, 1 for an upper and -1 for a lower bound."""
 
     basis: Array
     values: Array
@@ -88,27 +85,11 @@ class SpecimenEffects:
     covariance: PooledCovariance | None = None
     """That of the errors of population parameters and coefficients; None where only the law was asked for."""
 
-    @functools.cached_property
-    def _all_errors(self) -> Array:
-        assert self.covariance is not None
-        return self.covariance.half_widths(np.eye(len(self.covariance.by_rows)), 0.95) / NORMAL_QUANTILE
-
     @property
     def standard_errors(self) -> Array:
         """Standard errors of the predicted coefficients, shape (S, K): 1.96 of them are half a 95 % interval."""
-        return self._all_errors[-self.coefficients.size :].reshape(self.coefficients.shape)
-
-    @property
-    def population_errors(self) -> Array:
-        """The same of the population parameters, with the scatter of the specimens, shape (P,)."""
-        return self._all_errors[: -self.coefficients.size]
-
-    @property
-    def population_correlations(self) -> Array:
-        """Correlations of the errors of the population parameters, shape (P, P)."""
         assert self.covariance is not None
-        size = len(self.population_errors)
-        return normalised(self.covariance.matrix[:size, :size])
+        return self.covariance.standard_errors[-self.coefficients.size :].reshape(self.coefficients.shape)
 
 
 def predict_effects(sums: Sums, specimens: tuple[str, ...]) -> SpecimenEffects:
@@ -130,9 +111,8 @@ def predict_effects(sums: Sums, specimens: tuple[str, ...]) -> SpecimenEffects:
 
 def _variance_ratio(within: Array, gradient: Array, squares: float, freedom: float) -> tuple[float, float]:
     """The ratio of variances with the largest restricted likelihood, and the standard deviation of the residuals.
-
-    `within` and `gradient` are the normal matrix and the right-hand side of the effects, orthogonal to the population.
-    """
+    `within` and `gradient` are the normal matrix and the right-hand side of the effects, orthogonal to the
+    population."""
     eigenvalues, vectors = np.linalg.eigh(within)
     eigenvalues = np.maximum(eigenvalues, 0.0)[:, None]
     components = ((vectors.T @ gradient) ** 2)[:, None]

@@ -47,10 +47,8 @@ class SpecimenErrors:
 
     @property
     def odd(self) -> tuple[str, float, float] | None:
-        """The specimen that does not follow the others, its rms error, and the median of those of the others [N].
-
-        None unless there are four specimens or more and the greatest error exceeds `ODD_RATIO` times that median.
-        """
+        """The specimen that does not follow the others, its rms error, and the median of those of the others [N]. None
+        unless there are four specimens or more and the greatest error exceeds `ODD_RATIO` times that median."""
         worst = int(np.argmax(self.rms))
         median = float(np.median(np.delete(self.rms, worst))) if len(self.rms) >= MIN_JUDGED else math.inf
         return (self.names[worst], self.rms[worst], median) if self.rms[worst] > ODD_RATIO * median else None
@@ -99,10 +97,8 @@ def resting_lengths_of(recordings: Sequence[Recording]) -> dict[str, float]:
 
 
 def specimen_errors(fit: Fit, recordings: Sequence[Recording], fixed: tuple[str, ...] = ()) -> SpecimenErrors | None:
-    """The errors of the specimens left out of a fit, by refits from its parameters; `fixed` are those kept fixed.
-
-    None for fewer than three specimens, or where the others do not determine the law.
-    """
+    """The errors of the specimens left out of a fit, by refits from its parameters; `fixed` are those kept fixed. None
+    for fewer than three specimens, or where the others do not determine the law."""
     if len(specimens_of(recordings)) < MIN_MEMBERS:
         return None
     try:

@@ -151,10 +151,8 @@ def refit(
 def examine(
     points: FitPoints, problem: FitProblem, solution: LeastSquaresSolution, by_recording: Array | None, fit: Fit
 ) -> Remarks:
-    """The remarks on a fit and its points; `by_recording` are the standard deviations of sensors that differ.
-
-    Those on the solution of `problem`, and the branches of its residuals, are for a pooled law those of its population.
-    """
+    """The remarks on a fit and its points; `by_recording` are the standard deviations of sensors that differ. Those on
+    the solution of `problem`, and the branches of its residuals, are for a pooled law those of its population."""
     checks, quantity = points.checks, problem.fitted_quantity
     residuals = np.full(len(points.joined), np.nan)
     differences = solution.modelled - problem.data[quantity.name]

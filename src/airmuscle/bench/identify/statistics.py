@@ -119,10 +119,8 @@ class Estimate:
 
 
 def fit_statistics(problem: FitProblem, solution: LeastSquaresSolution, loss: Loss, runs: Runs) -> dict[str, Any]:
-    """Estimates and their covariance, rank and condition of a solution, as fields of a `Fit`.
-
-    Raises IdentificationError where the design matrix is rank-deficient.
-    """
+    """Estimates and their covariance, rank and condition of a solution, as fields of a `Fit`. Raises
+    IdentificationError where the design matrix is rank-deficient."""
     design, active = check_determined(problem, solution), problem.active_rows(solution.modelled)
     low, high = problem.bounds_reached(solution.values)
     on_bound = low | high
@@ -162,9 +160,7 @@ def check_determined(problem: FitProblem, solution: LeastSquaresSolution) -> "_D
 
 def check_determined_by_levels(problem: FitProblem, solution: LeastSquaresSolution, at_levels: Recording) -> None:
     """Raise IdentificationError where only the noise or ripple of a constant quantity determines the parameters.
-
-    `at_levels` are the data of the problem with the constant quantity of each run at its level.
-    """
+    `at_levels` are the data of the problem with the constant quantity of each run at its level."""
     data, arguments = problem.data, problem.fitted_quantity.arguments
     if at_levels is data or all(np.array_equal(at_levels[name], data[name]) for name in arguments):
         return

@@ -109,10 +109,8 @@ def is_linear_parameter(problem: FitProblem) -> npt.NDArray[np.bool_]:
 
 
 def find_initial_values(problem: FitProblem, multi_start: bool = True) -> Array:
-    """The best free parameters by variable projection, shape (P,); the given ones where none are better.
-
-    Without `multi_start` there is one search, from the given parameters.
-    """
+    """The best free parameters by variable projection, shape (P,); the given ones where none are better. Without
+    `multi_start` there is one search, from the given parameters."""
     linear = is_linear_parameter(problem)
     if linear.all() or not linear.any():
         return problem.initial_values

@@ -32,10 +32,8 @@ class Loss(abc.ABC):
             )
 
     def limit(self, residuals: Array) -> float:
-        """The magnitude to which residuals (N,) are limited in errors of a robust fit; infinite for least squares.
-
-        It is six robust standard deviations, 1.4826 times the median magnitude, and at least `scale` (chosen).
-        """
+        """The magnitude to which residuals (N,) are limited in errors of a robust fit; infinite for least squares. It
+        is six robust standard deviations, 1.4826 times the median magnitude, and at least `scale` (chosen)."""
         return max(self.scale, ROBUST_LIMIT * 1.4826 * float(np.median(np.abs(residuals))))
 
     @abc.abstractmethod
@@ -113,11 +111,8 @@ UNCENSORED = Censoring(-math.inf, math.inf)
 
 
 def default_censoring(law: Characteristic) -> Censoring:
-    """The range of force to which a force law is clamped, from zero if it has no clamp.
-
-    Laws that give contraction or pressure are measured with suspended loads, of which zero is an ordinary value: no
-    row is censored.
-    """
+    """The range of force to which a force law is clamped, from zero if it has no clamp. Laws that give contraction or
+    pressure are measured with suspended loads, of which zero is an ordinary value: no row is censored."""
     if not isinstance(law, ForceLaw):
         return UNCENSORED
     return Censoring(getattr(law, "min_force", 0.0), getattr(law, "max_force", math.inf))
@@ -125,11 +120,8 @@ def default_censoring(law: Characteristic) -> Censoring:
 
 @remembered
 def force_limits(runs: Sequence[Recording]) -> Censoring:
-    """The range of the force sensor, where the recordings show a limit at which it saturates.
-
-    The limits are estimated only if every recording has a time column and all come from one test rig; otherwise the
-    range is unlimited.
-    """
+    """The range of the force sensor, where the recordings show a limit at which it saturates. The limits are estimated
+    only if every recording has a time column and all come from one test rig; otherwise the range is unlimited."""
     timed = bool(runs) and all("time" in run.columns and "force" in run.columns and len(run) for run in runs)
     if not timed or sensor_deviations(runs, "force") is not None:
         return UNCENSORED

@@ -106,10 +106,8 @@ class Conditioning:
 
     @classmethod
     def from_design_matrix(cls, matrix: Array) -> "Conditioning":
-        """Of a design matrix (N, coefficients), exact also beyond 1e16, where singular values are lost in rounding.
-
-        The pseudo-inverse is computed with columns of unit norm, and its rows are scaled back by the norms.
-        """
+        """Of a design matrix (N, coefficients), exact also beyond 1e16, where singular values are lost in rounding. The
+        pseudo-inverse is computed with columns of unit norm, and its rows are scaled back by the norms."""
         norms = np.linalg.norm(matrix, axis=0)
         normalised = matrix / np.where(norms > 0, norms, 1.0)
         rank, size = int(np.linalg.matrix_rank(normalised)), matrix.shape[1]
@@ -170,10 +168,8 @@ class SurfaceProblem:
     def from_recording(
         cls, recording: Recording, saturation: float, pressure_degree: int, force_degree: int
     ) -> "SurfaceProblem":
-        """The problem for the points of a recording.
-
-        Raises IdentificationError for non-finite values, too few rows, or a pressure or force that does not vary.
-        """
+        """The problem for the points of a recording. Raises IdentificationError for non-finite values, too few rows, or
+        a pressure or force that does not vary."""
         for name in ("pressure", "force", "contraction"):
             bad = np.flatnonzero(~np.isfinite(recording[name]))
             if bad.size:

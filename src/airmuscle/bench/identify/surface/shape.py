@@ -121,10 +121,8 @@ class MonotonicityViolation:
 def find_violations(
     law: Any, rules: Sequence[MonotonicityRule], pressure: Array, second_argument: Array
 ) -> tuple[MonotonicityViolation, ...]:
-    """The regions where exact slopes at grid points violate one of the rules, largest first.
-
-    `pressure` [Pa] and `second_argument` (contraction [1] or force [N]) are grids, shape (N, M) each.
-    """
+    """The regions where exact slopes at grid points violate one of the rules, largest first. `pressure` [Pa] and
+    `second_argument` (contraction [1] or force [N]) are grids, shape (N, M) each."""
     from scipy import ndimage
 
     violations: list[MonotonicityViolation] = []
@@ -193,9 +191,7 @@ def fit_monotone(
 
 def slope_constraints(pressure_degree: int, force_degree: int, cells: tuple[int, int]) -> Array:
     """Rows g: v with Chebyshev coefficients c falls with p and rises with F on the validity range if all g @ c >= 0.
-
-    The condition is sufficient; on small `cells` in pressure and force it is nearly necessary.
-    """
+    The condition is sufficient; on small `cells` in pressure and force it is nearly necessary."""
     by_pressure, by_force = slope_rows(chebyshev.chebvander, _chebyshev_slopes, (pressure_degree, force_degree), cells)
     return np.vstack([-by_pressure, by_force])
 
@@ -212,10 +208,8 @@ LEAST_SHARE = 1e-3
 def find_shape_violations(
     law: ForceLaw, validity_range: ValidityRange, *, points: int = 101
 ) -> tuple[MonotonicityViolation, ...]:
-    """The regions of a validity range where a force falls with pressure or rises with contraction, largest first.
-
-    Exact slopes are evaluated on an even grid of `points` pressures and contractions.
-    """
+    """The regions of a validity range where a force falls with pressure or rises with contraction, largest first. Exact
+    slopes are evaluated on an even grid of `points` pressures and contractions."""
     check_whole("find_shape_violations", "points", points, 2)
     sides = (np.linspace(*validity_range.pressure, points), np.linspace(*validity_range.contraction, points))
     return find_violations(law, (FORCE_FALLS, RISES_WITH_CONTRACTION), *np.meshgrid(*sides, indexing="ij"))
