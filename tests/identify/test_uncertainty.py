@@ -27,7 +27,7 @@ from airmuscle.bench import (
     weakly_determined,
 )
 from airmuscle.bench.identify import blank_surface
-from airmuscle.bench.identify.bootstrapping import _assign_groups, _refit_iteratively
+from airmuscle.bench.identify.bootstrapping import _refit_iteratively
 from airmuscle.errors import IdentificationError
 from airmuscle.physics import Braid, ContractileSurface, Sarosi2012, TonduLopez2000
 from airmuscle.recording import Recording
@@ -112,7 +112,8 @@ def test_refits_at_once_are_refits_one_by_one():
     runs = experiment(1)
     found = fit(blank_surface(2, 4000), runs)
     drawn = bootstrap(found, runs, refits=40, by=RunSplit(), seed=3)
-    which, count = _assign_groups(found, runs, RunSplit())
+    names, which = np.unique(np.concatenate(RunSplit().labels(runs)), return_inverse=True)
+    count = names.size
     times = np.random.default_rng(3).multinomial(count, np.full(count, 1 / count), size=40).astype(float)
     none_known = np.empty((0, len(found.values)))
     expected = _refit_iteratively((found, which, none_known, None), times)

@@ -10,10 +10,9 @@ import numpy as np
 from ...core import AirmuscleError, Array, tree
 from ...engine.distribution import DistributedCalls
 from ...engine.processes import Workers, process_pool
-from ...physics.muscle.characteristic import Characteristic, PooledLengthLaw
+from ...physics.muscle.characteristic import PooledLengthLaw
 from .candidates import Candidate, ExcludedModel
 from .compared_points import ComparedPoints, cause_of, residuals_of_rows
-from .fit_points import FitPoints
 from .model_evidence import aicc, effective_sample_size
 from .pooling import population_of
 from .problem import FORCE, fitted_quantity_of
@@ -92,7 +91,13 @@ def score_candidate(
 ) -> tuple[Score, ...]:
     """The scores of a candidate for each split; without further folds above `limits` [N], if there are any."""
     try:
-        own_loss = in_fitted_quantity(loss, candidate.law, splits[0].points)
+        quantity, own_loss = fitted_quantity_of(candidate.law), loss
+        if not isinstance(loss, LeastSquares) and quantity != FORCE:
+            # The scale, a force [N], in proportion to the medians of the magnitudes of both quantities (chosen).
+            columns = (splits[0].points.joined[name] for name in (quantity.name, "force"))
+            own, force = (float(np.nanmedian(np.abs(column))) for column in columns)
+            scale = loss.scale * own / force if min(own, force) > 0 else loss.scale
+            own_loss = dataclasses.replace(loss, scale=scale)  # type: ignore[type-var]  # each loss is a dataclass
         fit = fit_to_points(candidate.law, splits[0].points, loss=own_loss, fixed=candidate.fixed)
         notes = splits[0].slack_notes(fit.model)
         residuals = residuals_of_rows(fit.model, splits[0].rows, splits[0].max_force)
@@ -142,17 +147,6 @@ def _excess_error(name: str, rmse: float, limit: float, where: str) -> ExcludedM
     cause = f"its cross-validation takes long and was not completed: its {error}"
     omitted = "its cross-validation takes long and was not completed. To complete it, give the law as a candidate."
     return ExcludedModel(name, f"Its {error}; {omitted}", cause, rmse)
-
-
-def in_fitted_quantity(loss: Loss, law: Characteristic, points: FitPoints) -> Loss:
-    """A robust loss whose scale is a force [N] for a law fitted in another quantity: in proportion to the medians of
-    the magnitudes of both quantities (chosen)."""
-    quantity = fitted_quantity_of(law)
-    if isinstance(loss, LeastSquares) or quantity == FORCE:
-        return loss
-    sizes = [float(np.nanmedian(np.abs(points.joined[name]))) for name in (quantity.name, "force")]
-    scale = loss.scale * sizes[0] / sizes[1] if min(sizes) > 0 else loss.scale
-    return dataclasses.replace(loss, scale=scale)  # type: ignore[type-var]  # each loss is a dataclass
 
 
 Progress = Callable[[str, float], None]

@@ -20,7 +20,7 @@ from . import Fit
 from .candidate_scores import RankedModel
 from .candidates import MIN_POOLED, Candidate
 from .cross_validation import GroupSplit, RunSplit, SpecimenSplit, specimen_name
-from .model_selection import Comparison, compare, compare_splits, eligible_models, is_equivalent
+from .model_selection import Comparison, compare, compare_splits, eligible_models, excess_error, is_contradicted
 from .weighting import LeastSquares, Loss
 
 SPLITS = (RunSplit(), SpecimenSplit())
@@ -72,8 +72,10 @@ def select_for_both(
     best = min(names, key=lambda name: (max(ratios(name)), rankings[0][name].parameter_count))
     limit = max(1 + MAX_JOINT_EXCESS, *ratios(best))
     within = [name for name in names if max(ratios(name)) <= limit]
-    equivalent = [name for name in within if all(is_equivalent(each[name], each[best]) for each in rankings)]
-    chosen = min(equivalent, key=lambda name: (rankings[0][name].parameter_count, max(ratios(name))))
+    for each in rankings:  # not worse by more than one standard error, nor contradicted by the rows of the fit
+        not_worse = [name for name in within if excess_error(each[name], each[best]) <= 0]
+        within = [name for name in not_worse if not is_contradicted(each[name], each[best])]
+    chosen = min(within, key=lambda name: (rankings[0][name].parameter_count, max(ratios(name))))
     models = tuple(ranking[chosen] for ranking in rankings)
     lines = [f"One law for all purposes: {chosen} with {models[0].parameter_count} parameters."]
     for comparison, model, ratio in zip(comparisons, models, ratios(chosen), strict=True):

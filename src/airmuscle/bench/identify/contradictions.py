@@ -131,8 +131,11 @@ def _example(runs: MatchedRuns) -> str:
 
 def _cause(contradicting: Sequence[MatchedRuns], matches: Matches) -> list[str | Hint]:
     """The cause and the remedy, as far as the contradictions show them."""
-    column = _separating_column(contradicting, matches)
-    if column is not None:
+    chosen = {id(each) for each in contradicting}
+    for column in contradicting[0].first.labels:
+        differs = {id(each) for each in matches.runs if each.first.labels.get(column) != each.second.labels.get(column)}
+        if not chosen <= differs or len(differs - chosen) > 0.5 * len(differs):
+            continue  # its values do not differ in all contradicting pairs, or in many others
         mapped = {re.sub(r"\s*[\[(].*", "", column): "specimen"}
         return [
             f" Column '{column}' tells the contradicting rows apart: it probably names the specimen.",
@@ -151,16 +154,6 @@ def _cause(contradicting: Sequence[MatchedRuns], matches: Matches) -> list[str |
         " Check whether these runs are of one muscle, with the same zeros, units and resting length, and leave out "
         "what is not."
     ]
-
-
-def _separating_column(contradicting: Sequence[MatchedRuns], matches: Matches) -> str | None:
-    """The column whose values differ in all contradicting pairs and in no other; None without one."""
-    chosen = {id(each) for each in contradicting}
-    for name in contradicting[0].first.labels:
-        differs = {id(each) for each in matches.runs if each.first.labels.get(name) != each.second.labels.get(name)}
-        if chosen <= differs and len(differs - chosen) <= 0.5 * len(differs):
-            return name
-    return None
 
 
 MIN_GROUPED, MIN_GAP = 4, 3.0

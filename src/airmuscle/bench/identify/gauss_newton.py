@@ -86,7 +86,8 @@ def gauss_newton(
         if linear is None:
             return None
         basis, length = linear.basis, float(np.linalg.norm(np.linalg.solve(linear.normal, linear.gradient)))
-        tolerance = residual_std(point.residuals, point.values.size)
+        spare = max(point.residuals.size - point.values.size, 1)
+        tolerance = float(np.linalg.norm(point.residuals) / np.sqrt(spare))  # the standard deviation of the residuals
         if length <= RELATIVE_STEP * tolerance:
             return LeastSquaresSolution(point.values, point.modelled, jacobian)
         moved = _curved_step(problem, point, linear, min(2 * fraction, 1.0))
@@ -181,11 +182,6 @@ def _bounded_step(step: Array, inverse: Array, basis: StepBasis, low: Array, hig
         bounded = step - gain @ (rows @ step - np.clip(rows @ step, low[fixed], high[fixed]))
         projection = np.eye(step.size) - gain @ rows
     return bounded, projection
-
-
-def residual_std(residuals: Array, parameters: int) -> float:
-    """Standard deviation of N weighted residuals with N - P degrees of freedom."""
-    return float(np.linalg.norm(residuals) / np.sqrt(max(residuals.size - parameters, 1)))
 
 
 def held_on_bounds(problem: FitProblem, values: Array, gradient: Array) -> BoolArray:

@@ -86,12 +86,6 @@ def _pulling(ranking: Sequence[RankedModel], recommended: RankedModel) -> str:
     )
 
 
-def is_equivalent(model: RankedModel, best: RankedModel) -> bool:
-    """Whether a law is not worse than the best one by more than one standard error of the difference, and the rows of
-    the fit do not contradict it where the folds are few."""
-    return excess_error(model, best) <= 0 and not is_contradicted(model, best)
-
-
 def is_contradicted(model: RankedModel, best: RankedModel) -> bool:
     """Whether there are few folds and AICc on the rows of the fit gives a law no support against the best one. The rows
     count with their effective number, because their residuals are correlated."""

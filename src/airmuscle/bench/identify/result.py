@@ -226,13 +226,22 @@ class Fit(Reported):
         texts = quantity_text(worst.pressure, "Pa", "kPa"), contraction_text(worst.contraction)
         point = f"at {', '.join(texts)}, {quantity_text(worst.force, 'N', 'N')}"
         undefined = "undefined, because the measured values do not vary"
+        # The rms error of a robust fit with its residuals limited, as in a comparison.
+        residuals, limited = self.residuals[self.censoring == 0], ""
+        limit = self.loss.limit(residuals)
+        if count := int(np.count_nonzero(np.abs(residuals) > limit)):
+            rmse, rows = (
+                float(np.sqrt(np.mean(np.clip(residuals, -limit, limit) ** 2))),
+                "row" if count == 1 else "rows",
+            )
+            limited = f"({self.format_residual(rmse)} with {count} {rows} limited to {self.format_residual(limit)})"
         ranges = self.data_ranges
         return (
             NamedValue("rows used", self.rows_used,
                      remark=f"{self.rows_censored} of them censored; {self.rows_dropped} dropped"),
             NamedValue("rows censored", self.rows_censored, brief=False),
             NamedValue("rows dropped", self.rows_dropped, brief=False),
-            self._residual("rms error", self.rmse, self._limited_text()),
+            self._residual("rms error", self.rmse, limited),
             *(self.scatter.values() if self.scatter else ()),
             self._residual("maximum error", worst.error, point),
             self._residual("residual standard deviation", self.sigma, brief=False),
@@ -250,17 +259,6 @@ class Fit(Reported):
         quantity = self.fitted_quantity
         shown = {"Pa": "kPa", "1": "%"}.get(quantity.unit, "")
         return NamedValue(name, value, quantity.unit, shown, remark=remark, brief=brief)
-
-    def _limited_text(self) -> str:
-        """The rms error of a robust fit with its residuals limited, as in a comparison; empty if none is limited."""
-        residuals = self.residuals[self.censoring == 0]
-        limit = self.loss.limit(residuals)
-        count = int(np.count_nonzero(np.abs(residuals) > limit))
-        if not count:
-            return ""
-        rmse = float(np.sqrt(np.mean(np.clip(residuals, -limit, limit) ** 2)))
-        rows = "1 row" if count == 1 else f"{count} rows"
-        return f"({self.format_residual(rmse)} with {rows} limited to {self.format_residual(limit)})"
 
     def format_residual(self, residual: float) -> str:
         """A residual [SI] as text in the usual unit of the fitted quantity."""

@@ -41,15 +41,6 @@ class Uncertainty:
         return self.bootstrap is not None or bool(self.profiles) or self.none_weak
 
 
-def _describe_bootstrap(bootstrap: Bootstrap) -> str:
-    failed = f"; {bootstrap.failed_refits} of them did not determine the parameters" if bootstrap.failed_refits else ""
-    if bootstrap.failed_refits > MAX_FAILED_SHARE * len(bootstrap.values):
-        failed += ", so the intervals are not reliable: add runs, or use a law with fewer parameters"
-    groups = f"{bootstrap.group_count} blocks resampled, seed {bootstrap.seed}"
-    caution = f"; {bootstrap.caution}" if bootstrap.caution else ""
-    return f"bootstrap: {len(bootstrap.values)} refits, {groups}{failed}{caution}"
-
-
 def uncertainty_chapter(uncertainty: Uncertainty) -> Chapter:
     """Return the chapter of the 95 % intervals of every parameter by each requested method."""
     sentences = [
@@ -58,13 +49,15 @@ def uncertainty_chapter(uncertainty: Uncertainty) -> Chapter:
     ]
     values: tuple[NamedValue, ...] = ()
     if (bootstrap := uncertainty.bootstrap) is not None:
-        sentences.insert(0, f"{_describe_bootstrap(bootstrap).capitalize()}.")
-        values = (
-            NamedValue("refits", len(bootstrap.values), brief=False),
-            NamedValue("resampled groups", bootstrap.group_count, brief=False),
-            NamedValue("failed refits", bootstrap.failed_refits, brief=False),
-            NamedValue("seed", bootstrap.seed, brief=False),
-        )
+        refits, groups, failed = len(bootstrap.values), bootstrap.group_count, bootstrap.failed_refits
+        text = f"bootstrap: {refits} refits, {groups} blocks resampled, seed {bootstrap.seed}"
+        text += f"; {failed} of them did not determine the parameters" if failed else ""
+        if failed > MAX_FAILED_SHARE * refits:
+            text += ", so the intervals are not reliable: add runs, or use a law with fewer parameters"
+        text += f"; {bootstrap.caution}" if bootstrap.caution else ""
+        sentences.insert(0, f"{text.capitalize()}.")
+        counts = {"refits": refits, "resampled groups": groups, "failed refits": failed, "seed": bootstrap.seed}
+        values = tuple(NamedValue(name, count, brief=False) for name, count in counts.items())
     if uncertainty.profiles:
         sentences.append(
             "A profile fixes one parameter and estimates all others again; an interval is unbounded where the data do "

@@ -192,13 +192,12 @@ def fit_monotone(
 def slope_constraints(pressure_degree: int, force_degree: int, cells: tuple[int, int]) -> Array:
     """Rows g: v with Chebyshev coefficients c falls with p and rises with F on the validity range if all g @ c >= 0.
     The condition is sufficient; on small `cells` in pressure and force it is nearly necessary."""
-    by_pressure, by_force = slope_rows(chebyshev.chebvander, _chebyshev_slopes, (pressure_degree, force_degree), cells)
+
+    def slopes(x: Array, degree: int) -> Array:
+        return np.column_stack([chebyshev.chebval(x, chebyshev.chebder(unit)) for unit in np.eye(degree + 1)])
+
+    by_pressure, by_force = slope_rows(chebyshev.chebvander, slopes, (pressure_degree, force_degree), cells)
     return np.vstack([-by_pressure, by_force])
-
-
-def _chebyshev_slopes(x: Array, degree: int) -> Array:
-    """Slopes of T_0..T_degree."""
-    return np.column_stack([chebyshev.chebval(x, chebyshev.chebder(unit)) for unit in np.eye(degree + 1)])
 
 
 LEAST_SHARE = 1e-3
@@ -284,11 +283,10 @@ def _free_contraction_basis(law: ContractileSurface, free: Recording | None) -> 
 def shape_constraints(degree: int, cells: tuple[int, int]) -> Array:
     """Rows g: a force surface keeps its shape on the validity range if all g @ coefficients >= 0; for `cells` in
     pressure and contraction."""
+
+    def slopes(x: Array, degree: int) -> Array:
+        return np.column_stack([np.zeros(x.size), polynomial.polyvander(x, degree - 1) * np.arange(1, degree + 1)])
+
     columns = [j * (degree + 1) + i for i, j in exponents(degree)]
-    rises, falls = slope_rows(polynomial.polyvander, _power_slopes, (degree, degree), cells)
+    rises, falls = slope_rows(polynomial.polyvander, slopes, (degree, degree), cells)
     return np.vstack([rises[:, columns], -falls[:, columns]])
-
-
-def _power_slopes(x: Array, degree: int) -> Array:
-    """Slopes of 1, x, .. x^degree."""
-    return np.column_stack([np.zeros(x.size), polynomial.polyvander(x, degree - 1) * np.arange(1, degree + 1)])
