@@ -116,7 +116,8 @@ def _cross_validate(
 ) -> Score:  # fmt: skip
     """The scores for one split; residuals in force [N] are limited to `limit`, which is infinite for least squares."""
     in_sample, left_out = np.clip(residuals, -limit, limit), list[FoldScore]()
-    rmse = points.rms(in_sample)
+    measured_rows = int(np.count_nonzero(points.rows.measured))
+    rmse = float(np.sqrt(in_sample @ in_sample / max(measured_rows, 1)))
     if rmse > bound:
         return _excess_error(candidate.name, rmse, bound, "on the rows of the fit")
     count = sum(int(np.count_nonzero(rows.measured)) or rows.force.size for rows in points.left_out_rows)
@@ -132,7 +133,7 @@ def _cross_validate(
     return RankedModel(
         candidate, fit, rmse,
         cross_validated_rmse=float(np.sqrt(np.average([each.rmse**2 for each in left_out], weights=rows))),
-        aicc=aicc(rmse**2, int(np.count_nonzero(points.rows.measured)), count_parameters(fit)),
+        aicc=aicc(rmse**2, measured_rows, count_parameters(fit)),
         fold_scores=tuple(left_out),
         slack=points.slack_pull(residuals, rmse),
         effective_rows=effective_sample_size(in_sample[points.rows.measured]),

@@ -31,8 +31,16 @@ def evaluate_force(law: Any, pressure: Array, contraction: Array, max_force: flo
     with np.errstate(all="ignore"):
         if isinstance(law, ForceLaw):
             force = np.asarray(law.force(pressure, contraction), dtype=float) + np.zeros(pressure.size)
-        else:
-            force = _invert_on_grid(law, pressure, contraction, max_force)
+        else:  # where the deficit first changes its sign: on a coarse grid, then on the fine grid in that interval
+            forces = np.linspace(0.0, max_force, FORCE_GRID_POINTS)
+            coarse = _deficit(law, pressure[:, None], contraction[:, None], forces[::COARSE_STEP])
+            rising = np.asarray((np.diff(coarse, axis=1) >= 0).all(axis=1))
+            interval = np.minimum(np.maximum((coarse < 0).sum(axis=1) - 1, 0), coarse.shape[1] - 2)
+            index = interval[:, None] * COARSE_STEP + np.arange(COARSE_STEP + 1)
+            every = np.tile(np.arange(FORCE_GRID_POINTS), (int(np.count_nonzero(~rising)), 1))
+            force = np.zeros(pressure.size)
+            for rows, grid in ((rising, index[rising]), (~rising, every)):
+                force[rows] = _first_crossing(law, pressure[rows], contraction[rows], forces[grid])
     return np.asarray(np.nan_to_num(force, nan=0.0, posinf=max_force, neginf=-max_force))
 
 
@@ -65,20 +73,6 @@ def _deficit(law: Any, pressure: Array, contraction: Array, force: Array) -> Arr
     if isinstance(law, ContractionLaw):
         return np.asarray(contraction - law.contraction(pressure, force))
     return np.asarray(law.pressure(contraction, force) - pressure)
-
-
-def _invert_on_grid(law: Any, pressure: Array, contraction: Array, max_force: float) -> Array:
-    """Forces at which the deficit first changes its sign: on a coarse grid, then on the fine grid in that interval."""
-    forces = np.linspace(0.0, max_force, FORCE_GRID_POINTS)
-    coarse = _deficit(law, pressure[:, None], contraction[:, None], forces[::COARSE_STEP])
-    rising = np.asarray((np.diff(coarse, axis=1) >= 0).all(axis=1))
-    interval = np.minimum(np.maximum((coarse < 0).sum(axis=1) - 1, 0), coarse.shape[1] - 2)
-    index = interval[:, None] * COARSE_STEP + np.arange(COARSE_STEP + 1)
-    result = np.zeros(pressure.size)
-    every = np.tile(np.arange(FORCE_GRID_POINTS), (int(np.count_nonzero(~rising)), 1))
-    for rows, grid in ((rising, index[rising]), (~rising, every)):
-        result[rows] = _first_crossing(law, pressure[rows], contraction[rows], forces[grid])
-    return result
 
 
 def _first_crossing(law: Any, pressure: Array, contraction: Array, forces: Array) -> Array:

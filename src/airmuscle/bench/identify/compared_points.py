@@ -18,7 +18,7 @@ from .group_refits import GroupRefits, RowIndices
 from .pooling import Pooling, make_pooling
 from .problem import POINT_COLUMNS, RESTING_LENGTH, LeastSquaresSolution, with_length
 from .result import Fit
-from .slack import SlackPull, pull_limit, slack_pull, with_slack_bounds
+from .slack import MIN_PULL, PULL_RATIO, SlackPull, slack_pull, with_slack_bounds
 from .solver import design_matrix, is_linear
 from .static_fit import refit
 from .weighting import LeastSquares, Loss
@@ -137,15 +137,10 @@ class ComparedPoints:
         fold = self.fold_of_rows[np.isfinite(np.stack([*columns])).all(axis=0)]
         return [self.rows.at(fold == i) for i in range(len(self.folds))]
 
-    def rms(self, residuals: Array) -> float:
-        """Root mean square [N] of the residuals of the evaluated rows (N,); those of slack rows are added to the rows
-        with a positive force."""
-        return float(np.sqrt(residuals @ residuals / max(int(np.count_nonzero(self.rows.measured)), 1)))
-
     def slack_pull(self, residuals: Array, rmse: float) -> SlackPull:
         """The force at the slack rows of a law with these residuals of the evaluated rows (N,) and this error [N]."""
         rows = self.rows
-        limit = pull_limit(rmse, float(np.max(rows.force, initial=0.0)))
+        limit = max(PULL_RATIO * rmse, MIN_PULL * float(np.max(rows.force, initial=0.0)))
         modelled = residuals + np.maximum(rows.force, 0.0)
         specimen = np.array([name for _, name in rows.muscles])[rows.run]
         return slack_pull(rows.pressure, rows.contraction, rows.force, modelled, limit, specimen)

@@ -35,13 +35,6 @@ class Scatter:
     repeatability: float | None
     branches: float = 0.0
 
-    @classmethod
-    def of(cls, recordings: Sequence[Recording], repeatability: float | None) -> "Scatter":
-        """The scatter of recordings; the noise only where the rows are in order of time."""
-        timed = [run["force"] for run in recordings if "time" in run and "force" in run]
-        noise = [estimate_noise(force[np.isfinite(force)]) for force in timed]
-        return cls(float(np.median(noise)) if noise and np.median(noise) > 0 else None, repeatability)
-
     def values(self) -> Iterator[NamedValue]:
         """What is known of the scatter, for a report."""
         if self.noise is not None:
@@ -158,7 +151,11 @@ def check_data(recordings: Sequence[Recording]) -> Remarks:
     if not any(" tells the contradicting rows apart" in note for note in contradictions):
         contradictions += two_muscle_notes(match_rows(measured, by_branch=True))
     found = (*contradictions, *outlier_notes(measured), *saturation_notes(measured), *delay_notes(delay))
-    return Remarks((*find_suspicious(recordings), *found), Scatter.of(measured, repeatability(matches)), delay)
+    # The noise only where the rows are in order of time.
+    timed = [run["force"] for run in measured if "time" in run and "force" in run]
+    noise = float(np.median([estimate_noise(force[np.isfinite(force)]) for force in timed])) if timed else 0.0
+    scatter = Scatter(noise if noise > 0 else None, repeatability(matches))
+    return Remarks((*find_suspicious(recordings), *found), scatter, delay)
 
 
 def level_text(name: str, value: float) -> str:

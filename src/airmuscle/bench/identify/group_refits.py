@@ -72,16 +72,6 @@ def widening(lengths: Sequence[float], length: float) -> float:
     return math.sqrt((1.0 + float(leverage)) / (1.0 + 1.0 / len(lengths)))
 
 
-def specimen_deviation(rms: Sequence[float], lengths: Sequence[float]) -> float:
-    """The standard deviation of the error of a specimen about the regression, from the rms errors of those left out.
-
-    lengths  resting lengths [m] of the specimens, by which the law depends on them; empty if it does not
-    """
-    places = lengths or [1.0] * len(rms)
-    remaining = np.maximum(1.0 - leverages(places, places), 0.0)
-    return float(np.sqrt(np.mean(remaining * np.square(rms))))
-
-
 RowIndices = npt.NDArray[np.intp]
 RELATIVE_STEP = 1e-6
 """Step, in standard deviations of the residuals, at which a refit ends (chosen)."""

@@ -52,19 +52,16 @@ class UndeterminedCombination:
     remedy: str
 
     def __str__(self) -> str:
-        names = [name for name, _ in self.shares]
+        names, error = [name for name, _ in self.shares], "not determined at all"
+        if np.isfinite(self.relative_stderr):
+            error = f"poorly determined (relative standard error {100 * self.relative_stderr:.0f} %)"
         if len(names) == 1:
-            return f"{names[0]} is {self._describe_error()}. To determine it, {self.remedy}."
+            return f"{names[0]} is {error}. To determine it, {self.remedy}."
         changes = ", ".join(f"{name} {share:+.2f} %" for name, share in self.shares)
         return (
-            f"{', '.join(names[:-1])} and {names[-1]} are {self._describe_error()}: the modelled data stay the same if "
+            f"{', '.join(names[:-1])} and {names[-1]} are {error}: the modelled data stay the same if "
             f"they change together ({changes}). To separate them, {self.remedy}."
         )
-
-    def _describe_error(self) -> str:
-        if not np.isfinite(self.relative_stderr):
-            return "not determined at all"
-        return f"poorly determined (relative standard error {100 * self.relative_stderr:.0f} %)"
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

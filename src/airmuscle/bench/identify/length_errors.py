@@ -55,14 +55,6 @@ class LengthError(ShortRepr):
     model: Characteristic
     """The law fitted with the corrected length."""
 
-    def explains(self, separate_rmse: float) -> bool:
-        """Whether the correction exceeds three standard errors and explains the misfit of one law for all specimens.
-        `separate_rmse` is the root mean square residual of separate fits of the specimens."""
-        excess = self.rmse_before**2 - separate_rmse**2
-        explained = self.rmse_before**2 - self.rmse_after**2 >= MIN_EXPLAINED * excess
-        significant = abs(self.offset) > MIN_STANDARD_ERRORS * self.standard_error
-        return self.rmse_before > MIN_MISFIT * separate_rmse and explained and significant
-
     def __str__(self) -> str:
         change = "less" if self.offset < 0 else "more"
         return (
@@ -161,7 +153,13 @@ def find_length_errors(law: Characteristic, recordings: Sequence[Recording]) -> 
         estimates = [estimate_length_error(model, recordings, name, min_reduction=least) for name in names]
     except IdentificationError:
         return ()
-    return tuple(sorted((e for e in estimates if e.explains(separate)), key=lambda e: abs(e.offset)))
+    found = []
+    for each in estimates:
+        explained = each.rmse_before**2 - each.rmse_after**2 >= MIN_EXPLAINED * (each.rmse_before**2 - separate**2)
+        significant = abs(each.offset) > MIN_STANDARD_ERRORS * each.standard_error
+        if each.rmse_before > MIN_MISFIT * separate and explained and significant:
+            found.append(each)
+    return tuple(sorted(found, key=lambda each: abs(each.offset)))
 
 
 class _Step(NamedTuple):

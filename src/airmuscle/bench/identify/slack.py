@@ -102,11 +102,6 @@ class SlackPull:
         return f"it pulls at {self.pulling} of {self.rows} slack rows, up to {self.greatest:.3g} N at {at}"
 
 
-def pull_limit(rmse: float, greatest_force: float) -> float:
-    """Force [N] at a slack row above which a law with this error on the measured rows counts as pulling."""
-    return max(PULL_RATIO * rmse, MIN_PULL * greatest_force)
-
-
 def slack_pull(
     pressure: Array, contraction: Array, force: Array, modelled: Array, limit: float, specimen: Array | None = None
 ) -> SlackPull:

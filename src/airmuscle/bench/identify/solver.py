@@ -10,9 +10,9 @@ from .gauss_newton import gauss_newton
 from .problem import FitProblem, LeastSquaresSolution
 from .variable_projection import (
     find_initial_values,
-    is_determined_without_censored,
     is_linear_parameter,
     solve_censored_least_squares,
+    uncensored_rank,
 )
 from .weighting import LeastSquares, Loss
 
@@ -42,7 +42,7 @@ def solve_least_squares(problem: FitProblem, loss: Loss, start: Array | None = N
     if isinstance(loss, LeastSquares):
         return linear
     robust = solve_iteratively(problem, loss, linear.values)
-    if is_determined_without_censored(problem, robust.jacobian):
+    if not problem.censoring.any() or uncensored_rank(problem, robust.jacobian) == robust.values.size:
         return robust
     # The search stops as soon as no bound is violated; parameters that only bounds determine are then arbitrary.
     # Least squares with every square weighted by rho' have the same solution.

@@ -13,7 +13,7 @@ from .candidate_scores import FoldScore, RankedModel
 from .candidates import Candidate
 from .compared_points import ComparedPoints
 from .cross_validation import SpecimenSplit, specimen_name
-from .group_refits import MIN_MEMBERS, specimen_deviation, t_quantile
+from .group_refits import MIN_MEMBERS, leverages, t_quantile
 from .model_selection import Comparison
 from .result import Fit
 
@@ -37,7 +37,9 @@ class SpecimenErrors:
     @property
     def deviation(self) -> float:
         """Standard deviation [N] of the error of a specimen about the regression of the specimens by ln L_0."""
-        return specimen_deviation(self.rms, self.lengths)
+        places = self.lengths or [1.0] * len(self.rms)
+        remaining = np.maximum(1.0 - leverages(places, places), 0.0)
+        return float(np.sqrt(np.mean(remaining * np.square(self.rms))))
 
     @property
     def half_width(self) -> float:

@@ -176,16 +176,14 @@ def shape_chapter(shaped: ShapeConstrainedFit, unconstrained: Fit, free: int) ->
 
 
 def violation_table(violations: Sequence[MonotonicityViolation], name: str, title: str) -> Table:
-    """Return a table of the regions in which a law is not monotonic, largest first."""
-    of_force = all(each.rule.quantity == "force" for each in violations)
-    second, units = ("contraction", ("1", "%")) if of_force else ("force", ("N", ""))
+    """Return a table of the regions in which a force is not monotonic, largest first."""
     columns: dict[str, Any] = {
         "constraint": [each.rule.description for each in violations],
-        "pressure": TableColumn([tuple(each.pressure) for each in violations], "Pa", "kPa"),
-        second: TableColumn([tuple(each.second_argument) for each in violations], *units),
+        "pressure": TableColumn([each.pressure for each in violations], "Pa", "kPa"),
+        "contraction": TableColumn([each.second_argument for each in violations], "1", "%"),
         "fraction of the validity range": TableColumn([each.area_fraction for each in violations], "1", "%"),
         "worst at pressure": TableColumn([each.worst_point[0] for each in violations], "Pa", "kPa"),
-        f"worst at {second}": TableColumn([each.worst_point[1] for each in violations], *units),
+        "worst at contraction": TableColumn([each.worst_point[1] for each in violations], "1", "%"),
     }
     return Table(name, title, columns, "`airmuscle fit --shape` fits a surface without such regions.")
 
@@ -194,11 +192,10 @@ def _surface_figure(shaped: ShapeConstrainedFit, unconstrained: Fit) -> Any:
     figure, axes = new_figure(width=6.6, height=3.9)
     contraction = np.linspace(*unconstrained.data_ranges["contraction"], POINTS)
     for i, pressure in enumerate(levels_of(unconstrained.recording["pressure"], MAX_CURVES)):
-        colour = LINES[i % len(LINES)]
-        rows = np.full(POINTS, pressure)
-        style = {"color": colour, "label": f"{pressure / 1e3:.4g} kPa"}
-        axes.plot(100 * contraction, shaped.model.force(rows, contraction), **style)
-        axes.plot(100 * contraction, unconstrained.model.force(rows, contraction), color=colour, linestyle=DASHES[1])
+        colour, rows = LINES[i % len(LINES)], np.full(POINTS, pressure)
+        solid, dashed = {"label": f"{pressure / 1e3:.4g} kPa"}, {"linestyle": DASHES[1]}
+        for law, style in ((shaped.model, solid), (unconstrained.model, dashed)):
+            axes.plot(100 * contraction, law.force(rows, contraction), color=colour, **style)
     axes.set(xlabel="contraction [%]", ylabel="force [N]")
     legend_outside(axes, title="gauge pressure")
     return figure

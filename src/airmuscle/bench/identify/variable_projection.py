@@ -43,7 +43,7 @@ def solve_censored_least_squares(
     target = problem.weights * (problem.target - constant)
     if not problem.censoring.any():
         return np.asarray(np.linalg.lstsq(matrix, target, rcond=_RCOND)[0] / norms)
-    inactive = 0.0 if is_determined_without_censored(problem, jacobian) else _INACTIVE_WEIGHT
+    inactive = 0.0 if uncensored_rank(problem, jacobian) == jacobian.shape[1] else _INACTIVE_WEIGHT
 
     def row_weights(scaled: Array) -> Array:
         return np.where(problem.active_rows(jacobian @ (scaled / norms) + constant), 1.0, inactive)
@@ -71,11 +71,6 @@ def shortened_step(
     """The step from x, halved until the sum of squares is at most `limit`; zero where no part of it is short enough."""
     parts = (factor * step for factor in 0.5 ** np.arange(halvings))
     return next((part for part in parts if sum_of_squares(x + part) <= limit), 0.0 * step)
-
-
-def is_determined_without_censored(problem: FitProblem, jacobian: Array) -> bool:
-    """Whether the uncensored rows alone determine all parameters."""
-    return not problem.censoring.any() or uncensored_rank(problem, jacobian) == jacobian.shape[1]
 
 
 def uncensored_rank(problem: FitProblem, jacobian: Array) -> int:

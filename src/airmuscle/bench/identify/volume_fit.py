@@ -138,7 +138,12 @@ def fit_volume(points: VolumePoints, resting_length: float) -> VolumeFit:
     polynomials = {f"polynomial of degree {n}": _polynomial(points, resting_length, n) for n in degrees}
     braid = _braid(points, resting_length)
     laws: dict[str, Geometry] = {**({} if braid is None else {"Braid": braid}), **polynomials}
-    criteria = {name: _aicc(law, points) for name, law in laws.items()}
+    criteria = dict[str, float]()
+    size, resolution = points.volume.size, RESOLUTION * float(np.abs(points.volume).max())
+    for name, law in laws.items():  # residuals below the resolution of the volumes do not distinguish laws
+        squares = float(np.sum((np.asarray(law.volume(points.contraction)) - points.volume) ** 2))
+        parameters = _design(law, points.contraction).shape[1]
+        criteria[name] = aicc(max(squares, size * resolution**2) / size, size, parameters)
     equivalent = [laws[name] for name, value in criteria.items() if value <= min(criteria.values()) + EQUIVALENT]
     best = min(equivalent, key=lambda law: _design(law, points.contraction).shape[1])
     residuals = np.asarray(best.volume(points.contraction)) - points.volume
@@ -183,14 +188,6 @@ def _braid_terms(contraction: Array) -> Array:
 def _chebyshev_terms(contraction: Array, low: float, high: float, degree: int) -> Array:
     scaled = np.clip((2 * contraction - low - high) / (high - low), -1.0, 1.0)
     return np.asarray(np.polynomial.chebyshev.chebvander(scaled, degree))
-
-
-def _aicc(law: Geometry, points: VolumePoints) -> float:
-    """Akaike's criterion; residuals below the resolution of the volumes do not distinguish laws."""
-    size = points.volume.size
-    squares = float(np.sum((np.asarray(law.volume(points.contraction)) - points.volume) ** 2))
-    floor = size * (RESOLUTION * float(np.abs(points.volume).max())) ** 2
-    return aicc(max(squares, floor) / size, size, _design(law, points.contraction).shape[1])
 
 
 def volume_chapter(
