@@ -153,7 +153,7 @@ def settings() -> list[Any]:
     """One instance of each dataclass that is a setting of a fit, a reader, a tuning, a benchmark or a learning task."""
     step, plant = design.StepMotion(0.1, 0.0), EXAMPLES["surface"]
     return [
-        bench.Huber(1.0), bench.SoftL1(1.0), bench.LeastSquares(), bench.BlockSplit(),
+        bench.Huber(1.0), bench.LeastSquares(), bench.BlockSplit(),
         bench.LevelSplit("pressure"), bench.Censoring(), bench.StartTime(0.1),
         bench.InitialValue("pressure", 1.0), bench.PlantUncertainty({"muscle.damping": 1.0}),
         bench.RecursiveFit(bench.BenchLimits(characteristic.ValidityRange(0.0, 6e5, 0.0, 0.25), 1e3)),

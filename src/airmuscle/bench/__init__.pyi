@@ -20,7 +20,6 @@ from .identify import ProfileLikelihood as ProfileLikelihood
 from .identify import RecursiveFit as RecursiveFit
 from .identify import RunSplit as RunSplit
 from .identify import ShapeConstrainedFit as ShapeConstrainedFit
-from .identify import SoftL1 as SoftL1
 from .identify import SpecimenSplit as SpecimenSplit
 from .identify import approximate as approximate
 from .identify import bootstrap as bootstrap

@@ -106,7 +106,6 @@ from .weighting import Censoring as Censoring
 from .weighting import Huber as Huber
 from .weighting import LeastSquares as LeastSquares
 from .weighting import Loss as Loss
-from .weighting import SoftL1 as SoftL1
 from .weighting import sensor_deviations as sensor_deviations
 
 # isort: split

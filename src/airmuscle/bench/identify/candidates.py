@@ -143,9 +143,10 @@ def started_candidates(recordings: Sequence[Recording]) -> tuple[tuple[Candidate
             else:
                 candidates += [Candidate(each, law, cls.redundant) for each, law in laws.items()]
     # Laws of partial pooling: a population law with a term in ln L0, and specimen effects of degree 2 or 3.
-    can_pool, length = scales.length_count >= 2 and scales.specimen_count >= MIN_POOLED, scales.resting_length
+    can_pool = scales.length_count >= 2 and scales.specimen_count >= MIN_POOLED
     for degree, change in POOLED_DEGREES if can_pool else ():
-        population = LogarithmicLength(blank_surface(degree), blank_surface(change), length, length)
+        surfaces = blank_surface(degree), blank_surface(change)
+        population = LogarithmicLength(*surfaces, scales.resting_length, scales.resting_length)
         for effects in (2, 3):
             name = f"pooled, ln L0, degree {degree}, change of degree {change}, effects of degree {effects}"
             candidates.append(Candidate(name, PooledLengthLaw(population, (blank_surface(effects),))))

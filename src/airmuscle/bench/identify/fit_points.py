@@ -133,7 +133,9 @@ class FitPoints:
         weights = np.ones(len(self.data)) if sigma is None else _row_weights(self.joined, self.missing, sigma)
         if censoring is None:
             censoring = default_censoring(law)
-            censoring = censoring.within(force_limits(self.recordings)) if isinstance(law, ForceLaw) else censoring
+            if isinstance(law, ForceLaw):  # the range that the law and the sensor have in common
+                sensor, (low, high) = force_limits(self.recordings), dataclasses.astuple(censoring)
+                censoring = Censoring(max(low, sensor.min_force), min(high, sensor.max_force))
         return make_problem(law, self.data, censoring, weights, fixed)
 
 

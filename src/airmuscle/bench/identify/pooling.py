@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core import Array, IdentificationError, tree
-from ...physics.muscle.characteristic import Characteristic, ContractileSurface, PooledLengthLaw
+from ...physics.muscle.characteristic import ContractileSurface, PooledLengthLaw
 from ...recording import Recording
 from .candidates import UNREACHED_FORCE
 from .cross_validation import specimen_name
@@ -232,10 +232,3 @@ def pooled_band(fit: Fit, points: Recording, jacobian: Array, level: float) -> t
 def population_of(law: Any) -> Any:
     """The population law of a pooled law; any other law unchanged."""
     return law.population if isinstance(law, PooledLengthLaw) else law
-
-
-def refit_pooled(law: PooledLengthLaw, population: Characteristic, points: FitPoints) -> PooledLengthLaw:
-    """The pooled law of a population law that was refitted to these points."""
-    problem = points.problem(population)
-    pooling = make_pooling(law, points, problem)
-    return pooling.law(population, pooling.predict(problem.initial_values))

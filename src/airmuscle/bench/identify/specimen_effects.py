@@ -9,7 +9,6 @@ specimen from above: the effects are then those of penalised least squares with 
 """
 
 import dataclasses
-import functools
 from typing import NamedTuple
 
 import numpy as np
@@ -36,11 +35,6 @@ class BoundedRows(NamedTuple):
         """Mask (N,) of the values, and of the bounds that an effect with these coefficients (K,) violates."""
         return np.asarray((self.side == 0) | (self.side * (self.basis @ coefficients - self.values) > 0))
 
-    def sum_of_squares(self, coefficients: Array, ratio: float) -> float:
-        """The weighted squares of the active rows and the penalty."""
-        residuals = np.where(self.active(coefficients), self.weights * (self.basis @ coefficients - self.values), 0.0)
-        return float(residuals @ residuals + ratio * coefficients @ coefficients)
-
 
 def bounded_coefficients(rows: BoundedRows, ratio: float, start: Array) -> Array:
     """The coefficients (K,) that minimise the squares of values and violated bounds, and `ratio` times their own.
@@ -49,7 +43,11 @@ def bounded_coefficients(rows: BoundedRows, ratio: float, start: Array) -> Array
     posterior mode of the coefficients for a normal prior and one-sided normal errors at the bounds.
     """
     coefficients, active = start, rows.active(start)
-    sum_of_squares = functools.partial(rows.sum_of_squares, ratio=ratio)
+
+    def sum_of_squares(x: Array) -> float:
+        residuals = np.where(rows.active(x), rows.weights * (rows.basis @ x - rows.values), 0.0)
+        return float(residuals @ residuals + ratio * x @ x)
+
     for _ in range(_MAX_ITERATIONS):
         weighted = np.where(active, rows.weights**2, 0.0)[:, None] * rows.basis
         normal = weighted.T @ rows.basis + ratio * np.eye(start.size)

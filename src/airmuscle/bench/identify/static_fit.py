@@ -18,7 +18,7 @@ from .branch_residuals import branch_distance, branch_notes
 from .data_checks import HELD, Remarks, level_text
 from .fit_points import FitPoints
 from .gauss_newton import gauss_newton
-from .pooling import check_poolable, pool, population_of, refit_pooled
+from .pooling import check_poolable, make_pooling, pool, population_of
 from .problem import FORCE, RESTING_LENGTH, FitProblem, LeastSquaresSolution, evaluate
 from .result import Fit
 from .slack import solve_bounded
@@ -60,7 +60,7 @@ def fit(
 
     law         structure and initial values; parameters declared as not fitted keep their value
     recordings  one recording or several, with the columns pressure [Pa], contraction [1] and force [N]
-    loss        LeastSquares(), Huber(scale) or SoftL1(scale), the scale in the unit of the fitted quantity
+    loss        LeastSquares() or Huber(scale), the scale in the unit of the fitted quantity
     censoring   the range of force within which rows are measured values. By default rows at zero force, at the clamp of
                 the law, or at the limit of the force sensor are censored: they contribute only where the law violates
                 their bound. `UNCENSORED` treats all rows as measured values
@@ -136,7 +136,10 @@ def refit(
     solution. Raises IdentificationError where the points do not determine the parameters.
     """
     if isinstance(law, PooledLengthLaw):
-        return refit_pooled(law, refit(law.population, points, loss=loss, fixed=fixed), points)
+        population = refit(law.population, points, loss=loss, fixed=fixed)
+        problem = points.problem(population)
+        pooling = make_pooling(law, points, problem)
+        return pooling.law(population, pooling.predict(problem.initial_values))
     problem = points.problem(law, fixed=fixed)
     near = None if is_linear(problem) or loss != LeastSquares() else gauss_newton(problem, problem.initial_values)
     try:

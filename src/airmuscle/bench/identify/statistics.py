@@ -127,7 +127,7 @@ def fit_statistics(problem: FitProblem, solution: LeastSquaresSolution, loss: Lo
     residuals = problem.residuals(solution.modelled)[active]
     sigma, influences = _residual_std(residuals, design.norms.size, loss)
     complete = _Design.of(problem, solution, np.ones(on_bound.size, dtype=bool)) if on_bound.any() else design
-    counted = design if complete.is_deficient else complete
+    counted = design if complete.null.any() else complete
     covariance = estimate_covariance(
         counted.basis, counted.matrix, influences, sigma, runs.rows(active), counted.columns
     )
@@ -152,7 +152,7 @@ def check_determined(problem: FitProblem, solution: LeastSquaresSolution) -> "_D
     """The design of the parameters that are not on a bound. Raises IdentificationError where it is rank-deficient."""
     low, high = problem.bounds_reached(solution.values)
     design = _Design.of(problem, solution, ~(low | high))
-    if design.is_deficient:
+    if design.null.any():
         shares = np.sqrt(np.sum(design.right_singular_vectors[design.null] ** 2, axis=0))
         raise _rank_deficiency(problem, design.columns, shares, int(np.count_nonzero(~design.null)))
     return design
@@ -192,11 +192,6 @@ class _Design(NamedTuple):
     def null(self) -> Mask:
         """Mask of the singular values that count as zero."""
         return self.singular_values <= RANK_TOLERANCE * np.max(self.singular_values, initial=0.0)
-
-    @property
-    def is_deficient(self) -> bool:
-        """Whether the rows do not determine all of these parameters."""
-        return bool(self.null.any())
 
     @property
     def basis(self) -> Array:

@@ -71,17 +71,6 @@ class Huber(Loss):
 
 
 @dataclasses.dataclass(frozen=True)
-class SoftL1(Loss):
-    """rho = 2 (sqrt(1 + z) - 1): a smooth transition from squared to absolute residuals at `scale` [SI]."""
-
-    scale: float
-
-    def rho(self, z: Array) -> Array:
-        root = np.sqrt(1.0 + z)
-        return np.stack([2 * (root - 1), 1 / root, -0.5 / root**3])
-
-
-@dataclasses.dataclass(frozen=True)
 class Censoring:
     """The range of force [N] within which a row is a measured value; at its limits and beyond it is a bound.
 
@@ -100,10 +89,6 @@ class Censoring:
     def signs(self, force: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
         """By row: 0 uncensored, 1 censored below (the true force is at most the limit), -1 censored above."""
         return (force <= self.min_force) * 1.0 - (force >= self.max_force) * 1.0
-
-    def within(self, other: "Censoring") -> "Censoring":
-        """The range that both have in common."""
-        return Censoring(max(self.min_force, other.min_force), min(self.max_force, other.max_force))
 
 
 UNCENSORED = Censoring(-math.inf, math.inf)
