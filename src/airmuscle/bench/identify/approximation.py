@@ -12,7 +12,9 @@ from ...recording import Recording
 from ...report.chapter import Chapter, NamedValue, Table, TableColumn
 from ...report.shown import parameter_table
 from ..reported import Reported
+from .problem import POINT_COLUMNS
 from .static_fit import fit
+from .statistics import WorstPoint
 from .weighting import UNCENSORED
 
 BANDS = 6
@@ -28,12 +30,8 @@ class ModelApproximation(Reported):
     model: Characteristic
     rmse: float
     """Root mean square error [N], at points between those of the fit."""
-    max_error: float
-    """Error of maximum magnitude [N], target minus source."""
-    max_error_pressure: float
-    """Gauge pressure [Pa] of the maximum error."""
-    max_error_contraction: float
-    """Contraction [1] of the maximum error."""
+    max_error: WorstPoint
+    """The error of maximum magnitude [N], target minus source."""
     check_points: Recording
     """The points where the error was evaluated: force of the source law [N], and `error` of the target [N]."""
 
@@ -43,9 +41,10 @@ class ModelApproximation(Reported):
     @property
     def summary(self) -> str:
         """The errors in one phrase."""
+        worst = self.max_error
         return (
-            f"{type(self.model).__name__}: rms error {self.rmse:.4g} N, maximum error {self.max_error:.4g} N at "
-            f"{self.max_error_pressure / 1e3:.4g} kPa and {100 * self.max_error_contraction:.2f} %"
+            f"{type(self.model).__name__}: rms error {self.rmse:.4g} N, maximum error {worst.error:.4g} N at "
+            f"{worst.pressure / 1e3:.4g} kPa and {100 * worst.contraction:.2f} %"
         )
 
     def chapter(self) -> Chapter:
@@ -62,9 +61,9 @@ class ModelApproximation(Reported):
                 NamedValue("pressure range", limits.pressure, "Pa", "kPa", brief=False),
                 NamedValue("contraction range", limits.contraction, "1", "%", brief=False),
                 NamedValue("rms error", self.rmse, "N", brief=False),
-                NamedValue("maximum error", self.max_error, "N", brief=False),
-                NamedValue("pressure of the maximum error", self.max_error_pressure, "Pa", "kPa", brief=False),
-                NamedValue("contraction of the maximum error", self.max_error_contraction, "1", "%", brief=False),
+                NamedValue("maximum error", self.max_error.error, "N", brief=False),
+                NamedValue("pressure of the maximum error", self.max_error.pressure, "Pa", "kPa", brief=False),
+                NamedValue("contraction of the maximum error", self.max_error.contraction, "1", "%", brief=False),
             ),
             tables=(self._band_table(), parameter_table(self.model, "parameters", f"Parameters of {model}")),
         )
@@ -108,12 +107,9 @@ def approximate(law: Characteristic, other: Characteristic, validity_range: Vali
             f"{type(law).__name__} has one, the first at {p / 1e3:.4g} kPa and {100 * c:.2f} %. Choose a "
             "smaller validity range."
         )
-    worst = int(np.argmax(np.abs(difference)))
-    return ModelApproximation(
-        model, float(np.sqrt(np.mean(difference**2))), float(difference[worst]),
-        float(check_points["pressure"][worst]), float(check_points["contraction"][worst]),
-        check_points.with_columns(error=difference), validity_range,
-    )  # fmt: skip
+    worst, rmse = int(np.argmax(np.abs(difference))), float(np.sqrt(np.mean(difference**2)))
+    point = WorstPoint(float(difference[worst]), *(float(check_points[name][worst]) for name in POINT_COLUMNS))
+    return ModelApproximation(model, rmse, point, check_points.with_columns(error=difference), validity_range)
 
 
 def sample_on_grid(law: Characteristic, validity_range: ValidityRange, count: int) -> Recording:

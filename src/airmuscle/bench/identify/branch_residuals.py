@@ -96,16 +96,15 @@ def _loop_delay(time: Array, pressure: Array, force: Array, top: int) -> tuple[f
     """The delay [s] that closes the loop, and its width [N], as medians over intervals of pressure."""
     low, high = float(np.min(pressure)), float(pressure[top])
     edges = np.linspace(low + 0.2 * (high - low), high - 0.1 * (high - low), LOOP_BINS + 1)
-    delays, widths = [], []
+    found = []
     for a, b in itertools.pairwise(edges):
         sides = [_line(time, pressure, force, part, a, b) for part in (slice(0, top), slice(top, None))]
         if sides[0] is None or sides[1] is None:
             continue
         width, change = sides[1][0] - sides[0][0], abs(sides[0][1]) + abs(sides[1][1])
         if change > 0:
-            delays.append(width / change)
-            widths.append(width)
-    return (float(np.median(delays)), float(np.median(widths))) if len(delays) >= LOOP_BINS // 2 else None
+            found.append((width / change, width))
+    return tuple(np.median(found, axis=0).tolist()) if len(found) >= LOOP_BINS // 2 else None
 
 
 def _line(time: Array, pressure: Array, force: Array, part: slice, low: float, high: float) -> Array | None:
@@ -128,14 +127,9 @@ MIN_STANDARD_ERRORS = 3.0
 """Standard errors above which the mean difference is not random (chosen)."""
 
 
-class _BranchBins(NamedTuple):
-    """Mask of the rows with a pressure; of these the direction (1 inflating or contracting, -1 deflating or extending)
-    and the interval of the driven quantity, whose column is named."""
-
-    known: npt.NDArray[np.bool_]
-    direction: Array
-    bins: npt.NDArray[np.intp]
-    column: str
+_BranchBins = tuple[npt.NDArray[np.bool_], Array, npt.NDArray[np.intp], str]
+"""Mask of the rows with a pressure; of these the direction (1 inflating or contracting, -1 deflating or extending) and
+the interval of the driven quantity, whose column is named."""
 
 
 def branch_distance(runs: Sequence[Recording], residuals: Sequence[Array], quantity: str) -> float:
@@ -176,7 +170,7 @@ def branch_notes(runs: Sequence[Recording], distance: float, quantity: str, *, d
         return []
     unit = QUANTITIES[quantity].unit
     text = f"{100 * distance:.3g} %" if unit == "1" else f"{distance:.3g} {unit}"
-    columns = {column for run in runs if (column := _branch_bins(run).column)}
+    columns = {column for run in runs if (column := _branch_bins(run)[3])}
     names = [" and ".join(branch_name(column, d) for d in (1, -1)) for column in sorted(columns, reverse=True)]
     return [
         HintedText(
@@ -193,8 +187,8 @@ def _branch_bins(run: Recording) -> _BranchBins:
     complete = run if known.all() else run.rows(known)
     branches = tuple(each for each in find_branches(complete) if len(each.interval) >= MIN_BRANCH_ROWS)
     if len({branch.direction for branch in branches}) < 2:
-        return _BranchBins(known, np.zeros(0), np.zeros(0, dtype=np.intp), "")
+        return known, np.zeros(0), np.zeros(0, dtype=np.intp), ""
     column = branches[0].column
     driven = complete[column]
     edges = np.linspace(driven.min(), driven.max(), BINS + 1)[1:-1]
-    return _BranchBins(known, branch_directions(complete, branches), np.digitize(driven, edges), column)
+    return known, branch_directions(complete, branches), np.digitize(driven, edges), column

@@ -150,19 +150,13 @@ def _excess_error(name: str, rmse: float, limit: float, where: str) -> ExcludedM
     return ExcludedModel(name, f"Its {error}; {omitted}", cause, rmse)
 
 
-Progress = Callable[[str, float], None]
-Scores = list[tuple[Score, ...]]
-
-
 def score_candidates(
     candidates: Sequence[Candidate], splits: Sequence[ComparedPoints], loss: Loss, workers: Workers,
-    progress: Progress | None, *, can_exclude: bool,
-) -> Scores:  # fmt: skip
-    """The scores of each candidate for each split, in the order of the candidates.
-
-    With `can_exclude` the laws that are not linear in all parameters, whose fits take longest, are scored last, and not
-    cross-validated further where they cannot be recommended. The scores do not depend on the number of workers.
-    """
+    progress: Callable[[str, float], None] | None, *, can_exclude: bool,
+) -> list[tuple[Score, ...]]:  # fmt: skip
+    """The scores of each candidate for each split, in the order of the candidates. With `can_exclude` the laws that are
+    not linear in all parameters, whose fits take longest, are scored last, and not cross-validated further where they
+    cannot be recommended. The scores do not depend on the number of workers."""
     late = [i for i, each in enumerate(candidates) if can_exclude and max_excess(each) < float("inf")]
     early = [i for i in range(len(candidates)) if i not in late]
     scores_of: dict[int, tuple[Score, ...]] = {}
@@ -195,11 +189,9 @@ def score_candidates(
 
 
 def max_excess(candidate: Candidate) -> float:
-    """The ratio to the lowest error of other laws above which a law is not cross-validated further.
-
-    That of a recommended law for those whose fits take longest, because they are linear in some of their fitted
-    parameters only, and a greater one for other laws that are not linear.
-    """
+    """The ratio to the lowest error of other laws above which a law is not cross-validated further. That of a
+    recommended law for those whose fits take longest, because they are linear in some of their fitted parameters only,
+    and a greater one for other laws that are not linear."""
     fields = linear_fields(candidate.law)
     if isinstance(candidate.law, PooledLengthLaw):
         return float("inf")
@@ -211,5 +203,5 @@ def max_excess(candidate: Candidate) -> float:
 
 def _score_tasks(
     common: tuple[Sequence[ComparedPoints], Loss], tasks: Sequence[tuple[Candidate, Sequence[float]]]
-) -> Scores:
+) -> list[tuple[Score, ...]]:
     return [score_candidate(candidate, *common, limits) for candidate, limits in tasks]

@@ -46,9 +46,8 @@ def evaluate_force(law: Any, pressure: Array, contraction: Array, max_force: flo
 
 def slack_rows(law: Any, pressure: Array, contraction: Array) -> npt.NDArray[np.bool_]:
     """Mask (N,) of the points at which a law that is solved for the force is slack: it has no root, even at zero load.
-
-    Always False for force laws. Raises IdentificationError where the law gives no force at a point without being slack.
-    """
+    Always False for force laws. Raises IdentificationError where the law gives no force at a point without being
+    slack."""
     if isinstance(law, ForceLaw) or _solve_error(law, pressure, contraction) is None:
         return np.zeros(pressure.size, dtype=bool)
     slack = np.asarray(_deficit(law, pressure, contraction, np.zeros(pressure.size)) > 0)

@@ -148,8 +148,11 @@ def compare_chapter(
 
 
 def _fold_figure(comparison: Comparison) -> Any:
+    def by_number(name: str) -> list[str | float]:  # contraction 3 % before contraction 12 %
+        return [float(part) if i % 2 else part for i, part in enumerate(re.split(r"(\d+(?:\.\d+)?)", name))]
+
     figure, axes = new_figure(width=7.0, height=3.6)
-    folds = sorted((part.fold for part in comparison.ranking[0].fold_scores), key=_natural_order)
+    folds = sorted((part.fold for part in comparison.ranking[0].fold_scores), key=by_number)
     for i, contender in enumerate(comparison.ranking[:_MAX_CURVES]):
         error_of = {part.fold: part.rmse for part in contender.fold_scores}
         errors = [error_of[fold] for fold in folds]
@@ -161,11 +164,6 @@ def _fold_figure(comparison: Comparison) -> Any:
     axes.set(xlabel=common.strip(), ylabel=f"rms error, {comparison.leave_out.group_name} left out [N]", yscale="log")
     legend_outside(axes)
     return figure
-
-
-def _natural_order(name: str) -> list[str | float]:
-    """A key that sorts names by the numbers in them: contraction 3 % before contraction 12 %."""
-    return [float(part) if i % 2 else part for i, part in enumerate(re.split(r"(\d+(?:\.\d+)?)", name))]
 
 
 def residual_figure(fit: Fit) -> Any:

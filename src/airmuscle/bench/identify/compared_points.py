@@ -160,10 +160,8 @@ class ComparedPoints:
 
     def left_out_residuals(self, candidate: Candidate, fit: Fit, loss: Loss) -> Iterator[tuple[str, Array, int]]:
         """The name of each fold, the residuals in force [N] on its rows of the law fitted to all other rows, and the
-        number of its rows with a positive force.
-
-        Raises IdentificationError where the other rows do not determine the parameters.
-        """
+        number of its rows with a positive force. Raises IdentificationError where the other rows do not determine the
+        parameters."""
         law, refits = candidate.law, self._refits_of(fit) if isinstance(loss, LeastSquares) else None
         pooling = make_pooling(law, self.points, fit.problem) if isinstance(law, PooledLengthLaw) else None
         for i, (name, rows) in enumerate(zip(self.folds, self.left_out_rows, strict=True)):

@@ -7,7 +7,7 @@ of them also fits the others, which says nothing about its error on a new run.
 import abc
 import dataclasses
 from collections.abc import Sequence
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -25,20 +25,14 @@ ROUND_DIGITS = 2
 """Significant digits of the levels that are chosen on a ramp."""
 
 
-class HeldLevels(NamedTuple):
-    """Levels of a quantity, in increasing order, and the fraction of the rows at them."""
-
-    values: Array
-    fraction: float
-
-
-def held_levels(values: Array) -> HeldLevels:
-    """Return the levels of a measured quantity: medians of groups of values, without groups that a ramp fills."""
+def held_levels(values: Array) -> tuple[Array, float]:
+    """The levels of a measured quantity in increasing order, and the fraction of the rows at them: medians of groups of
+    values, without groups that a ramp fills."""
     ordered = np.sort(values)
     tolerance = LEVEL_TOLERANCE * float(np.abs(ordered).max())
     ends = np.flatnonzero(np.diff(ordered) > tolerance) + 1
     groups = [group for group in np.split(ordered, ends) if np.ptp(group) <= MAX_LEVEL_WIDTH * tolerance]
-    return HeldLevels(np.array([np.median(group) for group in groups]), sum(map(len, groups)) / ordered.size)
+    return np.array([np.median(group) for group in groups]), sum(map(len, groups)) / ordered.size
 
 
 def levels_of(values: Array, max_count: int) -> Array:
@@ -47,18 +41,18 @@ def levels_of(values: Array, max_count: int) -> Array:
     A level is the median of values closer together than a test rig controls them. A ramp gives quantiles, rounded to
     two significant digits.
     """
-    levels = held_levels(values)
-    if levels.fraction < 0.5:
+    levels, fraction = held_levels(values)
+    if fraction < 0.5:
         quantiles = np.quantile(values, np.linspace(0.1, 0.9, max_count))
         return np.unique([float(f"{value:.{ROUND_DIGITS - 1}e}") for value in quantiles])
-    if levels.values.size <= max_count:
-        return levels.values
-    return np.asarray(levels.values[np.unique(np.linspace(0, levels.values.size - 1, max_count).astype(int))])
+    if levels.size <= max_count:
+        return levels
+    return np.asarray(levels[np.unique(np.linspace(0, levels.size - 1, max_count).astype(int))])
 
 
 def is_pressure_ramp(pressure: Array, contraction: Array) -> bool:
     """Whether the pressure was swept at held contractions [Pa, 1], as in isometric tests."""
-    return held_levels(contraction).fraction >= HELD_FRACTION and held_levels(pressure).fraction < 0.5
+    return held_levels(contraction)[1] >= HELD_FRACTION and held_levels(pressure)[1] < 0.5
 
 
 Labels = npt.NDArray[np.str_]

@@ -45,11 +45,9 @@ class Scatter:
             yield NamedValue("distance of the branches", self.branches, "N", digits=3)
 
     def misfit_notes(self, rmse: float, greatest: float, lengths: int = 1) -> list[str]:
-        """The remark that a residual [N] is greater than the scatter explains.
-
-        A static law follows the middle of two branches. `greatest` is the maximum force of the data [N], `lengths` the
-        number of resting lengths that a law without an effect of the length is fitted to.
-        """
+        """The remark that a residual [N] is greater than the scatter explains. A static law follows the middle of two
+        branches. `greatest` is the maximum force of the data [N], `lengths` the number of resting lengths that a law
+        without an effect of the length is fitted to."""
         known = [each for each in (self.noise, self.repeatability) if each is not None]
         expected = max([*known, 0.5 * self.branches], default=0.0)
         if not known or rmse <= MAX_MISFIT * expected or rmse <= MIN_MISFIT * greatest:

@@ -30,11 +30,9 @@ _MAX_ROWS_OF_POINTS = 2000
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class FitPoints:
-    """The points of one or several recordings, for fits of any law; the sensors are estimated once.
-
-    `joined` has all rows of the recordings in order. `missing` is the mask of the rows that are not used, because they
-    lack a value or are `repeated` from another recording.
-    """
+    """The points of one or several recordings, for fits of any law; the sensors are estimated once. `joined` has all
+    rows of the recordings in order. `missing` is the mask of the rows that are not used, because they lack a value or
+    are `repeated` from another recording."""
 
     recordings: tuple[Recording, ...]
     joined: Recording
@@ -96,11 +94,9 @@ class FitPoints:
 
     @functools.cached_property
     def at_levels(self) -> Recording:
-        """The complete rows of `data`, with every quantity that is constant in a run replaced by its level.
-
-        Its noise and its ripple vary in these rows, and its level in repeated runs, but do not show how the muscle
-        depends on it.
-        """
+        """The complete rows of `data`, with every quantity that is constant in a run replaced by its level. Its noise
+        and its ripple vary in these rows, and its level in repeated runs, but do not show how the muscle depends on
+        it."""
         columns = [_columns_at_levels(run) for run in self.recordings]
         if not any(held.any() for _, each in columns for held in each.values()):
             return self.data
@@ -120,12 +116,24 @@ class FitPoints:
         """What was computed last for one law and all points, which laws with the same population share."""
         return {}
 
+    def _range_of(self, name: str) -> tuple[float, float]:
+        values, unit = self.data[name], " Pa" if name == "pressure" else ""
+        if np.ptp(values) == 0:
+            raise IdentificationError(
+                f"{self.data.origin}: {name} is {values[0]:g}{unit} in every row, so a surface cannot be fitted. "
+                f"Measure at several levels of {name}.",
+                cause=f"{name} does not vary",
+            )
+        return float(values.min()), float(values.max())
+
     def problem(
         self, characteristic: Characteristic, *, censoring: Censoring | None = None, sigma: npt.ArrayLike | None = None,
         fixed: Collection[str] = (),
     ) -> FitProblem:  # fmt: skip
         """The problem of fitting a law to these points; arguments as for `fit`. Raises IdentificationError."""
-        law = _with_validity_range(with_length(characteristic, self.data.constants.get(RESTING_LENGTH)), self.data)
+        law: Any = with_length(characteristic, self.data.constants.get(RESTING_LENGTH))
+        if hasattr(law, "with_validity_range") and len(self.data):  # a surface is scaled to the range of the data
+            law = law.with_validity_range(*map(self._range_of, ("pressure", "contraction")))
         if sigma is None:
             by_recording = self.deviations(fitted_quantity_of(characteristic).name)
             if by_recording is not None:
@@ -184,21 +192,3 @@ def _row_weights(data: Recording, dropped: npt.NDArray[np.bool_], sigma: npt.Arr
         raise IdentificationError(f"{data.origin}: every sigma must be finite and positive.")
     weights = 1.0 / deviations
     return np.asarray(weights / np.sqrt(np.mean(weights**2)))
-
-
-def _with_validity_range(law: Characteristic, data: Recording) -> Characteristic:
-    """A surface scaled to the validity range of the data; any other law unchanged."""
-    with_validity_range = getattr(law, "with_validity_range", None)
-    if with_validity_range is None or not len(data):
-        return law
-    for name, unit in (("pressure", " Pa"), ("contraction", "")):
-        if np.ptp(data[name]) == 0:
-            raise IdentificationError(
-                f"{data.origin}: {name} is {data[name][0]:g}{unit} in every row, so a surface cannot be fitted. "
-                f"Measure at several levels of {name}.",
-                cause=f"{name} does not vary",
-            )
-    scaled: Characteristic = with_validity_range(
-        *((float(data[n].min()), float(data[n].max())) for n in ("pressure", "contraction"))
-    )
-    return scaled

@@ -67,11 +67,9 @@ class _Linearisation(NamedTuple):
 def gauss_newton(
     problem: FitProblem, start: Array, known: FirstStep | None = None, relative_step: float = RELATIVE_STEP
 ) -> LeastSquaresSolution | None:
-    """The solution of least squares near `start` (P,).
-
-    None where the iteration is not certain: redundant parameters, a step that does not reduce the sum of squares, or
-    slow convergence. With `known` the first step needs no Jacobian, and the last Jacobian is one step old.
-    """
+    """The solution of least squares near `start` (P,). None where the iteration is not certain: redundant parameters, a
+    step that does not reduce the sum of squares, or slow convergence. With `known` the first step needs no Jacobian,
+    and the last Jacobian is one step old."""
     point, basis, previous, fraction = _evaluate(problem, np.asarray(start, dtype=float)), None, 0.0, 1.0
     if known is not None:
         basis = known.basis

@@ -202,13 +202,21 @@ def estimate_covariance(
     in_parts = runs.in_time or is_correlated(residuals, runs.run)
     if not in_parts and count < MIN_GROUPS:
         return independent
-    rows = weighted @ basis
+    rows = weighted @ basis  # the Jacobian in its orthonormal basis
     units = ((SPECIMENS, runs.specimen, specimens if specimens < count else 0), (RUNS, runs.run, count))
     whole = ((unit, group) for unit, group, number in units if number >= MIN_GROUPS)
     fewest, most = max(-(-(parameters + SPARE_GROUPS) // count), 2), len(residuals) // (count * MIN_GROUP_ROWS)
     divided = ((PARTS, successive_parts(runs.run, parts)) for parts in range(fewest, most + 1) if in_parts)
     for unit, group in itertools.chain(whole, divided):
-        found = _group(independent, rows, residuals, group, unit)
+        parts = _split(rows, group)
+        leverages = np.array([part.T @ part for part in parts])
+        raw = np.array([part.T @ errors for part, errors in zip(parts, _split(residuals, group), strict=True)])
+        values, vectors = np.linalg.eigh(leverages)
+        values = np.clip(values, 0.0, _MAX_LEVERAGE)
+        scaled, transposed = vectors / np.sqrt(1.0 - values)[:, None, :], np.swapaxes(vectors, 1, 2)
+        gradients = (scaled @ transposed @ raw[:, :, None])[:, :, 0]
+        groups = Groups(gradients, leverages, (scaled * values[:, None, :]) @ transposed)
+        found = dataclasses.replace(independent, unit=unit, groups=groups)
         if found.degrees_of_freedom >= MIN_DEGREES_OF_FREEDOM:
             return found
     return independent
@@ -236,22 +244,6 @@ def successive_parts(run: Indices, parts: int) -> Indices:
         rows = np.flatnonzero(run == i)
         groups[rows] = i * parts + np.arange(rows.size) * parts // rows.size
     return groups
-
-
-def _group(
-    independent: ParameterCovariance, rows: Array, residuals: Array, group: Indices, unit: str
-) -> ParameterCovariance:
-    """The covariance by groups (N,), from the Jacobian in its orthonormal basis (N, P) and the residuals (N,)."""
-    parts = _split(rows, group)
-    leverages = np.array([part.T @ part for part in parts])
-    raw = np.array([part.T @ errors for part, errors in zip(parts, _split(residuals, group), strict=True)])
-    values, vectors = np.linalg.eigh(leverages)
-    values = np.clip(values, 0.0, _MAX_LEVERAGE)
-    scaled, transposed = vectors / np.sqrt(1.0 - values)[:, None, :], np.swapaxes(vectors, 1, 2)
-    gradients = (scaled @ transposed @ raw[:, :, None])[:, :, 0]
-    return dataclasses.replace(
-        independent, unit=unit, groups=Groups(gradients, leverages, (scaled * values[:, None, :]) @ transposed)
-    )
 
 
 def _split(rows: Array, group: Indices) -> list[Array]:

@@ -178,11 +178,9 @@ def make_pooling(law: PooledLengthLaw, points: FitPoints, problem: FitProblem) -
 
 
 def pool(law: PooledLengthLaw, population: Fit, points: FitPoints) -> Fit:
-    """The fit of a pooled law, from the fit of its population law to the same points.
-
-    Estimates and correlations are those of the population parameters, with the scatter of the specimens; `effects` has
-    those of the specimens. The problem remains that of the population law.
-    """
+    """The fit of a pooled law, from the fit of its population law to the same points. Estimates and correlations are
+    those of the population parameters, with the scatter of the specimens; `effects` has those of the specimens. The
+    problem remains that of the population law."""
     pooling = make_pooling(law, points, population.problem)
     predicted = pooling.predict(population.values)
     covariance = pooling.covariance(population.values, predicted, points.runs)
@@ -205,10 +203,8 @@ def pool(law: PooledLengthLaw, population: Fit, points: FitPoints) -> Fit:
 
 def pooled_band(fit: Fit, points: Recording, jacobian: Array, level: float) -> tuple[Array, Array]:
     """The offset (N,) of the specimen that `points` state from the population, and the half width (N,) of the band of
-    the force.
-
-    A specimen that the fit does not know has the mean of the prior, and the variance of the prior is added.
-    """
+    the force. A specimen that the fit does not know has the mean of the prior, and the variance of the prior is
+    added."""
     effects, model = fit.effects, fit.model
     assert effects is not None
     assert effects.covariance is not None

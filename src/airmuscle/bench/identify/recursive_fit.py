@@ -170,8 +170,9 @@ class RecursiveFit(ShortRepr):
             shares = shares @ self._inverse.T @ self.squared_factor.T
         return np.asarray(np.sum(shares**2, axis=1))
 
-    def _terms(self, pressure: float, contraction: float) -> Array:
-        return _terms(np.array([pressure]), np.array([contraction]), self.limits.validity_range, self.degree)
+    def _terms(self, pressure: float | Array, contraction: float | Array) -> Array:
+        point = np.atleast_1d(pressure), np.atleast_1d(contraction)
+        return _terms(*point, self.limits.validity_range, self.degree)
 
 
 def _with_row(factor: Array, row: Array) -> Array:

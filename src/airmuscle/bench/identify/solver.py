@@ -28,11 +28,9 @@ _SINGULAR_TOLERANCE = 1e-8
 
 
 def solve_least_squares(problem: FitProblem, loss: Loss, start: Array | None = None) -> LeastSquaresSolution:
-    """The free parameters that minimise the loss. Raises IdentificationError where the search does not converge.
-
-    The search starts at `start`, if possible by Gauss-Newton steps; by default at the initial values found by variable
-    projection.
-    """
+    """The free parameters that minimise the loss. Raises IdentificationError where the search does not converge. The
+    search starts at `start`, if possible by Gauss-Newton steps; by default at the initial values found by variable
+    projection."""
     if not is_linear(problem):
         near = gauss_newton(problem, start) if start is not None and isinstance(loss, LeastSquares) else None
         if near is not None:

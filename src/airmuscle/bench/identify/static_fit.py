@@ -130,11 +130,9 @@ def _fit_law(
 def refit(
     law: Characteristic, points: FitPoints, *, loss: Loss = LeastSquares(), fixed: Collection[str] = ()
 ) -> Characteristic:
-    """The law that `fit` finds for these points if its search starts at the parameters of `law`.
-
-    Other initial values are tried only where the search does not converge, and nothing but the rank is computed of the
-    solution. Raises IdentificationError where the points do not determine the parameters.
-    """
+    """The law that `fit` finds for these points if its search starts at the parameters of `law`. Other initial values
+    are tried only where the search does not converge, and nothing but the rank is computed of the solution. Raises
+    IdentificationError where the points do not determine the parameters."""
     if isinstance(law, PooledLengthLaw):
         population = refit(law.population, points, loss=loss, fixed=fixed)
         problem = points.problem(population)

@@ -100,15 +100,18 @@ def _rows(fit: Fit) -> Table:
 
 
 def equation_section(fit: Fit) -> tuple[tuple[DisplayedEquation, ...], tuple[Table, ...]]:
-    """Return the equations of a fitted law within the range of its data, and the table of their symbols.
-
-    The first equation has the parameters as symbols. A polynomial in scaled quantities follows in physical quantities.
-    A law without a closed form is represented by the definition in its documentation.
-    """
+    """Return the equations of a fitted law within the range of its data, and the table of their symbols. The first
+    equation has the parameters as symbols. A polynomial in scaled quantities follows in physical quantities. A law
+    without a closed form is represented by the definition in its documentation."""
     quantity = fit.fitted_quantity
     equations = law_equation(fit.model, quantity.name, quantity.arguments, fit.data_ranges)
     if not equations:
-        return (_definition(type(fit.model)),), ()
+        law: type[Any] = type(fit.model)
+        text = " ".join((law.__doc__ or law.__name__).split("\n\n")[0].split())
+        references: tuple[Reference, ...] = getattr(law, "references", ())
+        sources = "; ".join(f"{each.authors} {each.year or ''}".strip() for each in references) or "none published"
+        note = f"{text} The law has no closed form of a length that can be shown. Source: {sources}."
+        return (DisplayedEquation("equation-1", "Definition", (), note, {}),), ()
     scales = {"pressure": (1e-3, " kPa"), "contraction": (1.0, ""), "force": (1.0, " N")}
     ranges = []
     for name in quantity.arguments:
@@ -160,15 +163,6 @@ def _displayed(equation: LawEquation, name: str, validity: str) -> DisplayedEqua
     return DisplayedEquation(name, equation.title, tuple(displayed_lines(equation)), note, texts)
 
 
-def _definition(law: type[Any]) -> DisplayedEquation:
-    """Return the definition of a law whose expression has no closed form, or is too long to be shown."""
-    text = " ".join((law.__doc__ or law.__name__).split("\n\n")[0].split())
-    references: tuple[Reference, ...] = getattr(law, "references", ())
-    sources = "; ".join(f"{each.authors} {each.year or ''}".strip() for each in references)
-    note = f"{text} The law has no closed form of a length that can be shown. Source: {sources or 'none published'}."
-    return DisplayedEquation("equation-1", "Definition", (), note, {})
-
-
 def ramp_plot(fit: Fit) -> Plot | None:
     """Return measured and modelled force over pressure at the held contractions; None if the pressure was not swept
     at held contractions."""
@@ -198,7 +192,7 @@ def _at(values: Array, level: float) -> Any:
 def _draw_panel(axes: Any, fit: Fit, data: Recording, length: float | None) -> None:
     """Draw the ramps of one resting length [m]."""
     law = with_length(fit.model, length)
-    levels = held_levels(data["contraction"]).values
+    levels = held_levels(data["contraction"])[0]
     selected = levels[np.unique(np.linspace(0, levels.size - 1, min(levels.size, MAX_RAMPS)).astype(int))]
     for i, level in enumerate(selected):
         rows = data.rows(_at(data["contraction"], level) if levels.size > 1 else slice(None))

@@ -42,11 +42,9 @@ class CorrelationIndex:
 
 
 def correlation_index(measured: npt.ArrayLike, modelled: npt.ArrayLike) -> CorrelationIndex:
-    """The correlation index of modelled and measured values, shape (N,) each, in the same unit.
-
-    Raises IdentificationError where a value is not finite, the shapes differ, there are fewer than two values, or the
-    measured values do not vary.
-    """
+    """The correlation index of modelled and measured values, shape (N,) each, in the same unit. Raises
+    IdentificationError where a value is not finite, the shapes differ, there are fewer than two values, or the measured
+    values do not vary."""
     y, k = np.asarray(measured, dtype=float), np.asarray(modelled, dtype=float)
     if y.shape != k.shape or y.size < 2:
         raise IdentificationError(
@@ -72,11 +70,9 @@ class WorstPoint:
 
 
 def goodness_of_fit(problem: FitProblem, modelled: Array, data: Recording) -> dict[str, Any]:
-    """The rms error, maximum error and correlation index of a law, as fields of a `Fit`.
-
-    The error at a row is model - measured, with the model (N,) clamped; at a censored row it is the violation of its
-    bound, because its reading is not a measured value. The squares of violations are added to those of measured rows.
-    """
+    """The rms error, maximum error and correlation index of a law, as fields of a `Fit`. The error at a row is model -
+    measured, with the model (N,) clamped; at a censored row it is the violation of its bound, because its reading is
+    not a measured value. The squares of violations are added to those of measured rows."""
     measured, target = problem.censoring == 0, data[problem.fitted_quantity.name]
     errors = problem.residuals(modelled) / problem.weights
     worst = int(np.argmax(np.abs(errors)))
