@@ -135,13 +135,11 @@ the interval of the driven quantity, whose column is named."""
 def branch_distance(runs: Sequence[Recording], residuals: Sequence[Array], quantity: str) -> float:
     """The distance [SI] of the two branches that the residuals of a fit follow; 0 if they follow none.
 
-    runs        the recordings of the fit
-    residuals   residual (model - measured) of each row of each recording [SI], NaN for rows that are not measured
-    quantity    name of the fitted quantity
+    residuals  (model - measured) of each row of each recording [SI], NaN for rows that are not measured
 
     The medians of both branches are compared at equal driven quantity, so that neither an error of the law that both
     share nor an outlier counts. Their average difference must exceed three standard errors and the standard deviation
-    of the sensor.
+    of the sensor of the fitted `quantity`.
     """
     differences: list[float] = []  # median residual of inflating or contracting rows minus that of the others
     for run, own in zip(runs, residuals, strict=True):

@@ -162,20 +162,18 @@ class ComparedPoints:
         """The name of each fold, the residuals in force [N] on its rows of the law fitted to all other rows, and the
         number of its rows with a positive force. Raises IdentificationError where the other rows do not determine the
         parameters."""
-        law, refits = candidate.law, self._refits_of(fit) if isinstance(loss, LeastSquares) else None
+        law, refits = candidate.law, None
+        if isinstance(loss, LeastSquares):
+            if not self._kept_refits or self._kept_refits[0].problem is not fit.problem:
+                group = self.fold_of_rows[~self.points.missing]
+                self._kept_refits[:] = [_FoldRefits(fit, group, len(self.folds), self.points)]
+            refits = self._kept_refits[0]  # also for the next law of the same population
         pooling = make_pooling(law, self.points, fit.problem) if isinstance(law, PooledLengthLaw) else None
         for i, (name, rows) in enumerate(zip(self.folds, self.left_out_rows, strict=True)):
             model = None if refits is None else refits.law_without(i, pooling)
             if model is None:
                 model = self._refit_exactly(candidate, fit, i, loss)
             yield name, residuals_of_rows(model, rows, self.max_force), int(np.count_nonzero(rows.measured))
-
-    def _refits_of(self, fit: Fit) -> "_FoldRefits":
-        """The refits of a population law without each fold; kept for the next law of the same population."""
-        if not self._kept_refits or self._kept_refits[0].problem is not fit.problem:
-            group = self.fold_of_rows[~self.points.missing]
-            self._kept_refits[:] = [_FoldRefits(fit, group, len(self.folds), self.points)]
-        return self._kept_refits[0]
 
     def _refit_exactly(self, candidate: Candidate, fit: Fit, fold: int, loss: Loss) -> Characteristic:
         """The refit by a search of its own."""

@@ -142,7 +142,9 @@ def _cause(contradicting: Sequence[MatchedRuns], matches: Matches) -> list[str |
             Hint("To state it as the specimen", "columns", mapped, "ColumnMapping"),
             " Fit each specimen by itself, or at least three together with --compare.",
         ]
-    shifts = np.array([each.pressure_shift for each in contradicting])
+    # The error of the pressure of the first block that would explain the differences.
+    slopes = [np.maximum(each.first.slopes[each.pairs[:, 0]], 1e-12) for each in contradicting]
+    shifts = -np.array([np.median(each.differences / s) for each, s in zip(contradicting, slopes, strict=True)])
     if np.mean(np.abs(np.abs(shifts) / AMBIENT_PRESSURE - 1.0) < SHIFT_TOLERANCE) > 0.5:
         pairs = zip(contradicting, shifts, strict=True)
         names = [(each.first if shift > 0 else each.second).recording.origin for each, shift in pairs]

@@ -93,11 +93,6 @@ class MatchedRuns:
             return float(np.quantile(np.abs(self.differences), 0.75))
         return float(np.median(self.differences))
 
-    @property
-    def pressure_shift(self) -> float:
-        """The error of the pressure of the first block [Pa] that would explain the difference."""
-        return -float(np.median(self.differences / np.maximum(self.first.slopes[self.pairs[:, 0]], 1e-12)))
-
 
 class Matches(NamedTuple):
     """All matched runs of a bench, and its maximum force [N]."""
