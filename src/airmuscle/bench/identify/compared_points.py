@@ -55,8 +55,7 @@ def evaluated_rows(runs: Sequence[Recording]) -> EvaluatedRows:
     """The complete rows of recordings."""
     pressure, contraction, force = (np.concatenate([run[name] for run in runs]) for name in POINT_COLUMNS)
     index = np.repeat(np.arange(len(runs)), [len(run) for run in runs])
-    stated = [run.constants.get(RESTING_LENGTH) for run in runs]
-    lengths = [None if length is None else float(length) for length in stated]
+    lengths = [float(run.constants[RESTING_LENGTH]) if RESTING_LENGTH in run.constants else None for run in runs]
     muscles = tuple(zip(lengths, map(specimen_name, runs), strict=True))
     return EvaluatedRows(pressure, contraction, force, index, muscles).at(np.isfinite(pressure + contraction + force))
 

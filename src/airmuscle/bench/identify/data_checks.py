@@ -63,16 +63,13 @@ class Scatter:
 
 @dataclasses.dataclass(frozen=True)
 class Remarks:
-    """What recordings show, without a law or with a fit to them.
-
-    notes    remarks, as sentences; what contradicts a static characteristic with files and remedy
-    scatter  noise of the force sensor and repeatability of the force
-    delay    delay of the force after the pressure; None without one
-    """
+    """What recordings show, without a law or with a fit to them."""
 
     notes: tuple[str, ...]
+    """Sentences; what contradicts a static characteristic with files and remedy."""
     scatter: Scatter
     delay: SensorDelay | None
+    """Delay of the force after the pressure; None without one."""
 
 
 MIN_DISTANCE = 0.02
@@ -103,15 +100,15 @@ def outlier_notes(recordings: Sequence[Recording]) -> list[str]:
     rms = math.sqrt(sum((outlier.value - outlier.expected) ** 2 for _, outlier in found) / rows)
     if not found or (len(found) < MIN_SHARE * rows and rms < MIN_RMS * greatest):
         return []
-    files = len({run.origin for run, _ in found})
+    files, spoilt = {run.origin for run in timed}, {run.origin for run, _ in found}
     examples = "; ".join(
         f"{run.origin}, row {each.row + 1} ({each.value:.4g} N, neighbours {each.expected:.4g} N)"
         for run, each in found[:3]
     )
     return [
         HintedText(
-            f"Suspected outliers of the force pull the law: {len(found)} of {rows} rows, in {files} of "
-            f"{len({run.origin for run in timed})} files, which alone give an rms error of {rms:.2g} N ({examples}).",
+            f"Suspected outliers of the force pull the law: {len(found)} of {rows} rows, in {len(spoilt)} of "
+            f"{len(files)} files, which alone give an rms error of {rms:.2g} N ({examples}).",
             Hint("To leave them out", "drop_outliers", True, "ColumnMapping"),
             Hint("To reduce their weight", "loss", Huber(float(f"{HUBER * sensors['force'].std:.2g}"))),
         )

@@ -40,6 +40,8 @@ class FitPoints:
     dropped: int
     """Number of rows with a missing value."""
     repeated: tuple[RepeatedRows, ...] = ()
+    kept: dict[str, Any] = dataclasses.field(default_factory=dict)
+    """What was computed last for one law and all points, which laws with the same population share."""
 
     @classmethod
     def from_recordings(cls, recording: Recording | Sequence[Recording]) -> "FitPoints":
@@ -78,8 +80,7 @@ class FitPoints:
     def runs(self) -> Runs:
         """The run and the specimen of each complete row."""
         lengths, names = [len(run) for run in self.recordings], [specimen_name(run) for run in self.recordings]
-        position = {name: i for i, name in enumerate(sorted(set(names)))}
-        numbers = np.arange(len(lengths)), np.array([position[name] for name in names], dtype=np.intp)
+        numbers = np.arange(len(lengths)), np.unique(names, return_inverse=True)[1]
         index, specimen = (np.repeat(each, lengths)[~self.missing] for each in numbers)
         return Runs(index, specimen, all("time" in run for run in self.recordings))
 
@@ -110,11 +111,6 @@ class FitPoints:
             values[held] = merged[member]
             levels[name] = values[~self.missing]
         return self.data.with_columns(**levels)
-
-    @functools.cached_property
-    def kept(self) -> dict[str, Any]:
-        """What was computed last for one law and all points, which laws with the same population share."""
-        return {}
 
     def _range_of(self, name: str) -> tuple[float, float]:
         values, unit = self.data[name], " Pa" if name == "pressure" else ""

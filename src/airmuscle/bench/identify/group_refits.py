@@ -8,10 +8,9 @@ with a variance that is common to all members, and known only from the n members
 member have one sign over many rows, so that the rows do not count. The band is therefore that of Student's t
 distribution with n - 1 degrees of freedom.
 
-A law of muscles of several lengths is a regression of the specimens by ln L_0. A specimen that is left out at the end
-of the range is predicted by extrapolation, and has an error that is greater than that of a further one within the
-range: the variance of the former is s^2/(1 - h_i), that of the latter s^2 (1 + h), with the leverages h of the
-regression (Cook and Weisberg, Residuals and Influence in Regression (1982), section 2.2).
+A law of muscles of several lengths is a regression of the specimens by ln L_0. The error of a specimen that is left
+out, at an end of the range by extrapolation, has the variance s^2/(1 - h_i), that of a further one s^2 (1 + h), with
+the leverages h of the regression (Cook and Weisberg, Residuals and Influence in Regression (1982), section 2.2).
 """
 
 import math

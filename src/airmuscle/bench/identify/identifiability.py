@@ -77,7 +77,11 @@ class Identifiability:
     @property
     def rank(self) -> int:
         """Numerical rank of the sensitivity matrix."""
-        return int(np.count_nonzero(_is_nonzero(self.singular_values, self.tolerance)))
+        return int(np.count_nonzero(self._nonzero))
+
+    @property
+    def _nonzero(self) -> npt.NDArray[np.bool_]:
+        return np.asarray(self.singular_values > self.tolerance * self.singular_values[:1])
 
     @property
     def condition(self) -> float:
@@ -87,12 +91,11 @@ class Identifiability:
 
     def inverse(self) -> Array:
         """(J^T J)^-1 of the scaled matrix J, shape (P, P); NaN for parameters in the null space."""
-        nonzero = _is_nonzero(self.singular_values, self.tolerance)
+        nonzero = self._nonzero
         vectors = self.right_singular_vectors[nonzero]
         inverse = (vectors.T / self.singular_values[nonzero] ** 2) @ vectors
         null = (np.abs(self.right_singular_vectors[~nonzero]) > 1e-3).any(axis=0)
-        inverse[null, :] = np.nan
-        inverse[:, null] = np.nan
+        inverse[null, :] = inverse[:, null] = np.nan
         return np.asarray(inverse)
 
 
@@ -116,7 +119,7 @@ def analyse_identifiability(
     tolerance     relative singular value below which it counts as zero
     """
     singular, vectors = singular_vectors(sensitivities * scales)
-    nonzero = _is_nonzero(singular, tolerance)
+    nonzero = singular > tolerance * singular[:1]
     errors = np.where(nonzero, residual_std / np.where(nonzero, singular, 1.0), np.inf)
     undetermined = [
         _describe_combination(vector, error, names)
@@ -124,10 +127,6 @@ def analyse_identifiability(
         if error > MAX_RELATIVE_ERROR
     ]
     return Identifiability(singular, vectors, tuple(reversed(undetermined)), tolerance)
-
-
-def _is_nonzero(singular: Array, tolerance: float) -> npt.NDArray[np.bool_]:
-    return np.asarray(singular > tolerance * singular[:1])
 
 
 def _describe_combination(vector: Array, relative_stderr: float, names: Sequence[str]) -> UndeterminedCombination:

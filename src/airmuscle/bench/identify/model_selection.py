@@ -244,20 +244,20 @@ def compare_splits(
         ranking.sort(key=lambda m: (m.cross_validated_rmse, m.parameter_count))
         recommended, reason = recommend(ranking, split)
         of_lengths = length_notes(find_length_errors(recommended.fit.model, runs))
-        remarks = (*recommended.fit.notes, *of_lengths, *_limit_notes(recommended))
+        remarks = (*recommended.fit.notes, *of_lengths)
+        if np.isfinite(recommended.limit):
+            remarks += (_limit_note(recommended),)
         comparisons.append(Comparison(tuple(ranking), excluded, split, recommended, reason, unavailable, remarks))
     return tuple(comparisons)
 
 
-def _limit_notes(model: RankedModel) -> tuple[str, ...]:
+def _limit_note(model: RankedModel) -> str:
     """The definition of the errors for a robust loss, and the number of limited rows of a law."""
-    if not np.isfinite(model.limit):
-        return ()
     rows = sum(score.rows for score in model.fold_scores)
     many = model.limited_rows > MAX_LIMITED * rows
     advice = " These are more than outliers: the law does not describe them, or the files differ." if many else ""
     return (
         "In all errors of the ranking, residuals count at most as six robust standard deviations (1.4826 times the "
         f"median magnitude), at least as the scale of the robust loss: {model.limit:.4g} N for {model.candidate.name}, "
-        f"which limits {model.limited_rows} of {rows} rows.{advice}",
+        f"which limits {model.limited_rows} of {rows} rows.{advice}"
     )

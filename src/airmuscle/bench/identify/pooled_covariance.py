@@ -138,14 +138,13 @@ class PooledCovariance:
 
     def describe(self) -> str:
         """What the errors are estimated from, and what they do not contain, as a phrase."""
-        unknown = "the scatter between runs (zero and gain of the sensors) is not known"
-        parts = f"of {len(self.shifts)} successive parts of the runs; {unknown}"
+        unknown = "; the scatter between runs (zero and gain of the sensors) is not known"
         within = {
-            rows_of.RUNS: f"of {self.run_count} runs",
-            rows_of.PARTS: parts,
-            rows_of.ROWS: f"of independent rows; {unknown}",
+            rows_of.RUNS: f"{self.run_count} runs",
+            rows_of.PARTS: f"{len(self.shifts)} successive parts of the runs{unknown}",
+            rows_of.ROWS: f"independent rows{unknown}",
         }
-        return f"from the scatter of the specimens and {within[self.unit]}"
+        return f"from the scatter of the specimens and of {within[self.unit]}"
 
     @property
     def _factor(self) -> float:

@@ -90,15 +90,13 @@ class Pooling:
         predicted = PredictedEffects(effects, surface, decay, ratio)
         if not (problem.censoring > 0).any():
             return predicted
-        measured = [
-            BoundedRows(basis[own], rest[own], problem.censoring[own], problem.weights[own])
-            for own in (kept & (self.specimens.member == i) for i in range(members[1]))
-        ]
-        regions = [self._slack_region(i, predicted, values, kept) for i in range(members[1])]
-        limited = [
-            bounded_coefficients(BoundedRows(*map(np.concatenate, zip(own, region, strict=True))), ratio, start)
-            for own, region, start in zip(measured, regions, effects.coefficients, strict=True)
-        ]
+        limited = []
+        for i, start in enumerate(effects.coefficients):
+            own = kept & (self.specimens.member == i)
+            measured = BoundedRows(basis[own], rest[own], problem.censoring[own], problem.weights[own])
+            bounds = self._slack_region(i, predicted, values, kept)
+            joined = BoundedRows(*map(np.concatenate, zip(measured, bounds, strict=True)))
+            limited.append(bounded_coefficients(joined, ratio, start))
         effects = dataclasses.replace(effects, coefficients=np.array(limited))
         return predicted._replace(effects=effects)
 

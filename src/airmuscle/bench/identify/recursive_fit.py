@@ -136,7 +136,7 @@ class RecursiveFit(ShortRepr):
     def determined(self) -> float:
         """Share of the range of the test rig, from 0 to 1, on which the samples determine the force better than one
         sample at the point would."""
-        return float(np.mean(self._variance(_grid_terms(self.limits.validity_range, self.degree)) < DETERMINED))
+        return float(np.mean(self._variance(_grid(self.limits.validity_range, self.degree)[2]) < DETERMINED))
 
     def force(self, pressure: float, contraction: float) -> tuple[float, float]:
         """Predicted force and its standard error [N], without the limits of the force."""
@@ -149,7 +149,7 @@ class RecursiveFit(ShortRepr):
         Points with a predicted force above the maximum, and those where the muscle is certainly slack (below zero by
         two standard errors), are left out. Raises IdentificationError if no point remains.
         """
-        terms = _grid_terms(self.limits.validity_range, self.degree)
+        pressure, contraction, terms = _grid(self.limits.validity_range, self.degree)
         force, variance = terms @ self.coefficients, self._variance(terms)
         error = self.noise * np.sqrt(variance)
         feasible = (force <= self.limits.max_force) & (force + 2 * error >= 0.0)
@@ -159,7 +159,6 @@ class RecursiveFit(ShortRepr):
                 "limits, or check the units."
             )
         best = int(np.argmax(np.where(feasible, variance, -1.0)))
-        pressure, contraction = _grid(self.limits.validity_range)
         return NextPoint(float(pressure[best]), float(contraction[best]), float(force[best]), float(error[best]))
 
     def _variance(self, terms: Array) -> Array:
@@ -193,13 +192,8 @@ def _terms(pressure: Array, contraction: Array, span: ValidityRange, degree: int
 
 
 @functools.lru_cache(maxsize=8)
-def _grid(span: ValidityRange) -> tuple[Array, Array]:
-    """All pairs of evenly spaced levels of pressure and contraction, shape (N,) each."""
+def _grid(span: ValidityRange, degree: int) -> tuple[Array, Array, Array]:
+    """All pairs of evenly spaced levels of pressure and contraction, shape (N,) each, and their terms (N, P)."""
     axes = (np.linspace(*limits, LEVEL_COUNT) for limits in (span.pressure, span.contraction))
-    pressure, contraction = np.meshgrid(*axes, indexing="ij")
-    return pressure.ravel(), contraction.ravel()
-
-
-@functools.lru_cache(maxsize=8)
-def _grid_terms(span: ValidityRange, degree: int) -> Array:
-    return _terms(*_grid(span), span, degree)
+    pressure, contraction = map(np.ravel, np.meshgrid(*axes, indexing="ij"))
+    return pressure, contraction, _terms(pressure, contraction, span, degree)

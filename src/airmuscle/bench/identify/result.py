@@ -205,8 +205,7 @@ class Fit(Reported):
 
     def chapter(self) -> Chapter:
         """The description of the fit: goodness of fit, estimates, residuals, remarks on the data."""
-        columns = {name: self.correlations[:, i] for i, name in enumerate(self.names)}
-        correlations = {"parameter": list(self.names), **columns}
+        correlations = {"parameter": list(self.names), **dict(zip(self.names, self.correlations.T, strict=True))}
         return Chapter(
             name="fit",
             title=self._title,

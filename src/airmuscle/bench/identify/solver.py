@@ -8,12 +8,7 @@ import numpy as np
 from ...core import Array, Hint, IdentificationError
 from .gauss_newton import gauss_newton
 from .problem import FitProblem, LeastSquaresSolution
-from .variable_projection import (
-    find_initial_values,
-    is_linear_parameter,
-    solve_censored_least_squares,
-    uncensored_rank,
-)
+from .variable_projection import find_initial_values, is_linear_parameter, solve_censored_least_squares, uncensored_rank
 from .weighting import LeastSquares, Loss
 
 SEARCH_STAGES = (("trf", 100), ("dogbox", 500), ("trf", 500))

@@ -135,9 +135,11 @@ def fit_volume(points: VolumePoints, resting_length: float) -> VolumeFit:
             f"{levels}. Fill the muscle at further lengths."
         )
     degrees = range(1, min(MAX_DEGREE, levels - 2, points.volume.size - 3) + 1)
-    polynomials = {f"polynomial of degree {n}": _polynomial(points, resting_length, n) for n in degrees}
-    braid = _braid(points, resting_length)
-    laws: dict[str, Geometry] = {**({} if braid is None else {"Braid": braid}), **polynomials}
+    braid, ends = _braid(points, resting_length), (float(points.contraction.min()), float(points.contraction.max()))
+    laws: dict[str, Geometry] = {} if braid is None else {"Braid": braid}
+    for n in degrees:
+        terms = np.linalg.lstsq(_chebyshev_terms(points.contraction, *ends, n), points.volume, rcond=None)[0]
+        laws[f"polynomial of degree {n}"] = ChebyshevGeometry(tuple(terms.tolist()), *ends, resting_length)
     criteria = dict[str, float]()
     size, resolution = points.volume.size, RESOLUTION * float(np.abs(points.volume).max())
     for name, law in laws.items():  # residuals below the resolution of the volumes do not distinguish laws
@@ -164,13 +166,6 @@ def _braid(points: VolumePoints, resting_length: float) -> Braid | None:
         return Braid(radius, float(np.arccos(np.sqrt(cosine_squared))), resting_length)
     except ParameterError:
         return None
-
-
-def _polynomial(points: VolumePoints, resting_length: float, degree: int) -> ChebyshevGeometry:
-    ends = float(points.contraction.min()), float(points.contraction.max())
-    terms = _chebyshev_terms(points.contraction, *ends, degree)
-    coefficients = np.linalg.lstsq(terms, points.volume, rcond=None)[0]
-    return ChebyshevGeometry(tuple(map(float, coefficients)), *ends, resting_length)
 
 
 def _design(law: Geometry, contraction: Array) -> Array:
