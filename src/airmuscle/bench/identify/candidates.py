@@ -24,10 +24,8 @@ COARSE_STEP = 20
 
 def evaluate_force(law: Any, pressure: Array, contraction: Array, max_force: float) -> Array:
     """Forces [N] at N points, shape (N,), defined at every point so that all laws are compared on the same rows.
-
-    `max_force` [N] limits the force of laws that give contraction or pressure. Where such a law needs a higher
-    pressure at zero load than is applied, the muscle is slack and the force is 0.
-    """
+    `max_force` [N] limits the force of laws that give contraction or pressure. Where such a law needs a higher pressure
+    at zero load than is applied, the muscle is slack and the force is 0."""
     with np.errstate(all="ignore"):
         if isinstance(law, ForceLaw):
             force = np.asarray(law.force(pressure, contraction), dtype=float) + np.zeros(pressure.size)

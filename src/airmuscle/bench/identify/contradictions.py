@@ -173,12 +173,10 @@ class TwoGroups(NamedTuple):
 
 
 def two_muscle_notes(matches: Matches) -> list[str]:
-    """The remark that the runs fall into two groups, as those of two muscles do; empty if they do not.
-
-    A drift has no gap between two levels. Hysteresis, and friction that grows with the speed, raise the force of one
-    direction of the motion and lower that of the other, so that both directions must give the same groups; static
-    points must differ by more than hysteresis.
-    """
+    """The remark that the runs fall into two groups, as those of two muscles do; empty if they do not. A drift has no
+    gap between two levels. Hysteresis, and friction that grows with the speed, raise the force of one direction of the
+    motion and lower that of the other, so that both directions must give the same groups; static points must differ by
+    more than hysteresis."""
     runs = [each for each in matches.runs if not each.is_unordered]
     is_static = all(each.first.direction == 0 for each in runs)
     ways, least = ((0,), MAX_HYSTERESIS) if is_static else ((1, -1), MIN_DIFFERENCE)

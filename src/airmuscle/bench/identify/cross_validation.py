@@ -36,11 +36,9 @@ def held_levels(values: Array) -> tuple[Array, float]:
 
 
 def levels_of(values: Array, max_count: int) -> Array:
-    """Return the levels of a measured quantity, at most `max_count` of them, evenly selected, in its unit.
-
-    A level is the median of values closer together than a test rig controls them. A ramp gives quantiles, rounded to
-    two significant digits.
-    """
+    """Return the levels of a measured quantity, at most `max_count` of them, evenly selected, in its unit. A level is
+    the median of values closer together than a test rig controls them. A ramp gives quantiles, rounded to two
+    significant digits."""
     levels, fraction = held_levels(values)
     if fraction < 0.5:
         quantiles = np.quantile(values, np.linspace(0.1, 0.9, max_count))

@@ -141,11 +141,9 @@ def _curved_step(
     problem: FitProblem, point: _Point, linear: _Linearisation, fraction: float
 ) -> tuple[_Point, float] | None:
     """The point after at most this fraction of a Gauss-Newton step with geodesic acceleration, and the fraction made.
-
     The acceleration follows the curved valley of correlated parameters; the fraction decreases until the sum of squares
     does not increase. The direction stays that of the full step: damping the normal matrix would damp the motion along
-    the valley first. Reference: Transtrum and Sethna, arXiv:1201.5885 (2012).
-    """
+    the valley first. Reference: Transtrum and Sethna, arXiv:1201.5885 (2012)."""
     low, high = problem.bounds
     active = problem.weights * problem.active_rows(point.modelled)
     directions, inverse = linear.basis.directions, np.asarray(np.linalg.inv(linear.normal), dtype=float)

@@ -105,10 +105,8 @@ class ParameterCovariance:
 
     def of_parameters(self) -> tuple[Array, Array]:
         """Standard errors (Q,) and correlations (Q, Q) of all fitted parameters; NaN for those that are not contained.
-
         With groups of rows the standard errors contain Student's quantile over that of the normal distribution, so that
-        1.96 of them are the half width of a 95 % interval (effective degrees of freedom, JCGM 100:2008, G.4).
-        """
+        1.96 of them are the half width of a 95 % interval (effective degrees of freedom, JCGM 100:2008, G.4)."""
         count, square = self.parameters.size, np.ix_(self.parameters, self.parameters)
         errors, correlations = np.full(count, np.nan), np.full((count, count), np.nan)
         factor = 1.0 if self.groups is None else float(self._quantile(self.degrees_of_freedom, 0.95)) / NORMAL_QUANTILE

@@ -109,19 +109,19 @@ def slack_pull(
 
     specimen  labels (N,) of the specimens, whose slack regions are separate; by default one
     """
-    slack = force <= 0
-    judged = np.zeros(force.size, dtype=bool)
-    for name in np.unique(specimen) if specimen is not None else (None,):
-        own = np.ones(force.size, dtype=bool) if specimen is None else np.asarray(specimen == name)
+    count, judged = int(np.count_nonzero(force <= 0)), np.zeros(force.size, dtype=bool)
+    specimens = np.zeros(force.size) if specimen is None else specimen
+    for name in np.unique(specimens):
+        own = specimens == name
         p, c, f = pressure[own], contraction[own], force[own]
         judged[own] = (f <= 0) & (p < Slackness.of(p, c, f <= 0, f > limit).pull_limit(c))
     if not judged.any():
-        return SlackPull(int(np.count_nonzero(slack)), 0, limit, 0.0)
+        return SlackPull(count, 0, limit, 0.0)
     worst = int(np.argmax(np.where(judged, modelled, -np.inf)))
     pulling = int(np.count_nonzero(judged & (modelled > limit)))
     greatest = max(float(modelled[worst]), 0.0)
     point = float(pressure[worst]), float(contraction[worst])
-    return SlackPull(int(np.count_nonzero(slack)), pulling, limit, greatest, *point)
+    return SlackPull(count, pulling, limit, greatest, *point)
 
 
 LENGTH_FACTORS = (0.4, 0.63, 1.0, 1.6, 2.5)

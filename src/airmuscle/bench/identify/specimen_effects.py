@@ -37,11 +37,9 @@ class BoundedRows(NamedTuple):
 
 
 def bounded_coefficients(rows: BoundedRows, ratio: float, start: Array) -> Array:
-    """The coefficients (K,) that minimise the squares of values and violated bounds, and `ratio` times their own.
-
-    The sum is convex and each iteration is a Newton step, halved until the sum does not increase. The result is the
-    posterior mode of the coefficients for a normal prior and one-sided normal errors at the bounds.
-    """
+    """The coefficients (K,) that minimise the squares of values and violated bounds, and `ratio` times their own. The
+    sum is convex and each iteration is a Newton step, halved until the sum does not increase. The result is the
+    posterior mode of the coefficients for a normal prior and one-sided normal errors at the bounds."""
     coefficients, active = start, rows.active(start)
 
     def sum_of_squares(x: Array) -> float:

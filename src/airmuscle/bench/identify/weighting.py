@@ -122,12 +122,10 @@ deviation of one sensor differ less)."""
 
 @remembered
 def sensor_deviations(runs: Sequence[Recording], quantity: str) -> Array | None:
-    """The standard deviation of one observation in each recording [SI], shape (recordings,).
-
-    It includes noise and quantisation where every recording has a time column, otherwise quantisation alone, because
-    the rows are then in no known order. Recordings with similar standard deviations are attributed to one test rig and
-    share their median. None where all recordings are of one rig, or a sensor shows neither noise nor resolution.
-    """
+    """The standard deviation of one observation in each recording [SI], shape (recordings,). It includes noise and
+    quantisation where every recording has a time column, otherwise quantisation alone, because the rows are then in no
+    known order. Recordings with similar standard deviations are attributed to one test rig and share their median. None
+    where all recordings are of one rig, or a sensor shows neither noise nor resolution."""
     try:
         deviations, quantisation = np.array([reading_deviations([run], quantity) for run in runs]).reshape(-1, 2).T
     except ColumnError:
