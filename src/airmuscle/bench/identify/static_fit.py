@@ -19,7 +19,7 @@ from .data_checks import HELD, Remarks, level_text
 from .fit_points import FitPoints
 from .gauss_newton import gauss_newton
 from .pooling import check_poolable, make_pooling, pool, population_of
-from .problem import FORCE, RESTING_LENGTH, FitProblem, LeastSquaresSolution, evaluate
+from .problem import FORCE, RESTING_LENGTH, FitProblem, evaluate
 from .result import Fit
 from .slack import solve_bounded
 from .solver import is_linear
@@ -111,6 +111,8 @@ def _fit_law(
     check_determined_by_levels(problem, solution, points.at_levels)
     data, quantity = problem.data, problem.fitted_quantity
     by_recording = None if sigma is not None else points.deviations(quantity.name)
+    inside = [not estimate.on_bound for estimate in statistics["estimates"]]
+    measured = uncensored_rank(problem, solution.jacobian[:, inside]) if problem.censoring.any() else statistics["rank"]
     model = tree.with_parameters(problem.law, problem.leaf_values(solution.values))
     return Fit(
         model=model,
@@ -121,7 +123,7 @@ def _fit_law(
         censoring=problem.censoring,
         problem=dataclasses.replace(problem, law=model, leaves=tuple(tree.leaves(model))),
         loss=loss,
-        remarks=partial(examine, points, problem, solution, by_recording),
+        remarks=partial(examine, points, problem, solution.modelled, measured, by_recording),
         **statistics,
         **goodness_of_fit(problem, evaluate(model, quantity.name, quantity.arguments, data), data),
     )
@@ -150,19 +152,20 @@ def refit(
 
 
 def examine(
-    points: FitPoints, problem: FitProblem, solution: LeastSquaresSolution, by_recording: Array | None, fit: Fit
+    points: FitPoints, problem: FitProblem, modelled: Array, measured: int, by_recording: Array | None, fit: Fit
 ) -> Remarks:
-    """The remarks on a fit and its points; `by_recording` are the standard deviations of sensors that differ. Those on
-    the solution of `problem`, and the branches of its residuals, are for a pooled law those of its population."""
+    """The remarks on a fit and its points; for a pooled law those on `problem` and its quantity `modelled` are those on
+    its population. `measured` is the rank of the uncensored rows, `by_recording` the standard deviations of sensors
+    that differ."""
     checks, quantity = points.checks, problem.fitted_quantity
     residuals = np.full(len(points.joined), np.nan)
-    differences = solution.modelled - problem.data[quantity.name]
+    differences = modelled - problem.data[quantity.name]
     residuals[~points.missing] = np.where(problem.censoring == 0, differences, np.nan)
     ends = np.cumsum([len(run) for run in points.recordings])
     distance = branch_distance(points.recordings, np.split(residuals, ends[:-1]), quantity.name)
     scatter = dataclasses.replace(checks.scatter, branches=distance)
     branches = branch_notes(points.recordings, distance, quantity.name, delayed=checks.delay is not None)
-    own = collect_notes(problem, solution, fit, by_recording)
+    own = collect_notes(problem, modelled, measured, by_recording, fit)
     notes = (*checks.notes, *map(str, points.repeated), *own, *branches)
     ranges = fit.data_ranges
     notes += tuple(
@@ -192,7 +195,7 @@ def _effect_note(effects: SpecimenEffects) -> str:
     )
 
 
-def _row_notes(problem: FitProblem, solution: LeastSquaresSolution, fit: Fit) -> Iterator[str]:
+def _row_notes(problem: FitProblem, measured: int, fit: Fit) -> Iterator[str]:
     """Remarks on rows that are dropped, censored, above the limit of the law, or at zero force and not censored."""
     force, usual = problem.data["force"], default_censoring(problem.law)
     if fit.rows_dropped:
@@ -208,10 +211,9 @@ def _row_notes(problem: FitProblem, solution: LeastSquaresSolution, fit: Fit) ->
             f"{above} rows are above the upper limit of the force of the law, max_force {usual.max_force:.4g} N, which "
             "the fit does not change: the law gives no greater force. Give a law with a greater max_force."
         )
-    inside = [not estimate.on_bound for estimate in fit.estimates]
-    if censored and (rank := uncensored_rank(problem, solution.jacobian[:, inside])) < fit.rank:
+    if measured < fit.rank:
         yield (
-            f"The uncensored rows determine {rank} of {fit.rank} parameters; the others "
+            f"The uncensored rows determine {measured} of {fit.rank} parameters; the others "
             "are limited only by the bounds of the censored rows, and the law is as close to these as possible."
         )
     if at_zero := int(np.count_nonzero((force <= 0) & (problem.censoring == 0))):
@@ -221,10 +223,10 @@ def _row_notes(problem: FitProblem, solution: LeastSquaresSolution, fit: Fit) ->
 
 
 def collect_notes(
-    problem: FitProblem, solution: LeastSquaresSolution, fit: Fit, by_recording: Array | None
+    problem: FitProblem, modelled: Array, measured: int, by_recording: Array | None, fit: Fit
 ) -> Iterator[str]:
     """Remarks on the solution of a fit that affect its interpretation, as sentences; arguments as for `examine`."""
-    yield from _row_notes(problem, solution, fit)
+    yield from _row_notes(problem, measured, fit)
     length = problem.data.constants.get(RESTING_LENGTH)  # to which the contraction is relative
     for leaf in problem.leaves:
         if leaf.declared.name == RESTING_LENGTH and length is not None and abs(leaf.value - float(length)) > 1e-6:
@@ -247,7 +249,7 @@ def collect_notes(
             Hint("To weight all rows equally", "sigma", 1.0),
         )
     if not isinstance(fit.loss, LeastSquares):
-        residuals = np.abs(problem.residuals(solution.modelled))[problem.censoring == 0]
+        residuals = np.abs(problem.residuals(modelled))[problem.censoring == 0]
         inside = int(np.count_nonzero(residuals <= fit.loss.scale))
         if inside < residuals.size / 2:
             yield (
