@@ -23,7 +23,6 @@ from .problem import FORCE, RESTING_LENGTH, FitProblem, evaluate
 from .result import Fit
 from .slack import solve_bounded
 from .solver import is_linear
-from .specimen_effects import SpecimenEffects
 from .statistics import check_determined, check_determined_by_levels, fit_statistics, goodness_of_fit
 from .variable_projection import find_initial_values, uncensored_rank
 from .weighting import UNCENSORED, Censoring, LeastSquares, Loss, default_censoring
@@ -174,25 +173,20 @@ def examine(
         for name, band in (("pressure", RIPPLE_BAND * ranges["pressure"][1]), ("contraction", HELD))
         if np.ptp(ranges[name]) < band
     )
-    if fit.effects is not None:
-        notes += (_effect_note(fit.effects),)
+    if (effects := fit.effects) is not None:
+        text = "the data show no difference between them."
+        if effects.degrees_of_freedom >= NO_EFFECT:
+            text = (
+                f"coefficients of the specimen effects with a standard deviation of {effects.deviation:.3g} N "
+                f"(restricted maximum likelihood) and {effects.degrees_of_freedom:.3g} effective parameters of "
+                f"{effects.coefficients.size}. The standard errors of the population parameters contain this scatter."
+            )
+        notes += (f"Partial pooling of {len(effects.specimens)} specimens: {text}",)
     if quantity == FORCE:
         lengths = {run.constants.get(RESTING_LENGTH) for run in points.recordings} - {None}
         count = 1 if hasattr(fit.model, "with_resting_length") else len(lengths)
         notes += tuple(scatter.misfit_notes(fit.rmse, ranges["force"][1], count))
     return dataclasses.replace(checks, notes=notes, scatter=scatter)
-
-
-def _effect_note(effects: SpecimenEffects) -> str:
-    """The remark on the number of parameters of the specimen effects."""
-    text = f"Partial pooling of {len(effects.specimens)} specimens: "
-    if effects.degrees_of_freedom < NO_EFFECT:
-        return f"{text}the data show no difference between them."
-    return (
-        f"{text}coefficients of the specimen effects with a standard deviation of {effects.deviation:.3g} N "
-        f"(restricted maximum likelihood) and {effects.degrees_of_freedom:.3g} effective parameters of "
-        f"{effects.coefficients.size}. The standard errors of the population parameters contain this scatter."
-    )
 
 
 def _row_notes(problem: FitProblem, measured: int, fit: Fit) -> Iterator[str]:
