@@ -204,8 +204,7 @@ def _longest(runs: Sequence[Run]) -> Run | None:
 
 def _span(values: Array) -> float:
     """The range of the values without the extreme rows."""
-    low, high = np.quantile(values, [0.01, 0.99])
-    return float(high - low)
+    return float(np.ptp(np.quantile(values, [0.01, 0.99])))
 
 
 MAX_RATIO, MAX_SCALE = 1.5, 10.0

@@ -27,11 +27,8 @@ LEVEL = 0.95
 LEVEL_TOLERANCE = 0.03
 """Relative difference of two values that belong to one level (chosen)."""
 SHARE_OF_ERROR = 0.25
-"""Share of the error of leaving a level out that applies halfway between two levels.
-
-The error of interpolation increases with the square of the distance of the levels, and leaving one out doubles this
-distance.
-"""
+"""Share of the error of leaving a level out that applies halfway between two levels: the error of interpolation
+increases with the square of the distance of the levels, and leaving one out doubles this distance."""
 MIN_GROUPS = 3
 """Minimum number of levels or lengths; the lowest and the highest are in every fit."""
 

@@ -50,9 +50,8 @@ LIMITS = {"sensitivity": (200.0, 2e4), "overlap": (0.02, 1.0), "pilot_time": (0.
 class RegulatorFit(Reported):
     """A regulator identified from its records; `print` it.
 
-    `fit` is the dynamic fit of a vessel behind the regulator, `zeros` [Pa] the difference of settled pressure and
-    command that was subtracted from each record, `remarks` what the records excite too little, with the command that
-    would excite it.
+    `fit` is the dynamic fit of a vessel behind the regulator, `zeros` [Pa] settled pressure minus command, subtracted
+    from each record, `remarks` what the records excite too little, with the command that would excite it.
     """
 
     fit: DynamicFit

@@ -75,9 +75,9 @@ def agreement_of_run(joint: Friction, own: HysteresisFit, description: str, pres
     joint_misfit, misfit = Misfit.of(joint, (run,)), Misfit.of(own.friction, (run,))
     largest = max(float(np.linalg.norm(force)) for force in (own_force, joint_force)) or 1e-300
     amplitude, deviation = force_amplitude(run, joint), float(np.linalg.norm(own_force - joint_force)) / largest
-    stderr, p_value = float(np.sqrt(variance / power)), misfit.p_value(joint_misfit._replace(parameters=curve.shape[1]))
-    own_amplitude = (factor * amplitude, stderr * amplitude)
-    return RunAgreement(run.origin, description, pressure, *own_amplitude, amplitude, deviation, p_value)
+    stderr = float(np.sqrt(variance / power)) * amplitude
+    p_value = misfit.p_value(joint_misfit._replace(parameters=curve.shape[1]))
+    return RunAgreement(run.origin, description, pressure, factor * amplitude, stderr, amplitude, deviation, p_value)
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False, kw_only=True)
