@@ -65,6 +65,8 @@ TIME_LIMIT, CPU_LIMIT = 60.0, 15.0
 MEMORY_LIMIT, MEMORY_FACTOR = 6e9, 20.0
 """Limit of the memory [bytes], with this multiple of the size of the file (chosen)."""
 _worker = Worker(quiet=True)
+stop = _worker.stop
+"""Ends the present process; the next request starts another one."""
 _lock = threading.Lock()
 
 
@@ -120,8 +122,3 @@ def call_function(seconds: float, module: str, function: str, path: Path, *argum
 def _limit(kind: int, value: float) -> None:
     hard = resource.getrlimit(kind)[1]
     resource.setrlimit(kind, (int(value) + 1 if hard == resource.RLIM_INFINITY else min(int(value) + 1, hard), hard))
-
-
-def stop() -> None:
-    """End the present process; the next request starts another one."""
-    _worker.stop()

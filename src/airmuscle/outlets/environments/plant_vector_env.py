@@ -144,7 +144,11 @@ class PlantVectorEnv(gymnasium.vector.VectorEnv):  # type: ignore[misc, unused-i
             return observations, rewards, terminated, truncated, _masked(terms, present)
         info = _masked(terms, ~over)
         if over.any():
-            info |= _final(observations, over) | {"final_info": _masked(terms, over), "_final_info": over.copy()}
+            last = np.full(over.size, None, dtype=object)
+            for i in np.flatnonzero(over):
+                last[i] = observations[i].copy()
+            info |= {"final_obs": last, "_final_obs": over.copy()}
+            info |= {"final_info": _masked(terms, over), "_final_info": over.copy()}
             self._begin(np.flatnonzero(over))
             observations = np.where(over[:, None], self._observed()[0], observations)
         return observations, rewards, terminated, truncated, info
@@ -195,14 +199,6 @@ def _masked(terms: dict[str, Array], present: Booleans) -> dict[str, Any]:
     """Terms of the rewards (N,) where they are present, 0 elsewhere, with the masks of Gymnasium's own vectors."""
     values = terms if present.all() else {name: np.where(present, value, 0.0) for name, value in terms.items()}
     return {**values, **{f"_{name}": present.copy() for name in terms}}
-
-
-def _final(observations: npt.NDArray[np.float32], over: Booleans) -> dict[str, Any]:
-    """The dictionary of a step in which episodes are over (N,), as that of Gymnasium's own vectors."""
-    last = np.full(over.size, None, dtype=object)
-    for i in np.flatnonzero(over):
-        last[i] = observations[i].copy()
-    return {"final_obs": last, "_final_obs": over.copy()}
 
 
 def make_vector(kind: str, num_envs: int = 1, task: EnvironmentTask | None = None, **options: Any) -> Any:

@@ -43,11 +43,6 @@ class ActuatorModel:
     step: float
 
     @property
-    def command_range(self) -> tuple[float, float]:
-        """Lowest and highest command."""
-        return control_range(self.controls)
-
-    @property
     def parameters(self) -> list[Leaf]:
         """The parameters, in the order of their vector."""
         return list(leaves(self.part))
@@ -62,7 +57,7 @@ class ActuatorModel:
 
         model, vector = autodiff.symbolic(self.part)
         rest = casadi.substitute(casadi.SX(model.resting_lengths[0]), vector, p)
-        low, high = self.command_range
+        low, high = control_range(self.controls)
         command = casadi.fmin(casadi.fmax(z[0], low), high)
         values = {SHORTENING: rest - z[1], SHORTENING_SPEED: -z[2]}
         pair = [casadi.fmax(command, 0.0), casadi.fmax(-command, 0.0)]

@@ -19,7 +19,7 @@ from ...engine.run.batch import Double, Precision, Single
 from ...files import load_scenario
 from ...files.library.uncertainty import ParameterUncertainty
 from ...physics import ExternalLoad, Muscle, Plant
-from .actuator import ActuatorModel, actuator_model
+from .actuator import ActuatorModel, actuator_model, control_range
 from .identifiers import filled, line_comment, program_name, provenance
 from .write import write_files
 
@@ -101,7 +101,7 @@ class ExportedActuator:
 
     def files(self, language: TargetLanguage, templates: Mapping[str, str], **more: str) -> dict[str, str | bytes]:
         """The filled templates, by the ends of the names of their files."""
-        model, (low, high) = self.model, self.model.command_range
+        model, (low, high) = self.model, control_range(self.model.controls)
         functions, held = model.print_functions(language)
         controls = model.controls
         command = f"{controls[0].name}: {controls[0].meaning}" if controls else "without effect"
@@ -182,7 +182,7 @@ class OnnxStack(Stack):
         observed = step.results["o"]
         valid = step.node("Greater", observed[2], step.constant(0.5))
         rows_out, given = {"tension": observed[0], "pressure": observed[1], "valid": valid}, ("state", *driven, "dt")
-        low, high = model.command_range
+        low, high = control_range(model.controls)
         facts = {
             "title": actuator.title, "provenance": "\n".join(actuator.provenance), "step": repr(model.step),
             "command": f"{low!r} to {high!r}", "states": ", ".join(s.name for s in model.part.states),

@@ -175,7 +175,7 @@ class FitService:
 
         changing = {
             "file": self.add_file, "remove": self.remove_file, "read": self.read, "start": self.start,
-            "task/{task}/cancel": self.cancel,
+            "task/{task}/cancel": self.status,
         }  # fmt: skip
         reading = {"task/{task}": self.status, "task/{task}/{name}": self.file}
         routes = [Route(f"/api/fit/{path}", handler, methods=["POST"]) for path, handler in changing.items()]
@@ -203,25 +203,26 @@ class FitService:
         """What was understood of the files of a set."""
         from starlette.concurrency import run_in_threadpool
 
-        wanted = await limited_table(request, MAX_SETTINGS)
-        folder, settings = self._uploads.folder(_name(wanted, "set")), _settings(wanted)
+        _, folder, settings = await self._given(request)
         task = sheet_of_files if isinstance(settings, FitSettings) else sheet_of_episodes
         sheet = await run_in_threadpool(self._pool.call, task, str(folder), settings, limit=READING_LIMIT)
         return json_answer(sheet)
 
     async def start(self, request: Any) -> Any:
         """Start a fit; returns the identifier of its task."""
+        return json_answer({"task": self._queue.submit(*await self._given(request))})
+
+    async def _given(self, request: Any) -> tuple[str, Path, FitSettings | ArmTexts]:
+        """A set, its folder, and the settings of measurement files of a muscle, or of episodes of an arm."""
         wanted = await limited_table(request, MAX_SETTINGS)
-        name, settings = _name(wanted, "set"), _settings(wanted)
-        return json_answer({"task": self._queue.submit(name, self._uploads.folder(name), settings)})
+        name, given = _name(wanted, "set"), wanted.get("settings", {})
+        folder, is_arm = self._uploads.folder(name), isinstance(given, dict) and given.get("record") == "arm"
+        return name, folder, read_arm_settings(given) if is_arm else read_settings(given)
 
     async def status(self, request: Any) -> Any:
-        """State and progress of a task."""
-        return json_answer(self._queue.status(request.path_params["task"]))
-
-    async def cancel(self, request: Any) -> Any:
-        """End a task."""
-        self._queue.cancel(request.path_params["task"])
+        """State and progress of a task, which a POST ends."""
+        if request.method == "POST":
+            self._queue.cancel(request.path_params["task"])
         return json_answer(self._queue.status(request.path_params["task"]))
 
     async def file(self, request: Any) -> Any:
@@ -234,13 +235,6 @@ class FitService:
             raise BadRequest("this fit has no such file.", 404)
         self._uploads.folder(task.set_name)  # a set whose result is read is not idle
         return FileResponse(path, media_type=_TYPES[name.rpartition(".")[2]], filename=shown)
-
-
-def _settings(wanted: dict[str, Any]) -> FitSettings | ArmTexts:
-    """The settings of measurement files of a muscle, or of episodes of an arm."""
-    given = wanted.get("settings", {})
-    is_arm = isinstance(given, dict) and given.get("record") == "arm"
-    return read_arm_settings(given) if is_arm else read_settings(given)
 
 
 def _name(wanted: dict[str, Any], key: str) -> str:

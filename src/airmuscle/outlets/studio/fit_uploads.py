@@ -4,6 +4,7 @@ A set has a random identifier, which only the page that uploaded it knows; it is
 A file appears under its name when it is complete. The folder of a server that was killed is removed by the next one.
 """
 
+import functools
 import os
 import re
 import secrets
@@ -55,7 +56,6 @@ class UploadStore:
 
     def __init__(self, parent: Path | None = None) -> None:
         self._parent, self._lock = parent, threading.Lock()
-        self._root: Path | None = None
         self._used: dict[str, float] = {}
 
     def new_set(self, is_needed: IsNeeded) -> str:
@@ -63,16 +63,16 @@ class UploadStore:
         with self._lock:
             if len(self._used) >= MAX_SETS:
                 latest = time.monotonic() - MAX_IDLE
-                filled = {name: any((self._top() / name / FILES).iterdir()) for name in self._used}
+                filled = {name: any((self._top / name / FILES).iterdir()) for name in self._used}
                 idle = [n for n, used in self._used.items() if (used < latest or not filled[n]) and not is_needed(n)]
                 if not idle:
                     text = f"the server keeps {MAX_SETS} sets of files, and all are in use; try again later."
                     raise BadRequest(text, 503)
                 oldest = min(idle, key=lambda name: (filled[name], self._used[name]))
-                shutil.rmtree(self._top() / oldest, ignore_errors=True)
+                shutil.rmtree(self._top / oldest, ignore_errors=True)
                 del self._used[oldest]
             identifier = secrets.token_urlsafe(16)
-            (self._top() / identifier / FILES).mkdir(parents=True, mode=0o700)
+            (self._top / identifier / FILES).mkdir(parents=True, mode=0o700)
             self._used[identifier] = time.monotonic()
         return identifier
 
@@ -82,7 +82,7 @@ class UploadStore:
             if not _IDENTIFIER.fullmatch(identifier) or identifier not in self._used:
                 raise BadRequest("these files are no longer on the server; drop them again.", 404)
             self._used[identifier] = time.monotonic()
-            return self._top() / identifier
+            return self._top / identifier
 
     def names(self, identifier: str) -> list[str]:
         """The names of the files of a set, in order."""
@@ -96,7 +96,7 @@ class UploadStore:
         if len(others) >= MAX_FILES:
             raise BadRequest(f"at most {MAX_FILES} files are fitted together; remove some.", 413)
         allowed = MAX_SET - sum(path.stat().st_size for path in others)
-        unfinished = self._top() / f"{secrets.token_hex(8)}.part"
+        unfinished = self._top / f"{secrets.token_hex(8)}.part"
         try:
             size = 0
             with unfinished.open("wb") as file:
@@ -123,16 +123,15 @@ class UploadStore:
 
     def stop(self) -> None:
         """Remove all files."""
-        if self._root is not None:
-            shutil.rmtree(self._root, ignore_errors=True)
+        if "_top" in vars(self):  # it was made
+            shutil.rmtree(self._top, ignore_errors=True)
 
+    @functools.cached_property
     def _top(self) -> Path:
         """A folder that only this user can read; those of servers that were killed are removed before it is made."""
-        if self._root is None:
-            parent = self._parent or Path(tempfile.gettempdir())
-            for old in parent.glob(f"{_PREFIX}*"):
-                process = old.name.removeprefix(_PREFIX).partition("-")[0]
-                if process.isdecimal() and not old.is_symlink() and not is_running(int(process)):
-                    shutil.rmtree(old, ignore_errors=True)
-            self._root = Path(tempfile.mkdtemp(prefix=f"{_PREFIX}{os.getpid()}-", dir=parent))
-        return self._root
+        parent = self._parent or Path(tempfile.gettempdir())
+        for old in parent.glob(f"{_PREFIX}*"):
+            process = old.name.removeprefix(_PREFIX).partition("-")[0]
+            if process.isdecimal() and not old.is_symlink() and not is_running(int(process)):
+                shutil.rmtree(old, ignore_errors=True)
+        return Path(tempfile.mkdtemp(prefix=f"{_PREFIX}{os.getpid()}-", dir=parent))

@@ -72,6 +72,14 @@ def law_sheet(entry: Entry) -> dict[str, Any]:
     stated = {} if known is None else dict(zip(known.parameters, known.standard_errors, strict=True))
     for row in parameters:
         row["standard_error"] = stated.get(row["path"], stated.get(row["path"].removeprefix("characteristic.")))
+    shape: dict[str, Any] | None = None
+    if geometry is not None:  # the number of its segments, and radii on a grid where there is no closed form
+        low, high = geometry.contraction_range
+        segments = geometry.segments if isinstance(geometry, FibreTube) else 1
+        shape = {"model": type(geometry).__name__, "segments": segments, "range": [float(low), float(high)]}
+        if "outline" not in functions:
+            grid = np.linspace(max(low, -0.05), min(high, 0.6), OUTLINE_CONTRACTIONS)
+            shape |= sampled_outline(geometry, grid)
     sheet: dict[str, Any] = {
         **{key: getattr(entry, key) for key in ("name", "title", "provenance", "note", "warning")},
         "law": kind.__name__, "formula": (kind.__doc__ or "").strip().partition("\n")[0],
@@ -81,7 +89,7 @@ def law_sheet(entry: Entry) -> dict[str, Any]:
         "resting_length": next((i for i, (path, _) in enumerate(rows) if path.endswith("resting_length")), None),
         "validity_range": None if limits is None else dataclasses.asdict(limits),
         "ratings": {name: getattr(ratings, name) for name in (ratings.stated if ratings else ())},
-        "geometry": None if geometry is None else _geometry_sheet(geometry, "outline" in functions),
+        "geometry": shape,
         "references": [str(reference) for reference in cite(entry)], "approximation": errors,
         "toml": _toml(entry, fixed),
     }  # fmt: skip
@@ -130,16 +138,6 @@ def parameter_row(path: str, leaf: Leaf, source: str) -> dict[str, Any]:
         "shown_unit": "" if shown == unit == "1" else shown,
         "factor": 1.0 if shown == unit else conversion(shown, unit).factor, "source": source,
     }  # fmt: skip
-
-
-def _geometry_sheet(geometry: am.geometry.Geometry, printed: bool) -> dict[str, Any]:
-    """The outline of a geometry: the number of its segments, and radii on a grid where there is no closed form."""
-    segments = geometry.segments if isinstance(geometry, FibreTube) else 1
-    low, high = geometry.contraction_range
-    sheet = {"model": type(geometry).__name__, "segments": segments, "range": [float(low), float(high)]}
-    if printed:
-        return sheet
-    return {**sheet, **sampled_outline(geometry, np.linspace(max(low, -0.05), min(high, 0.6), OUTLINE_CONTRACTIONS))}
 
 
 def sampled_outline(
