@@ -1,5 +1,6 @@
 """Quantities and units in headings, and values in the names of files by a pattern."""
 
+import contextlib
 import itertools
 import json
 import re
@@ -88,8 +89,12 @@ def parse_unit_row(headings: Sequence[str], cells: Sequence[str]) -> tuple[str, 
     bare = [re.sub(r"^\[(.*)\]$|^\((.*)\)$", r"\1\2", cell) for cell in cells]
     if any(is_number(cell) and cell != "1" for cell in bare):
         return None
-    pairs = zip(headings, bare, strict=False)
-    return tuple(bare) if any(cell not in ("", "1") and _is_unit(text, cell) for text, cell in pairs) else None
+    for text, cell in zip(headings, bare, strict=False):
+        target = parse_heading(text).target
+        with contextlib.suppress(UnitError):  # it is no unit of the quantity in the heading
+            if cell not in ("", "1") and target is not None and conversion(cell, target):
+                return tuple(bare)
+    return None
 
 
 def count_cells(cells: Sequence[object]) -> int:
@@ -103,15 +108,6 @@ def parse_constant_cells(cells: Sequence[str]) -> tuple[str, float | str] | None
     name, value = (filled[0].rstrip(" :="), " ".join(filled[1:])) if len(filled) > 1 else (filled[0], "")
     text = f"{name} = {value}" if value else name
     return parse_constant_comment(text if text[0] in "#%" else f"# {text}")
-
-
-def _is_unit(heading: str, cell: str) -> bool:
-    """Whether a cell is a unit of the quantity in its heading."""
-    target = parse_heading(heading).target
-    try:
-        return target is not None and bool(conversion(cell, target))
-    except UnitError:
-        return False
 
 
 def parse_constant_comment(line: str) -> tuple[str, float | str] | None:

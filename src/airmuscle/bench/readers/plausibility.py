@@ -127,15 +127,13 @@ def _compare(name: str, target: str, one: tuple[Recording, float], two: tuple[Re
     both = f"{first.origin} (up to {written:.4g} {unit}) and {second.origin} (up to {other_written:.4g} {other_unit})"
     comparable = name.rpartition(".")[2] in ("pressure", "length")
     if unit == other_unit and comparable and _ratio(size, other_size) >= SUSPICIOUS_RATIO:
-        _warn(f"the {name} of {both} differs by a factor of {_ratio(size, other_size):.0f}. Check the units.")
+        text = f"the {name} of {both} differs by a factor of {_ratio(size, other_size):.0f}. Check the units."
+        warnings.warn(text, AirmuscleWarning, stacklevel=2)
     changes = [conversion(each, "Pa") for each in (unit, other_unit) if target == "Pa"]
     stated = {"none" if each.assumed_gauge else "absolute" if each.offset else "gauge" for each in changes}
     if len(stated) > 1 and "none" in stated:
-        _warn(f"of {both}, only one states whether its {name} is gauge or absolute; the other is read as gauge.")
-
-
-def _warn(message: str) -> None:
-    warnings.warn(message, AirmuscleWarning, stacklevel=2)
+        text = f"of {both}, only one states whether its {name} is gauge or absolute; the other is read as gauge."
+        warnings.warn(text, AirmuscleWarning, stacklevel=2)
 
 
 def _magnitude(recording: Recording, name: str) -> float:

@@ -61,13 +61,22 @@ class Variables(list[Variable]):
             ))  # fmt: skip
 
     def checked(self) -> list[Variable]:
-        """The variables with stated units. Raises ParameterError for two of one name."""
+        """The variables with units that importers know, and descriptions that state gauge or absolute. Raises
+        ParameterError for two of one name."""
         for name, count in Counter(variable.name for variable in self).items():
             if count > 1:
                 raise ParameterError(
                     f"the FMU would have two variables '{name}'; rename the muscle or signal of this name."
                 )
-        return [_stated(each) for each in self]
+        stated = []
+        for v in self:
+            name, about, unit = printable(v.name), printable(v.description), v.unit.replace("Pa(a)", "Pa")
+            kind = "absolute" if unit != v.unit else "gauge"
+            is_stated = any(word in about for word in ("gauge", "absolute"))
+            if unit == "Pa" and not is_stated and ("pressure" in f"{name} {about}" or kind == "absolute"):
+                about = f"{about or 'pressure'}, {kind}"
+            stated.append(dataclasses.replace(v, name=name, description=about, unit=unit))
+        return stated
 
 
 def make_variables(program: ExportedRun, indicators: int, starts: Mapping[str, float]) -> list[Variable]:
@@ -98,16 +107,6 @@ def make_variables(program: ExportedRun, indicators: int, starts: Mapping[str, f
         about = "changes its sign where the rates are not smooth"
         variables.add(f"event_indicator[{i}]", "local", about, is_indicator=True)
     return variables.checked()
-
-
-def _stated(v: Variable) -> Variable:
-    """The variable with a unit that importers know, and a description that states gauge or absolute."""
-    name, about, unit = printable(v.name), printable(v.description), v.unit.replace("Pa(a)", "Pa")
-    kind = "absolute" if unit != v.unit else "gauge"
-    is_stated = any(word in about for word in ("gauge", "absolute"))
-    if unit == "Pa" and not is_stated and ("pressure" in f"{name} {about}" or kind == "absolute"):
-        about = f"{about or 'pressure'}, {kind}"
-    return dataclasses.replace(v, name=name, description=about, unit=unit)
 
 
 def references_of(known: Description, place: Place) -> tuple[int, int]:

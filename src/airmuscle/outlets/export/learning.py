@@ -213,9 +213,16 @@ def write_actuator(
     """
     model = actuator_model(plant, muscle=muscle, step=step)
     title = title or model.part.muscles[0].name
-    identified, root = _spread(model, uncertainty)
+    known, identified, root = {leaf.path for leaf in model.parameters}, list[str](), np.zeros((0, 0))
+    if uncertainty is not None:
+        for path in uncertainty.parameters:
+            identified.append("muscle." + re.sub(r"^characteristic\b", "contractile", path))  # its name in a plant
+            if identified[-1] not in known:
+                text = f"write_actuator: the plant has no parameter '{identified[-1]}' of the uncertainty."
+                raise ParameterError(text)
+        root = uncertainty.deviations(np.eye(len(identified))).T
     lines = provenance(title, model.part, (), [NOTE])
-    actuator = ExportedActuator(program_name(name, title), title, model, lines, identified, root)
+    actuator = ExportedActuator(program_name(name, title), title, model, lines, tuple(identified), root)
     return write_files(stack.files(actuator), folder)
 
 
@@ -225,18 +232,6 @@ def regulated_plant(muscle: Muscle) -> Plant:
     The regulator is one that was fitted to published responses with a vessel, not to this muscle.
     """
     return Plant(muscle, load_scenario("vessel-smc-itv2050").plant.circuit, ExternalLoad())
-
-
-def _spread(model: ActuatorModel, given: ParameterUncertainty | None) -> tuple[tuple[str, ...], Array]:
-    """The paths of the identified parameters in the plant, and the root of their covariance."""
-    if given is None:
-        return (), np.zeros((0, 0))
-    known, paths = {leaf.path for leaf in model.parameters}, []
-    for path in given.parameters:
-        paths.append("muscle." + re.sub(r"^characteristic\b", "contractile", path))  # its name in a plant
-        if paths[-1] not in known:
-            raise ParameterError(f"write_actuator: the plant has no parameter '{paths[-1]}' of the uncertainty.")
-    return tuple(paths), given.deviations(np.eye(len(paths))).T
 
 
 def _tuple(values: Any) -> str:

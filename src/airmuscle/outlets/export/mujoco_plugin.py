@@ -5,7 +5,7 @@ import functools
 import hashlib
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -144,7 +144,20 @@ def write_mujoco_plugin(plant: Plant, folder: str | Path, *, name: str = "", mus
     part = open_plant(single_muscle(plant, muscle))
     program, controls = program_name(name, part.muscles[0].name), controls_of(part)
     lines = provenance(f"Muscle {part.muscles[0].name} for MuJoCo", part, (), [NOTE])
-    files = _sources(part, program, controls, lines)
+    system = export_system(compile_system(dataclasses.replace(part, mechanism=HangingMass(1.0))))  # mass set by MuJoCo
+    paths, states = [leaf.path for leaf in system.tunable], system.known.state_names
+    own = [leaf.path for leaf in leaves(part)]
+    places = [*(system.known.input_names.index(i.name) for i in controls), -1, -1]
+    values = {
+        "provenance": block_comment(lines), "name": f"airmuscle.{program}", "file": program,
+        "attribute_names": c_strings([*own, REST_LENGTH]), "places": c_integers([paths.index(path) for path in own]),
+        "own_states": c_integers([states.index(state.name) for state in part.states]),
+        "rest_length": c_number(part.muscles[0].geometry.resting_length),
+        "attributes": str(len(own) + 1), "first": str(places[0]), "second": str(places[1]),
+    }  # fmt: skip
+    texts = c_files(program, system, Rodas4(TOLERANCE), lines)
+    texts[f"{program}_plugin.c"] = filled("mujoco_plugin.c", values, program)
+    files = {file: text.encode() for file, text in texts.items()}
     library, remark = f"lib{program}_plugin.so", ""
     try:
         installed = Path(check_mujoco().__file__).parent
@@ -171,24 +184,6 @@ def check_mujoco() -> Any:
             "mujoco>=3.17,!=4.0.0"
         )
     return mujoco
-
-
-def _sources(part: Plant, name: str, controls: Sequence[Input], lines: Sequence[str]) -> dict[str, bytes]:
-    """The C files by name: the muscle with a load whose mass and gravity the plugin sets, and the plugin."""
-    system = export_system(compile_system(dataclasses.replace(part, mechanism=HangingMass(1.0))))
-    paths, states = [leaf.path for leaf in system.tunable], system.known.state_names
-    own = [leaf.path for leaf in leaves(part)]
-    places = [*(system.known.input_names.index(i.name) for i in controls), -1, -1]
-    values = {
-        "provenance": block_comment(lines), "name": f"airmuscle.{name}", "file": name,
-        "attribute_names": c_strings([*own, REST_LENGTH]), "places": c_integers([paths.index(path) for path in own]),
-        "own_states": c_integers([states.index(state.name) for state in part.states]),
-        "rest_length": c_number(part.muscles[0].geometry.resting_length),
-        "attributes": str(len(own) + 1), "first": str(places[0]), "second": str(places[1]),
-    }  # fmt: skip
-    texts = c_files(name, system, Rodas4(TOLERANCE), lines)
-    texts[f"{name}_plugin.c"] = filled("mujoco_plugin.c", values, name)
-    return {file: text.encode() for file, text in texts.items()}
 
 
 def _load(plugin: str, library: Path) -> None:

@@ -96,7 +96,14 @@ def read_settings(data: Any) -> FitSettings:
     if not isinstance(data, dict):
         raise RequestError("the request must be a table of settings.")
     texts = {name: _text(data.get(name, ""), name) for name in (*TEXTS, *BRAID)}
-    facts = {name: _facts(name, value) for name, value in _table(data.get("files", {}), "files").items()}
+    facts: dict[str, dict[str, str]] = {}
+    for file, value in _table(data.get("files", {}), "files").items():
+        field = f"file:{file}"
+        given = _table(value, field)
+        for unknown in (each for each in given if each not in FILE_FACTS):
+            text = f"'{str(unknown)[:40]}' is no fact of a file; allowed: {', '.join(FILE_FACTS)}."
+            raise RequestError(text, field)
+        facts[file] = {name: text for name in FILE_FACTS if (text := _text(given.get(name, ""), field))}
     columns = {key: _heading(key, value) for key, value in _table(data.get("columns", {}), "columns").items()}
     rules = data.get("rules", [])
     if not isinstance(rules, list) or len(rules) > MAX_RULES:
@@ -155,15 +162,6 @@ def _heading(key: str, value: Any) -> str:
     if name not in COLUMN_CHOICES:
         raise RequestError(f"'{name[:40]}' is no known quantity; allowed: {', '.join(COLUMN_CHOICES)}.", field)
     return f"{name} [{unit}]" if unit else name
-
-
-def _facts(file: str, value: Any) -> dict[str, str]:
-    facts = _table(value, f"file:{file}")
-    unknown = [name for name in facts if name not in FILE_FACTS]
-    if unknown:
-        text = f"'{str(unknown[0])[:40]}' is no fact of a file; allowed: {', '.join(FILE_FACTS)}."
-        raise RequestError(text, f"file:{file}")
-    return {name: text for name in FILE_FACTS if (text := _text(facts.get(name, ""), f"file:{file}"))}
 
 
 def _rule(value: Any) -> Rule:
