@@ -101,12 +101,20 @@ def _read_file(path: Path, settings: FitSettings, read: ReadSet) -> None:
         read.complain(RequestError(without_folder(problem.message, path.parent), problem.field))
         return
     for table in tables:
-        columns = list(_columns(table, settings))[:MAX_COLUMNS]
+        columns, units = list[FileColumn](), table.units or ("",) * len(table.headings)
+        for key, heading, unit_row in zip(_keys(table), table.headings, units, strict=False):
+            chosen, (name, stated, known) = settings.columns.get(key), _name_and_unit(heading)
+            stated, unit = unit_row or stated, ""
+            if chosen:
+                name, unit, known = _name_and_unit(chosen)
+            name = name if known else heading
+            columns.append(FileColumn(key, heading, name, unit or stated, stated, known, chosen != ""))
+        columns = columns[:MAX_COLUMNS]
         listed = read.columns.setdefault(path.name, [])
         listed += [each for each in columns if all(each.key != other.key for other in listed)]
         try:
-            chosen = {key: settings.columns[key] for key in _keys(table) if key in settings.columns}
-            mapped = apply_mapping(table, settings.mapping(chosen))
+            own = {key: settings.columns[key] for key in _keys(table) if key in settings.columns}
+            mapped = apply_mapping(table, settings.mapping(own))
         except AirmuscleError as error:
             read.complain(error, "columns")
             continue
@@ -155,17 +163,6 @@ def _constants(path: Path, settings: FitSettings) -> dict[str, float | str]:
 def _keys(table: RawTable) -> list[str]:
     """The key of each column: its heading if it occurs once, otherwise its number."""
     return [h if h and table.headings.count(h) == 1 else str(i) for i, h in enumerate(table.headings, 1)]
-
-
-def _columns(table: RawTable, settings: FitSettings) -> Iterator[FileColumn]:
-    units = table.units or ("",) * len(table.headings)
-    for key, heading, unit_row in zip(_keys(table), table.headings, units, strict=False):
-        chosen, unit = settings.columns.get(key), ""
-        name, stated, known = _name_and_unit(heading)
-        stated = unit_row or stated
-        if chosen:
-            name, unit, known = _name_and_unit(chosen)
-        yield FileColumn(key, heading, name if known else heading, unit or stated, stated, known, chosen != "")
 
 
 def _name_and_unit(text: str) -> tuple[str, str, bool]:

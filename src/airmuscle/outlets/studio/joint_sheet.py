@@ -168,7 +168,8 @@ def _linear_program(plant: am.Plant, columns: tuple[str, ...]) -> str:
 
 
 def _pair_program(plant: am.Plant) -> str:
-    """The statics of a joint as a function of the angle and of both pressures, and the torque that a motion needs."""
+    """The statics of a joint as a function of the angle and of both pressures, and the torque [N m] of the muscles
+    without their dampers for an angle, its speed and acceleration, and both pressures."""
     import casadi
 
     x = casadi.SX.sym("x", 3)
@@ -182,16 +183,7 @@ def _pair_program(plant: am.Plant) -> str:
     values = [torque, stiffness, *each, shut, load[0], load[1]]
     printer = Printer(JavaScriptLanguage(exported=False))
     printer.add("pair", {"x": x}, {"f": casadi.cse(casadi.densify(casadi.vertcat(*values)))})
-    motion = casadi.SX.sym("x", 5)
-    printer.add("needed", {"x": motion}, {"f": casadi.cse(casadi.densify(_needed_torque(plant, motion)))})
-    return _module(printer, ["pair", "needed"])
-
-
-def _needed_torque(plant: am.Plant, x: Any) -> Any:
-    """Torque [N m] of the muscles without their dampers for an angle, its speed and acceleration, and two pressures."""
-    import casadi
-
-    mechanism, lengths = plant.mechanism, plant.resting_lengths
+    x, mechanism, lengths = casadi.SX.sym("x", 5), plant.mechanism, plant.resting_lengths
     coordinate = mechanism.coordinates[0]
     q, v = {coordinate.name: x[0]}, {coordinate.speed: x[1]}
     contractions = mechanism.contractions(q, lengths)
@@ -200,7 +192,9 @@ def _needed_torque(plant: am.Plant, x: Any) -> Any:
         speed = length * casadi.jacobian(casadi.SX(contraction), x[0]) * x[1]
         damping.append(-muscle.damper.force(pressure, contraction, speed))
     held = mechanism.generalised_forces(q, damping, lengths)[coordinate.name]
-    return casadi.SX(mechanism.driving_force(q, v, x[2]) - held)
+    needed = casadi.SX(mechanism.driving_force(q, v, x[2]) - held)
+    printer.add("needed", {"x": x}, {"f": casadi.cse(casadi.densify(needed))})
+    return _module(printer, ["pair", "needed"])
 
 
 def _module(printer: Printer, names: list[str]) -> str:

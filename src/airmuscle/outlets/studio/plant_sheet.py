@@ -39,7 +39,12 @@ def sheet_of_tables(
         )
     program = make_run(scenario.problem, name="plant", title=scenario.title, with_loop=True)
     module = am.outlets.JavaScript().run_files(program)["plant.mjs"]
-    plant, system = scenario.plant, program.system
+    plant, system, columns = scenario.plant, program.system, list[dict[str, Any]]()
+    for column in system.known.column_names:
+        own = system.units[column]
+        usual = {"rad": (180.0 / np.pi, "deg"), "Pa": (1e-3, "kPa")}.get(own, display_scale(column))
+        factor, unit = usual if usual[1] else (1.0, own)
+        columns.append({"name": column, "factor": factor, "unit": "" if unit in ("1", "-") else unit})
     sheet: dict[str, Any] = {
         "plant": True, "name": name, "title": scenario.title,
         "provenance": str(tables.get("provenance", "the file of the user")),
@@ -48,7 +53,7 @@ def sheet_of_tables(
         "duration": scenario.problem.duration, "values": system.defaults.tolist(),
         "temperature_index": [leaf.path for leaf in leaves(plant)].index("ambient.temperature"),
         "parameters": _parameter_rows(plant, sources), "inputs": _input_rows(plant),
-        "controlled": program.loop is not None, "columns": _column_rows(system.known.column_names, system.units),
+        "controlled": program.loop is not None, "columns": columns,
         "muscles": [_muscle_row(plant, i) for i in range(len(plant.muscles))], "mechanism": _mechanism_row(plant),
         "references": [str(reference) for reference in cite(plant)],
         "toml": {
@@ -97,15 +102,6 @@ def _input_rows(plant: am.Plant) -> list[dict[str, Any]]:
         low, high = (end if np.isfinite(end) else None for end in (each.minimum, each.maximum))
         unit = "" if each.unit == "1" else each.unit
         rows.append({"name": each.name, "unit": unit, "minimum": low, "maximum": high})
-    return rows
-
-
-def _column_rows(columns: Any, units: Mapping[str, str]) -> list[dict[str, Any]]:
-    rows = []
-    for name in columns:
-        usual = {"rad": (180.0 / np.pi, "deg"), "Pa": (1e-3, "kPa")}.get(units[name], display_scale(name))
-        factor, unit = usual if usual[1] else (1.0, units[name])
-        rows.append({"name": name, "factor": factor, "unit": "" if unit in ("1", "-") else unit})
     return rows
 
 
