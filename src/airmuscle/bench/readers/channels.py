@@ -3,6 +3,7 @@
 Every file reader returns RawTables, and `interpret` converts them to Recordings.
 """
 
+import contextlib
 import dataclasses
 from collections.abc import Mapping, Sequence
 from typing import Any
@@ -63,10 +64,9 @@ def taken(cells: Cells, rows: npt.NDArray[np.intp]) -> Cells:
 
 def numbers_if_all(texts: list[str]) -> Cells:
     """Texts as numbers if each of them is one; otherwise the texts."""
-    try:
+    with contextlib.suppress(ValueError):
         return np.array([float(text) for text in texts])
-    except ValueError:
-        return texts
+    return texts
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

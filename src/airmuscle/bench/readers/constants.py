@@ -117,10 +117,9 @@ def file_conversion(unit: str, target: str, *, ambient: float = AMBIENT_PRESSURE
 
 def is_mass(unit: str) -> bool:
     """Whether a unit of a load is one of mass."""
-    try:
+    with contextlib.suppress(UnitError):
         return unit not in UNIT_SPELLINGS["N"] and bool(conversion(unit, "kg"))
-    except UnitError:
-        return False
+    return False
 
 
 def held_value(heading: Heading, stated: float | str, ambient: float, where: str) -> float:

@@ -146,12 +146,18 @@ def read_large_csv(
     stride = step if isinstance(downsampling, Decimation) else 1
     columns: list[tuple[Cells, ...]] = []
     rows: list[int] = []
-    for chunk in _read_chunks(path, encoding, first, stride, step):
-        cells = parse_columns(path.name, header, chunk, text_format)
-        columns.append(cells if stride == step else tuple(downsampling.reduce(c, step) for c in cells))
-        rows += [line for line, _ in chunk][:: step // stride]
-        if progress:
-            progress(path.name, min(1.0, (rows[-1] - first + 1) / total))
+    size = max(_CHUNK_ROWS // step, 1) * step // stride  # complete blocks of `step` lines, every `stride`-th one
+    with path.open(encoding=encoding, errors="replace") as text:
+        numbered = zip(itertools.count(first, stride), itertools.islice(text, first - 1, None, stride))
+        while lines := list(itertools.islice(numbered, size)):
+            chunk = [(i, line) for i, line in lines if has_content(line) and not is_comment(line)]
+            if not chunk:
+                continue
+            cells = parse_columns(path.name, header, chunk, text_format)
+            columns.append(cells if stride == step else tuple(downsampling.reduce(c, step) for c in cells))
+            rows += [line for line, _ in chunk][:: step // stride]
+            if progress:
+                progress(path.name, min(1.0, (rows[-1] - first + 1) / total))
     return header.table(path.name, _joined(columns), rows, (downsampling.note(total, step),) if step > 1 else ())
 
 
@@ -208,17 +214,6 @@ def _count_lines(path: Path) -> int:
             count += block.count(b"\n")
             last = block
     return count + (not last.endswith((b"\n", b"\n\0", b"\0\n")))
-
-
-def _read_chunks(path: Path, encoding: str, first: int, stride: int, step: int) -> Iterator[NumberedLines]:
-    """The lines from line `first` on, every `stride`-th one, in chunks of complete blocks of `step` lines."""
-    size = max(_CHUNK_ROWS // step, 1) * step // stride
-    with path.open(encoding=encoding, errors="replace") as file:
-        numbered = zip(itertools.count(first, stride), itertools.islice(file, first - 1, None, stride))
-        while lines := list(itertools.islice(numbered, size)):
-            chunk = [(i, line) for i, line in lines if has_content(line) and not is_comment(line)]
-            if chunk:
-                yield chunk
 
 
 def _joined(chunks: list[tuple[Cells, ...]]) -> tuple[Cells, ...]:

@@ -77,26 +77,23 @@ def read_tdms_tables(path: Path, group: str | None = None) -> tuple[RawTable, ..
         if not nonempty:
             raise FileError(f"{path.name}: no channel contains values.")
         check_known(f"{path.name}: no group", [] if group is None else group, nonempty, "the groups are", FileError)
-        selected = [each for name, each in nonempty.items() if group in (None, name)]
-        return tuple(_make_table(path, each, dict(file.properties), len(selected) > 1) for each in selected)
-
-
-def _make_table(path: Path, group: Any, properties: dict[str, Any], several: bool) -> RawTable:
-    constants = {
-        name: value
-        for name, value in {**properties, **group.properties}.items()
-        if isinstance(value, float | int | str) and name not in ("name", "description", "title", "author")
-    }
-    origin = f"{path.name}, group '{group.name}'" if several else path.name
-    channels = []
-    for channel, start in zip(group.channels(), _start_times(group.channels()), strict=True):
-        unit = str(channel.properties.get("unit_string") or channel.properties.get("NI_UnitDescription") or "")
-        time, step = None, _step(channel)
-        if step > 0.0:
-            offset = float(channel.properties.get("wf_start_offset", 0.0))
-            time = np.asarray(start + offset + step * np.arange(len(channel)))
-        channels.append(Channel(channel.name, channel[:], time, unit))
-    return merge_channels(origin, channels, constants)
+        selected, tables = [each for name, each in nonempty.items() if group in (None, name)], list[RawTable]()
+        for each in selected:
+            constants = {
+                name: value for name, value in {**file.properties, **each.properties}.items()
+                if isinstance(value, float | int | str) and name not in ("name", "description", "title", "author")
+            }  # fmt: skip
+            channels = []
+            for channel, start in zip(each.channels(), _start_times(each.channels()), strict=True):
+                unit = str(channel.properties.get("unit_string") or channel.properties.get("NI_UnitDescription") or "")
+                time, step = None, _step(channel)
+                if step > 0.0:
+                    offset = float(channel.properties.get("wf_start_offset", 0.0))
+                    time = np.asarray(start + offset + step * np.arange(len(channel)))
+                channels.append(Channel(channel.name, channel[:], time, unit))
+            origin = f"{path.name}, group '{each.name}'" if len(selected) > 1 else path.name
+            tables.append(merge_channels(origin, channels, constants))
+        return tuple(tables)
 
 
 def _start_times(channels: list[Any]) -> list[float]:

@@ -52,7 +52,14 @@ def _parse_table(origin: str, rows: Rows, text_format: TextFormat) -> RawTable:
     stated = header.stated_heading_row(texts, text_format.named, text_format.skip_rows)
     if text_format.skip_rows is not None and stated is None:
         raise FileError(f"{origin}: there is no table below the {text_format.skip_rows} rows of skip_rows.")
-    start = _heading_row(rows) if stated is None else stated
+    start = stated or 0
+    if stated is None:  # the last row above the numbers that is as wide as they are, or the row above the unit row
+        numeric = next((i for i, (_, row) in enumerate(rows) if _is_numeric(row)), 0)
+        width = header.count_cells(rows[numeric][1])
+        above = [i for i in range(numeric) if header.count_cells(rows[i][1]) >= width]
+        start, adjacent = above[-1] if above else numeric, len(above) > 1 and above[-2] == above[-1] - 1
+        if adjacent and header.parse_unit_row(*(_texts(rows[i][1]) for i in above[-2:])):
+            start = above[-2]
     constants = dict(filter(None, (header.parse_constant_cells(_texts(row)) for _, row in rows[:start])))
     first, cells = rows[start]
     used = [j for j, cell in enumerate(cells) if cell not in (None, "")]
@@ -68,18 +75,6 @@ def _parse_table(origin: str, rows: Rows, text_format: TextFormat) -> RawTable:
             )
     columns = tuple(_column([row[j] for _, row in body]) for j in used)
     return RawTable(origin, tuple(headings), units, columns, np.array([i for i, _ in body]), "row", constants)
-
-
-def _heading_row(rows: Rows) -> int:
-    """The index of the last row above the numbers that is as wide as they are, or of the row above the unit row."""
-    numeric = next((i for i, (_, row) in enumerate(rows) if _is_numeric(row)), 0)
-    width = header.count_cells(rows[numeric][1])
-    above = [i for i in range(numeric) if header.count_cells(rows[i][1]) >= width]
-    if not above:
-        return numeric
-    adjacent = len(above) > 1 and above[-2] == above[-1] - 1
-    unit_row = adjacent and header.parse_unit_row(*(_texts(rows[i][1]) for i in above[-2:]))
-    return above[-2] if unit_row else above[-1]
 
 
 def _is_numeric(row: list[Any]) -> bool:
