@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from ...core import Array, ColumnError, UnitError, conversion, quantity
 from ...core.units import AMBIENT_PRESSURE, STANDARD_GRAVITY, UnitConversion
-from ...recording.columns import UNIT_SPELLINGS, Heading, parse_heading
+from ...recording.columns import UNIT_SPELLINGS, Heading
 from .channels import Cells, RawTable
 
 SPECIMEN = "specimen"
@@ -97,14 +97,6 @@ def check_constants(origin: str, constants: Mapping[str, Any]) -> None:
                 f"{origin}: {name} is {value:g} {unit}; allowed range: {low:g} to {high:g} {unit}. Check the "
                 "unit; a number without a unit is in SI units."
             )
-
-
-def check_stated(origin: str, stated: Mapping[str, float | str]) -> None:
-    """Check the constants and held quantities that a mapping states. Raises ColumnError or UnitError."""
-    check_constants(origin, collect_constants(origin, stated))
-    for name, value in stated.items():
-        if not parse_constant_name(name) and (heading := parse_heading(name)).known:
-            held_value(heading, value, AMBIENT_PRESSURE, f"{origin}: {name}")
 
 
 def file_conversion(unit: str, target: str, *, ambient: float = AMBIENT_PRESSURE, where: str = "") -> UnitConversion:

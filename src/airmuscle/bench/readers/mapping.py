@@ -32,9 +32,10 @@ from typing import Any
 
 from ...core import AirmuscleError, ColumnError, ParameterError, abridged, check_field_types, listed, suggestion
 from ...core.errors import check_known
+from ...core.units import AMBIENT_PRESSURE
 from ...recording.columns import QUANTITIES, parse_heading
 from .channels import RawTable
-from .constants import SPECIMEN, check_stated, parse_constant_name
+from .constants import SPECIMEN, check_constants, collect_constants, held_value, parse_constant_name
 from .file_kind import read_toml
 from .header import FileNamePattern, bare_heading
 from .missing_values import MISSING_VALUES, MissingValues, RefuseMissing, parse_code
@@ -161,8 +162,12 @@ def mapping_of_tables(content: Mapping[str, Any], where: str, base: ColumnMappin
         mapping = dataclasses.replace(base, **values, **given)
     except AirmuscleError as error:
         raise error.located(where) from None
-    stated = {**content, **(content.get("constants") or {})}
-    check_stated(where, {name: value for name, value in mapping.constants_of().items() if name in stated})
+    named = {**content, **(content.get("constants") or {})}
+    stated = {name: value for name, value in mapping.constants_of().items() if name in named}
+    check_constants(where, collect_constants(where, stated))
+    for name, value in stated.items():
+        if not parse_constant_name(name) and (heading := parse_heading(name)).known:
+            held_value(heading, value, AMBIENT_PRESSURE, f"{where}: {name}")  # checks it
     return mapping
 
 

@@ -273,19 +273,19 @@ def read_objects(path: Path, objects: Sequence[MatlabObject]) -> dict[str, Mappi
     if not names or not is_installed(_PACKAGE):
         return {}
     frames = import_lab_package(_PACKAGE, path).load_from_mat(str(path), variable_names=names, add_table_attrs=True)
-    return {name: _columns(frames[name]) for name in names if hasattr(frames.get(name), "columns")}
-
-
-def _columns(frame: Any) -> dict[str, Any]:
-    units = [str(unit) for unit in frame.attrs.get("VariableUnits") or frame.attrs.get("varUnits") or []]
-    fields: dict[str, Any] = {}
-    if frame.index.dtype.kind in "mM":
-        fields["time"] = _numbers(frame.index.to_numpy())
-    fields |= {str(name): _numbers(frame[name].to_numpy()) for name in frame.columns}
-    stated = dict(zip(map(str, frame.columns), units, strict=False))
-    dated = {str(name) for name in frame.columns if frame[name].dtype.kind in "mM"}
-    stated |= {name: "s" for name in fields if name == "time" or name in dated}
-    return {name: values for name, values in fields.items() if values is not None} | {"units": stated}
+    found: dict[str, Mapping[str, Any]] = {}
+    for variable in (name for name in names if hasattr(frames.get(name), "columns")):
+        frame, fields = frames[variable], dict[str, Any]()
+        units = [str(unit) for unit in frame.attrs.get("VariableUnits") or frame.attrs.get("varUnits") or []]
+        if frame.index.dtype.kind in "mM":
+            fields["time"] = _numbers(frame.index.to_numpy())
+        fields |= {str(name): _numbers(frame[name].to_numpy()) for name in frame.columns}
+        stated = dict(zip(map(str, frame.columns), units, strict=False))
+        dated = {str(name) for name in frame.columns if frame[name].dtype.kind in "mM"}
+        stated |= {name: "s" for name in fields if name == "time" or name in dated}
+        known = {name: values for name, values in fields.items() if values is not None}
+        found[variable] = known | {"units": stated}
+    return found
 
 
 def _numbers(values: Any) -> Array | None:

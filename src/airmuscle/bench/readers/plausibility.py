@@ -101,7 +101,9 @@ def check_unit_consistency(recordings: Sequence[Recording]) -> None:
         by_unit: dict[str, list[tuple[Recording, float]]] = {}
         for each in recordings:
             if name in each.units and len(each) and quantity:
-                by_unit.setdefault(each.units[name], []).append((each, _magnitude(each, name)))
+                offset = conversion(each.units[name], "Pa").offset if name.rpartition(".")[2] == "pressure" else 0.0
+                magnitude = float(np.quantile(np.abs(each.columns[name] - offset), 0.95))  # [SI], absolute as written
+                by_unit.setdefault(each.units[name], []).append((each, magnitude))
         size = operator.itemgetter(1)
         groups = [sorted(group, key=size) for group in by_unit.values()]
         ends = ((group[0], group[-1]) for group in groups if len(group) > 1)
@@ -134,12 +136,6 @@ def _compare(name: str, target: str, one: tuple[Recording, float], two: tuple[Re
     if len(stated) > 1 and "none" in stated:
         text = f"of {both}, only one states whether its {name} is gauge or absolute; the other is read as gauge."
         warnings.warn(text, AirmuscleWarning, stacklevel=2)
-
-
-def _magnitude(recording: Recording, name: str) -> float:
-    """The 95th percentile of the absolute values of a column [SI]; absolute pressures are compared as written."""
-    offset = conversion(recording.units[name], "Pa").offset if name.rpartition(".")[2] == "pressure" else 0.0
-    return float(np.quantile(np.abs(recording.columns[name] - offset), 0.95))
 
 
 def _ratio(first: float, second: float) -> float:

@@ -123,18 +123,17 @@ def from_pandas(frame: Any, mapping: ColumnMapping = ColumnMapping(), *, origin:
     dated = (each for each in series if each.dtype.kind == "M")
     text = "Column '{}' contains dates; time is counted from the first, {}."
     notes = tuple(text.format(each.name, each.iloc[0]) for each in dated)
-    table = merge_channels(origin, [Channel(str(each.name), _values(each)) for each in series], {})
+    channels = []
+    for each in series:  # numbers, dates or durations where a column has such a type, otherwise texts
+        kind = each.dtype.kind
+        if kind in "Mm":
+            values = each.to_numpy(dtype=f"{'datetime' if kind == 'M' else 'timedelta'}64[ns]")
+        else:
+            values = np.asarray(each.to_numpy(), dtype=float) if kind in "biuf" else list(map(str, each))
+        channels.append(Channel(str(each.name), values))
+    table = merge_channels(origin, channels, {})
     table = dataclasses.replace(table, rows=np.arange(len(frame)), notes=notes)
     return interpret(apply_mapping(table, mapping), mapping)
-
-
-def _values(series: Any) -> Any:
-    """Numbers, dates or durations where the column has such a type, otherwise texts."""
-    if series.dtype.kind in "Mm":
-        return series.to_numpy(dtype=f"{'datetime' if series.dtype.kind == 'M' else 'timedelta'}64[ns]")
-    if series.dtype.kind in "biuf":
-        return np.asarray(series.to_numpy(), dtype=float)
-    return [str(value) for value in series]
 
 
 def to_xarray(recording: Recording) -> Any:

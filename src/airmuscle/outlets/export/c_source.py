@@ -12,7 +12,7 @@ from ...engine.compile.functions import ArraySizes, Extension
 from ...engine.compile.kernel_text import CKernels
 from ...engine.compile.text.languages import CLanguage
 from ...recording.recording import column_heading
-from .exported_run import BETWEEN, SHAPES, STEP, TABLEAU, ExportedRun, solver_text
+from .exported_run import BETWEEN, SHAPES, STEP, TABLEAU, ExportedRun, places_of, solver_text
 from .identifiers import block_comment, c_integers, c_number, c_string, c_strings, c_values, filled, make_identifiers
 from .printed_system import ExportedSystem
 
@@ -107,6 +107,7 @@ def main_program(program: ExportedRun) -> str:
         places["columns_at"] = ", ".join(str(every.index(each)) for each in columns)
     else:
         known, table, driven = program.system.known, loop.drivers, len(loop.drivers.kinds) > 0
+        groups = known.state_names, known.input_names, known.output_names, *loop.added_columns
         tables = {
             "kinds": c_integers(list(map(tuple, table.kinds.tolist()))), "settings": c_values(table.settings),
             "states": c_values(table.kept),
@@ -117,7 +118,7 @@ def main_program(program: ExportedRun) -> str:
         }  # fmt: skip
         places |= {
             **{key: c_number(loop.numbers[key]) for key in ("sample_time", "near", "finish")},
-            "columns_at": c_integers(loop.column_at(known, columns)),
+            "columns_at": c_integers(places_of(columns, groups)),
             "measured_at": c_integers(loop.measured_at(known)), "commanded": c_integers(loop.prepared.commanded),
             **_signal(loop.prepared.setpoint_signal, "setpoint_"),
             "driver_tables": filled("driver_tables.c", tables, name) if driven else "",

@@ -101,11 +101,7 @@ class ExportedLoop:
 
     def measured_at(self, known: Description) -> list[tuple[int, int]]:
         """Of each measured column: 0 for a state and 1 for an output, and its number among these."""
-        return _places(self.controller.law.measured_columns, (known.state_names, known.output_names))
-
-    def column_at(self, known: Description, columns: Sequence[str]) -> list[tuple[int, int]]:
-        """Of each column: its kind (state, input, output, set point, measurement, command), and its number."""
-        return _places(columns, (known.state_names, known.input_names, known.output_names, *self.added_columns))
+        return places_of(self.controller.law.measured_columns, (known.state_names, known.output_names))
 
     @property
     def kernels(self) -> list[str]:
@@ -134,7 +130,7 @@ class ExportedLoop:
         }  # fmt: skip
 
 
-def _places(names: Iterable[str], groups: Sequence[Sequence[str]]) -> list[tuple[int, int]]:
+def places_of(names: Iterable[str], groups: Sequence[Sequence[str]]) -> list[tuple[int, int]]:
     """Of each name: the number of the first group that has it, and its number there."""
     return [next((k, list(of).index(name)) for k, of in enumerate(groups) if name in of) for name in names]
 

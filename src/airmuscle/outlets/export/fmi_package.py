@@ -13,11 +13,12 @@ from importlib import metadata
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-from ...core import ParameterError, atomic_folder
+from ...core import ParameterError
 from ...engine.loop.control_loop import SETPOINT
 from .compiler import Platform, this_platform
 from .fmi_variables import Variable, add_units, has_unit
 from .identifiers import LICENCE, block_comment, filled, template
+from .write import write_files
 
 _WORD = r"[A-Za-z_][A-Za-z0-9_]*(\[\d+\])?"
 _STRUCTURED = re.compile(rf"{_WORD}(\.{_WORD})*|der\({_WORD}(\.{_WORD})*\)")
@@ -141,8 +142,7 @@ class FmuPackage:
                     SubElement(files, "File", name=file)
 
     def _add_structure(self, structure: Element, fmi: int) -> None:
-        """Outputs, rates and what is computed at the start, with the states and inputs on which they depend; a state
-        depends on itself."""
+        """Outputs, rates and what is computed at the start, with the states and inputs on which they depend."""
         unknowns = (
             ("Outputs", "Output", [v.reference for v in self.variables if v.causality == "output"]),
             ("Derivatives", "ContinuousStateDerivative",
@@ -226,9 +226,7 @@ class FmuPackage:
 
 def write_archive(target: Path, content: bytes, folders: Sequence[str], remark: str) -> WrittenFmu:
     """Write the bytes of an FMU or of a package of FMUs. Raises FileError."""
-    with atomic_folder(target.parent) as staging:
-        (staging / target.name).write_bytes(content)
-    return WrittenFmu(target, tuple(folders), remark)
+    return WrittenFmu(write_files({target.name: content}, target.parent)[0], tuple(folders), remark)
 
 
 def check_target(path: str | Path, fmi: int, suffix: str = ".fmu") -> Path:

@@ -61,8 +61,7 @@ class Variables(list[Variable]):
             ))  # fmt: skip
 
     def checked(self) -> list[Variable]:
-        """The variables with units that importers know, and descriptions that state gauge or absolute. Raises
-        ParameterError for two of one name."""
+        """The variables, of which pressures state gauge or absolute. Raises ParameterError for two of one name."""
         for name, count in Counter(variable.name for variable in self).items():
             if count > 1:
                 raise ParameterError(

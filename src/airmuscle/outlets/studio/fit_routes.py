@@ -138,8 +138,6 @@ class FitQueue:
                 task.state = RUNNING
                 self._running[task.identifier] = worker
             self._run(task, worker)
-            with self._changed:
-                del self._running[task.identifier]
         worker.stop()
 
     def _run(self, task: FitTask, worker: Any) -> None:
@@ -159,6 +157,7 @@ class FitQueue:
         if state != DONE:  # what a process that was ended has left
             shutil.rmtree(task.folder, ignore_errors=True)
         with self._changed:
+            del self._running[task.identifier]
             if task.state == RUNNING:
                 task.state, task.error, task.field = state, error, field
 
