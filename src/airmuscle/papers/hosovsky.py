@@ -1,5 +1,6 @@
 """Report chapter: Hošovský et al., muscle dynamics by Hill's model with valves by ISO 6358; Figures 1 and 2."""
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -61,8 +62,7 @@ def chapter() -> Chapter:
             releasing.joint_table(joint),
             coefficient_table(),
             maxwell_table(parameters),
-            _extrapolation_table(fill, low, high),
-            *_time_series(fill, low, high),
+            *run_tables(fill, low, high),
         ),
         plots=(*shown, causing.effect_plot(effects), releasing.figure_4(low, high)),
         references=(*cite(fill.plant), rig.MATRIX_CATALOGUE, *cite(load_law(FORCE_MAPS[0]))),
@@ -93,22 +93,17 @@ def maxwell_table(parameters: rig.UnpublishedParameters) -> Table:
     return titled("hosovsky_maxwell", columns)
 
 
-def _extrapolation_table(fill: filling.FillRun, low: releasing.Release, high: releasing.Release) -> Table:
-    """Return the times and extents of extrapolation beyond the data of the surface, by run."""
-    named = {"fill and discharge": fill.adaptive}
-    named |= {f"release from {each.pressure / 1e3:g} kPa": each.run for each in (low, high)}
-    found = [(name, note) for name, run in named.items() for note in run.notes if "outside the validity range" in note]
-    return titled("hosovsky_boxes", {"run": [name for name, _ in found], "extrapolation": [note for _, note in found]})
-
-
-def _time_series(fill: filling.FillRun, low: releasing.Release, high: releasing.Release) -> tuple[Table, ...]:
-    """Return the time series of Figs. 3 and 4; only written to files."""
-    named = {"hosovsky_fill": fill.adaptive, "hosovsky_release_low": low.run, "hosovsky_release_high": high.run}
+def run_tables(fill: filling.FillRun, low: releasing.Release, high: releasing.Release) -> Iterator[Table]:
+    """Yield the extrapolations beyond the data of the surface, by run, and the time series, which only files have."""
+    runs = {"fill and discharge": ("hosovsky_fill", fill.adaptive)}
+    for key, each in (("hosovsky_release_low", low), ("hosovsky_release_high", high)):
+        runs[f"release from {each.pressure / 1e3:g} kPa"] = key, each.run
+    notes = [(name, note) for name, (_, run) in runs.items() for note in run.notes]
+    found = [(name, note) for name, note in notes if "outside the validity range" in note]
+    yield titled("hosovsky_boxes", {"run": [name for name, _ in found], "extrapolation": [note for _, note in found]})
     names = (("time", "s"), ("pressure", "Pa"), ("contraction", "1"), ("position", "m"), ("force", "N"))
-    return tuple(
-        Table(key, key.replace("_", " "), {f"{n} [{unit}]": run[n] for n, unit in names}, shown=False)
-        for key, run in named.items()
-    )
+    for key, run in runs.values():
+        yield Table(key, key.replace("_", " "), {f"{n} [{unit}]": run[n] for n, unit in names}, shown=False)
 
 
 def hill_model() -> Plot:

@@ -109,10 +109,7 @@ def plant(
     valve: am.physics.Orifice = MATRIX, tube: am.physics.TubeModel | None = None, data: str = FORCE_MAPS[0],
     **elements: Any,
 ) -> am.Plant:  # fmt: skip
-    """Return the plant; the defaults are those of the paper: isothermal gas, rigid wall, no line, no series spring.
-
-    elements  of the muscle that replace those of the paper: spring, wall, series
-    """
+    """Return the plant of the paper, isothermal and without a line; `elements` replace spring, wall or series."""
     valves = am.FillDischarge(am.Supply(SUPPLY_PRESSURE), valve, valve)
     actuator = dataclasses.replace(muscle(parameters, data), **elements)
     circuit = valves if tube is None else am.physics.WithTubes(valves, tube)

@@ -17,10 +17,7 @@ FUNCTIONS = ("sqrt", "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", 
 
 
 class Node:
-    """One operation of an expression, a number or a symbol. Nodes of one `Expressions` are equal if identical.
-
-    `value` is that of a number, or the name of a symbol.
-    """
+    """An operation, a number (its value) or a symbol (its name). Nodes of one `Expressions` are equal if identical."""
 
     __slots__ = ("arguments", "kind", "value")
 
