@@ -34,7 +34,7 @@ from airmuscle.design import (
     size_muscles,
 )
 from airmuscle.design.sizing import air_path, sizing_chapter
-from airmuscle.design.sizing.static_muscle import static_muscle
+from airmuscle.design.sizing.search import static_muscle
 from airmuscle.errors import AirmuscleError, ParameterError, SolveError
 from airmuscle.files import Entry
 from airmuscle.physics import (

@@ -99,39 +99,6 @@ class _Spent(Exception):
     """All runs are used."""
 
 
-class _Rig:
-    """A truth on which sets of gains are tried; it counts the runs and keeps the best."""
-
-    def __init__(
-        self, joint: BenchmarkJoint, truth: BenchmarkTruth, law: Controller, ranges: list[GainRange],
-        tasks: Sequence[ControlTask], limit: int,
-    ) -> None:  # fmt: skip
-        self.joint, self.truth, self.law, self.ranges, self.tasks, self.limit = joint, truth, law, ranges, tasks, limit
-        known = {leaf.path: leaf.value for leaf in leaves(law)}
-        present = [np.array(min(max(known[each.path], each.low), each.high)) for each in ranges]
-        self.point = np.array([float(each.to_unit(value)) for each, value in zip(ranges, present, strict=True)])
-        self.runs, self.best = 0, np.inf
-
-    def gains(self, point: Array) -> dict[str, float]:
-        """The gains at a point (D,) within 0 and 1."""
-        return {each.path: float(each.from_unit(value)) for each, value in zip(self.ranges, point, strict=True)}
-
-    def errors(self, point: Array) -> Array | None:
-        """The errors of the encoder (N,) [rad] in all tasks; None if a run fails. Raises _Spent without runs left."""
-        if self.runs + len(self.tasks) > self.limit:
-            raise _Spent
-        self.runs += len(self.tasks)
-        law = with_gains(self.law, self.gains(point))
-        found = [tracking_errors(self.joint, self.truth, law, task) for task in self.tasks]
-        complete = [each for each in found if each is not None]
-        if len(complete) < len(found):
-            return None
-        errors = np.concatenate(complete)
-        if _rms(errors) < self.best:
-            self.best, self.point = _rms(errors), point
-        return errors
-
-
 def commission(
     joint: BenchmarkJoint, truth: BenchmarkTruth, law: Controller, bounds: Mapping[str, tuple[float, float]],
     tasks: Sequence[ControlTask], *, runs: int,
@@ -147,30 +114,57 @@ def commission(
     what each step has shown (Broyden's update), and measured again where a step does not help or hardly helps. Nothing
     but the sensors of the truth is used.
     """
-    rig = _Rig(joint, truth, law, [GainRange(path, *pair) for path, pair in bounds.items()], tasks, runs)
-    before = np.inf
+    ranges = [GainRange(path, *pair) for path, pair in bounds.items()]
+    known = {leaf.path: leaf.value for leaf in leaves(law)}
+    start = np.array([float(each.to_unit(np.clip(known[each.path], each.low, each.high))) for each in ranges])
+    spent, complete = 0, list[tuple[float, Array]]()
+
+    def gains(point: Array) -> dict[str, float]:
+        return {each.path: float(each.from_unit(value)) for each, value in zip(ranges, point, strict=True)}
+
+    def errors(point: Array) -> Array | None:
+        """The errors of the encoder (N,) [rad] in all tasks; None if a run fails. Raises _Spent without runs left."""
+        nonlocal spent
+        if spent + len(tasks) > runs:
+            raise _Spent
+        spent += len(tasks)
+        changed = with_gains(law, gains(point))
+        found = [tracking_errors(joint, truth, changed, task) for task in tasks]
+        done = [each for each in found if each is not None]
+        if len(done) < len(found):
+            return None
+        complete.append((_rms(np.concatenate(done)), point))
+        return np.concatenate(done)
+
     with contextlib.suppress(_Spent):
-        errors = rig.errors(rig.point)
-        before = rig.best
-        _descend(rig, rig.point, errors)
-    return Commissioning(rig.gains(rig.point), before, rig.best, rig.runs)
+        _descend(errors, start, errors(start))
+    before, _ = complete[0] if complete else (np.inf, start)
+    after, best = min(complete, key=lambda pair: pair[0], default=(np.inf, start))
+    return Commissioning(gains(best), before, after, spent)
 
 
-def _descend(rig: _Rig, point: Array, errors: Array | None) -> None:
+def _descend(measure: Callable[[Array], Array | None], point: Array, errors: Array | None) -> None:
     """Gauss-Newton steps until all runs are used, with derivatives that are measured or corrected by the last steps."""
     from scipy.optimize import lsq_linear
 
     region, slopes, measured = FIRST_REGION, None, False
     while errors is not None and region > 1e-3 and np.any(errors):
         if slopes is None:
-            slopes, measured = np.array([_slope(rig, point, errors, i) for i in range(point.size)]).T, True
+            measured, columns = True, list[Array]()
+            for i in range(point.size):
+                probe = point.copy()
+                probe[i] += PROBE if point[i] + PROBE <= 1.0 else -PROBE
+                found = measure(probe)
+                change = np.zeros_like(errors) if found is None else found - errors  # none where the run fails
+                columns.append(change / (probe[i] - point[i]))
+            slopes = np.array(columns).T
         damping = DAMPING * np.linalg.norm(slopes) * np.eye(point.size)
         low, high = (np.clip(point + side * region, 0.0, 1.0) - point for side in (-1.0, 1.0))
         step = lsq_linear(
             np.vstack([slopes, damping]), np.append(-errors, np.zeros(point.size)), (low - 1e-12, high + 1e-12)
         ).x
         tried = np.clip(point + step, 0.0, 1.0)
-        step, found = tried - point, rig.errors(tried)
+        step, found = tried - point, measure(tried)
         better = -1.0 if found is None else 1.0 - _rms(found) / _rms(errors)
         if found is not None and np.any(step):
             slopes = slopes + np.outer(found - errors - slopes @ step, step) / (step @ step)
@@ -181,14 +175,6 @@ def _descend(rig: _Rig, point: Array, errors: Array | None) -> None:
             region *= 0.4
         else:
             region, slopes = max(0.4 * region, LEAST_REGION), None
-
-
-def _slope(rig: _Rig, point: Array, errors: Array, index: int) -> Array:
-    """The derivative (N,) of the errors by one coordinate; 0 where the run fails."""
-    probe = point.copy()
-    probe[index] += PROBE if point[index] + PROBE <= 1.0 else -PROBE
-    found = rig.errors(probe)
-    return np.zeros_like(errors) if found is None else (found - errors) / (probe[index] - point[index])
 
 
 def _rms(errors: Array) -> float:

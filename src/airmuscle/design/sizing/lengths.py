@@ -8,8 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...core import Array, SolveError
-from .choice import MuscleDesign
-from .requirement import JointRequirement, LiftRequirement, SizingConditions
+from .requirement_and_choice import JointRequirement, LiftRequirement, MuscleDesign, SizingConditions
 from .static_muscle import EndPoint, StaticMuscle, least_sufficient
 
 GRID, ZOOMS = 257, 6

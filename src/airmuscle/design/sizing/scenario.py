@@ -12,8 +12,7 @@ from ...files.library.write import scenario_toml
 from ...physics import AntagonisticJoint, HangingMass, Isotonic, LinearDamper, Mechanism, Muscle, Plant, SpringLoad
 from ...physics.pneumatics import FillDischarge, Orifice, ProportionalRegulator, SecondOrderLag, Supply, Valve
 from ...physics.pneumatics.gas import Isothermal, absolute_pressure
-from .choice import MuscleChoice
-from .requirement import JointRequirement, LiftRequirement
+from .requirement_and_choice import JointRequirement, LiftRequirement, MuscleChoice
 
 STATIONS = 65
 """Stations of the quasi-static path (chosen)."""

@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 
 from ...core import UnitError, quantity
 from ...design.sizing import JointRequirement, LiftRequirement, SizingConditions, SizingResult, size_muscles
-from ...design.sizing.choice import SORT_KEYS, Requirement
+from ...design.sizing.requirement_and_choice import SORT_KEYS, Requirement
 from ...files.library import load_law
 from .declaration import RequestError, Where, many, option, optional, request
 
