@@ -239,7 +239,6 @@ def test_junk_in_one_argument_is_accepted_or_refused_by_an_error_of_airmuscle(
         (lambda: units.conversion(3, "Pa"), UnitError, "a unit is a text, such as 'mm', 'kPa' or 'N'; given are 3 and"),
         (lambda: units.quantity("1 m", 3), UnitError, "the target of a quantity is a unit in SI, .* given is 3"),
         (lambda: am.load("dmsp-20-300").characteristic.force(int, 0.1), ParameterError, r"pressure is <class 'int'>; give"),
-        (lambda: bench.quasi_static_rows(RUN, settling_time=math.nan), ParameterError, "a duration is nan s; it must not"),
         (lambda: am.fit(am.load("dmsp-20-300").characteristic, TABLE, sigma=[1.0]), None, ""),
         (lambda: am.fit(am.load("dmsp-20-300").characteristic, TABLE, sigma=[1, 2]), IdentificationError, r"shape \(2,\)"),
     ],

@@ -2,7 +2,7 @@
 
 import dataclasses
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ..core import Hint, HintedText, System, chosen_scale
@@ -205,25 +205,15 @@ def find_quantity_name(text: str) -> str | None:
 def parse_heading(text: str) -> Heading:
     """Parse a heading: `pressure [kPa]`, `pressure (kPa)`, `pressure_kPa`, `Pressure / kPa` or `p`."""
     text = text.strip()
-    for name, unit in _candidate_splits(text):
-        return Heading(text, name, unit.strip(), True)
-    name_only = find_quantity_name(text)
-    return Heading(text, name_only or text, None, name_only is not None)
-
-
-def _candidate_splits(text: str) -> Iterator[tuple[str, str]]:
-    """Quantity and unit of a heading that states both; after a blank or underscore only a usual unit is accepted."""
-    if len(text) > MAX_HEADING:
-        return
-    for form in _MARKED_FORMS:
+    for form in (*_MARKED_FORMS, _SUFFIX_FORM) if len(text) <= MAX_HEADING else ():
         match = form.fullmatch(text)
         name = find_quantity_name(match["name"]) if match else None
         if match and name:
-            yield name, match["unit"]
-    match = _SUFFIX_FORM.fullmatch(text)
-    name = find_quantity_name(match["name"]) if match else None
-    if match and name and match["unit"] in UNIT_SPELLINGS[QUANTITIES[name.rpartition(".")[2]].unit]:
-        yield name, match["unit"]
+            usual = UNIT_SPELLINGS[QUANTITIES[name.rpartition(".")[2]].unit]
+            if form is not _SUFFIX_FORM or match["unit"] in usual:  # after a blank or underscore
+                return Heading(text, name, match["unit"].strip(), True)
+    name_only = find_quantity_name(text)
+    return Heading(text, name_only or text, None, name_only is not None)
 
 
 def split_unit(text: str) -> tuple[str, str | None]:

@@ -95,20 +95,18 @@ def bench_rows(recordings: Sequence[Recording]) -> BenchRows:
 def slack_plateaus(recordings: Sequence[Recording]) -> BenchRows:
     """The rows of isobars at which the muscle is slack: the force does not change with the contraction, up to the
     shortest length. Drift and friction of a run, which returns, are in the mean of each step of the contraction."""
-    rows = [_plateau(bench_rows([run])) for run in recordings_with(recordings, *BenchRows._fields)]
-    return BenchRows(*(np.concatenate([np.zeros(0), *columns]) for columns in zip(*rows, strict=True)))
-
-
-def _plateau(run: BenchRows) -> BenchRows:
-    """The slack rows of one recording; none if its pressure is not constant."""
-    if run.force.size < MIN_ROWS or np.ptp(run.pressure) > CONSTANT_PRESSURE * np.max(run.pressure):
-        return run.at(run.force > np.inf)
-    step = ((np.max(run.contraction) - run.contraction) / STEP).astype(int)
-    counts = np.bincount(step)
-    means = np.bincount(step, run.force) / np.maximum(counts, 1)
-    change = FLAT * np.subtract(*limits(run.force)[::-1]) / max(counts.size - 1, 1)
-    flat = np.logical_and.accumulate((counts > 0) & (np.abs(means - means[0]) < change))
-    return run.at((step < np.count_nonzero(flat)) & (np.count_nonzero(flat) >= MIN_STEPS))
+    found = []
+    for recording in recordings_with(recordings, *BenchRows._fields):
+        run = bench_rows([recording])
+        if run.force.size < MIN_ROWS or np.ptp(run.pressure) > CONSTANT_PRESSURE * np.max(run.pressure):
+            continue
+        step = ((np.max(run.contraction) - run.contraction) / STEP).astype(int)
+        counts = np.bincount(step)
+        means = np.bincount(step, run.force) / np.maximum(counts, 1)
+        change = FLAT * np.subtract(*limits(run.force)[::-1]) / max(counts.size - 1, 1)
+        flat = np.count_nonzero(np.logical_and.accumulate((counts > 0) & (np.abs(means - means[0]) < change)))
+        found += [run.at(step < flat)] if flat >= MIN_STEPS else []
+    return BenchRows(*(np.concatenate([np.zeros(0), *(getattr(e, n) for e in found)]) for n in BenchRows._fields))
 
 
 class PressureLine(NamedTuple):

@@ -14,7 +14,6 @@ from ..readers.constants import CONSTANT_QUANTITIES
 from ..reported import unit_column
 from .inspection import Inspection
 from .runs import Run
-from .sensor import Sampling
 
 MAX_FILES, MAX_RUNS, MAX_LISTED = 12, 8, 4
 """Rows of the brief view: files, runs of a file, and branches or outliers (chosen)."""
@@ -34,10 +33,15 @@ def inspection_chapter(inspection: Inspection) -> Chapter:
     recording, sampling = inspection.recording, inspection.sampling
     tables = [_column_table(inspection), _run_table(inspection.runs), _branch_table(inspection),
               _plateau_table(inspection), _outlier_table(inspection)]  # fmt: skip
+    summary = "The rows have no time."
+    if sampling:
+        gaps = f", {len(sampling.gaps)} gaps" if sampling.gaps else ""
+        regularity = "time stamps repeat" if sampling.rounded else f"jitter {100 * sampling.jitter:.1f} %"
+        summary = f"{sampling.rate:.4g} rows per second over {sampling.duration:.4g} s, {regularity}{gaps}."
     return Chapter(
         name="inspection",
         title=f"{recording.origin}: {len(recording)} rows",
-        summary=f"{_describe_sampling(sampling)}." if sampling else "The rows have no time.",
+        summary=summary,
         values=tuple(_values(inspection)),
         tables=tuple(table for table in tables if table is not None),
         plots=(Plot("recording", f"{recording.origin}: branches, plateaus, outliers and limits.", inspection.plot),),
@@ -155,14 +159,18 @@ def _outlier_table(inspection: Inspection) -> Table | None:
     return Table("outliers", "Suspected outliers", columns, brief=MAX_LISTED) if found else None
 
 
-def _describe_sampling(sampling: Sampling) -> str:
-    gaps = f", {len(sampling.gaps)} gaps" if sampling.gaps else ""
-    regularity = "time stamps repeat" if sampling.rounded else f"jitter {100 * sampling.jitter:.1f} %"
-    return f"{sampling.rate:.4g} rows per second over {sampling.duration:.4g} s, {regularity}{gaps}"
-
-
 def _overview(inspections: Sequence[Inspection]) -> Chapter:
     """Return the chapter of several files: one row each, and each note once with the files that it concerns."""
+    constants: dict[str, dict[str, None]] = {}
+    for each in inspections:
+        for name, value in each.recording.constants.items():
+            unit, shown = _units(name, value)
+            text = quantity_text(value, unit, shown) if unit else str(value)
+            constants.setdefault(name, {})[text] = None
+    values = []
+    for name, texts in constants.items():
+        some = [*list(texts)[:MAX_LISTED], *(["..."] if len(texts) > MAX_LISTED else [])]
+        values.append(NamedValue(name.replace("_", " "), "; ".join(some)))
     names = [", ".join(name for name in each.recording if name != "time") for each in inspections]
     rates = [each.sampling and each.sampling.rate for each in inspections]
     columns: dict[str, Any] = {
@@ -177,7 +185,7 @@ def _overview(inspections: Sequence[Inspection]) -> Chapter:
         name="overview",
         title=f"{len(inspections)} recordings",
         summary=f"Columns: {'; '.join(list(dict.fromkeys(names))[:MAX_LISTED])}.",
-        values=tuple(_common_constants(inspections)),
+        values=tuple(values),
         tables=(Table("files", "Recordings", columns, brief=MAX_FILES),),
         problems=_common([[f.text for f in each.findings if f.serious] for each in inspections], inspections),
         notes=_common([[*each.recording.notes, *(f.text for f in each.findings if not f.serious)]
@@ -196,18 +204,6 @@ def _describe_runs(runs: Sequence[Run]) -> str | None:
         return f"{first.kind.name}{more}"
     factor, unit = display_scale(first.constant_column)
     return f"{first.kind.name} at {first.constant_column} {first.constant_value * factor:.4g} {unit}{more}"
-
-
-def _common_constants(inspections: Sequence[Inspection]) -> Iterator[NamedValue]:
-    constants: dict[str, dict[str, None]] = {}
-    for each in inspections:
-        for name, value in each.recording.constants.items():
-            unit, shown = _units(name, value)
-            text = quantity_text(value, unit, shown) if unit else str(value)
-            constants.setdefault(name, {})[text] = None
-    for name, texts in constants.items():
-        some = [*list(texts)[:MAX_LISTED], *(["..."] if len(texts) > MAX_LISTED else [])]
-        yield NamedValue(name.replace("_", " "), "; ".join(some))
 
 
 def _common(texts: Sequence[Sequence[str]], inspections: Sequence[Inspection]) -> tuple[str, ...]:

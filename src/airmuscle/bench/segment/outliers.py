@@ -92,34 +92,23 @@ def leave_out(recording: Recording, outliers: Sequence[Outlier]) -> Recording:
 
 
 def _column_outliers(name: str, values: Array, sensor: Sensor) -> Iterator[Outlier]:
+    """Rows far from the medians of those before and after, which agree, and from the lines through either of them."""
     scale = sensor.std or 1e-9 * float(np.max(np.abs(values)))
     if scale == 0.0:
         return
-    before, after = _neighbour_medians(values)
-    distance = values - 0.5 * (before + after)
-    is_far = np.abs(distance) > MIN_DEVIATIONS * scale
-    agree = np.abs(before - after) < MAX_NEIGHBOUR_DIFFERENCE * np.abs(distance)
-    is_far &= _distance_from_lines(values, before, after) > MIN_EXTRAPOLATION_ERROR * np.abs(distance)
-    for row in np.flatnonzero(is_far & agree):
-        expected = float(values[row] - distance[row])
-        yield Outlier(name, int(row), float(values[row]), expected, float(abs(distance[row]) / scale))
-
-
-def _neighbour_medians(values: Array) -> tuple[Array, Array]:
-    """The medians of the rows before and after each row; the row itself near the ends, where there are too few rows."""
     medians = np.median(np.lib.stride_tricks.sliding_window_view(values, WINDOW), axis=1)
-    before, after = values.copy(), values.copy()
-    inner = slice(WINDOW, -WINDOW)
-    before[inner], after[inner] = medians[: -WINDOW - 1], medians[WINDOW + 1 :]
-    return before, after
-
-
-def _distance_from_lines(values: Array, before: Array, after: Array) -> Array:
-    """The smaller distance of each row from the lines through the rows before and after it."""
+    before, after = values.copy(), values.copy()  # near the ends, where there are too few rows
+    before[WINDOW:-WINDOW], after[WINDOW:-WINDOW] = medians[: -WINDOW - 1], medians[WINDOW + 1 :]
+    distance = values - 0.5 * (before + after)
     back, ahead = np.zeros(len(values)), np.zeros(len(values))
     if len(values) > SLOPE_STEPS + 1:
         slopes = np.median(np.lib.stride_tricks.sliding_window_view(np.diff(values), SLOPE_STEPS), axis=1)
-        back[SLOPE_STEPS + 1 :] = slopes[:-1]
-        ahead[: -(SLOPE_STEPS + 1)] = slopes[1:]
+        back[SLOPE_STEPS + 1 :], ahead[: -(SLOPE_STEPS + 1)] = slopes[:-1], slopes[1:]
     reach = 0.5 * (WINDOW + 1)
-    return np.asarray(np.minimum(np.abs(values - before - reach * back), np.abs(values - after + reach * ahead)))
+    from_lines = np.minimum(np.abs(values - before - reach * back), np.abs(values - after + reach * ahead))
+    is_outlier = np.abs(distance) > MIN_DEVIATIONS * scale
+    is_outlier &= np.abs(before - after) < MAX_NEIGHBOUR_DIFFERENCE * np.abs(distance)
+    is_outlier &= from_lines > MIN_EXTRAPOLATION_ERROR * np.abs(distance)
+    for row in np.flatnonzero(is_outlier):
+        expected = float(values[row] - distance[row])
+        yield Outlier(name, int(row), float(values[row]), expected, float(abs(distance[row]) / scale))

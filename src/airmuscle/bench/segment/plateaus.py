@@ -1,6 +1,6 @@
 """Plateaus, intervals of constant pressure, length and force, and quasi-static rows with their rates of change.
 
-A row is quasi-static if the pressure, and the length if measured, change within `settling_time` by at most the fraction
+A row is quasi-static if the pressure, and the length if measured, change within SETTLING_TIME by at most the fraction
 `max_change` of their range, or by no more than the noise explains. Both numbers are chosen: 0.1 s is the time in which
 a muscle of usual size follows its pressure, and a change of 1 % is negligible for a static fit.
 """
@@ -24,14 +24,13 @@ _MONITORED = ("pressure", *MOVED)
 
 
 def quasi_static_rows(
-    recording: Recording, sensors: Mapping[str, Sensor] | None = None, *, settling_time: float = SETTLING_TIME,
-    max_change: float = MAX_CHANGE,
-) -> Mask:  # fmt: skip
+    recording: Recording, sensors: Mapping[str, Sensor] | None = None, *, max_change: float = MAX_CHANGE
+) -> Mask:
     """Whether each row is quasi-static (N,). Without time, every row is taken as a steady state."""
     quasi_static = np.ones(len(recording), dtype=bool)
     if "time" not in recording or len(recording) < 3:
         return quasi_static
-    width = count_rows(settling_time, recording["time"], 1)
+    width = count_rows(SETTLING_TIME, recording["time"], 1)
     sensors = sensors or estimate_sensors(recording)
     for name in recording:
         if name.rpartition(".")[2] in _MONITORED and name in sensors and width < len(recording):
@@ -95,9 +94,8 @@ class Plateau:
 
 
 def find_plateaus(
-    recording: Recording, sensors: Mapping[str, Sensor] | None = None, *, min_duration: float = MIN_DURATION,
-    columns: Collection[str] = CONSTANT_COLUMNS,
-) -> tuple[Plateau, ...]:  # fmt: skip
+    recording: Recording, sensors: Mapping[str, Sensor] | None = None, *, columns: Collection[str] = CONSTANT_COLUMNS
+) -> tuple[Plateau, ...]:
     """The plateaus among the quasi-static rows; empty without time or pressure, and for a slow ramp.
 
     In a plateau each of the `columns` that were measured stays within twice the maximum quasi-static change of its
@@ -107,7 +105,7 @@ def find_plateaus(
         return ()
     sensors = sensors or estimate_sensors(recording)
     bands = {name: _band(recording[name], sensors[name]) for name in columns if name in recording and name in sensors}
-    min_rows = max(MIN_ROWS, count_rows(min_duration, recording["time"], MIN_ROWS))
+    min_rows = max(MIN_ROWS, count_rows(MIN_DURATION, recording["time"], MIN_ROWS))
     intervals = true_intervals(quasi_static_rows(recording, sensors))
     for name, band in bands.items():
         values = running_median(recording[name], MEDIAN_ROWS)  # so that an outlier does not end a plateau

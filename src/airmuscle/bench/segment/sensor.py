@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ...core import Array, ParameterError
+from ...core import Array
 from ...recording.columns import quantity_of
 from ...recording.recording import Recording
 from .interval import Mask, find_static_points, remembered, true_intervals
@@ -77,8 +77,6 @@ def _sample_time(steps: Array) -> float:
 
 def count_rows(seconds: float, time: Array | None, min_rows: int) -> int:
     """The number of rows in a time span, at most all; `min_rows` without time or if the rows are far apart."""
-    if not seconds >= 0.0:
-        raise ParameterError(f"a duration is {seconds} s; it must not be negative.")
     if time is None or len(time) < 2:
         return min_rows
     sample_time = _sample_time(np.diff(time))

@@ -58,29 +58,25 @@ class PassedSignals(ControlLaw):
         return {**{name: measurement.columns[name] for name in self.columns}, **applied}, applied
 
 
-class SensedMemory(NamedTuple):
-    """Memories of the sensors, the controller and the actuation."""
-
-    sensors: Any
-    controller: Any
-    actuation: Any
+Memories = tuple[Any, Any, Any]
+"""Memories of the three parts of a controller, in the order of its fields."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
 class SensedController(Controller):
     """A controller that is no control law, with sensors in front of it and the actuation behind it.
 
+    sensors     of all columns that controller and actuation measure
     controller  commands half the pressure difference, both pressures, or the valves
     actuation   law from these commands, as set points `commanded.<input>`, to the valves, which remembers them as they
                 are attained: the controller goes on as if it had commanded those
     ranges      minimum and maximum [SI] of the controller's commands; those of the plant unless given
-    sensors     of all columns that controller and actuation measure
     """
 
+    sensors: WithSensors
     controller: Controller
     actuation: ControlLaw
     ranges: Mapping[str, tuple[float, float]]
-    sensors: WithSensors
 
     measured_columns = forwarded("sensors.law.measured_columns")
 
@@ -100,30 +96,29 @@ class SensedController(Controller):
         """The fields without machine code, which belongs to one process."""
         return {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
 
-    def init(self) -> SensedMemory:
+    def init(self) -> Memories:
         sensors, actuation = self._compiled
-        return SensedMemory(sensors.initial, self.controller.init(), actuation.initial)
+        return sensors.initial, self.controller.init(), actuation.initial
 
-    def step(
-        self, memory: SensedMemory, measurement: Measurement, dt: float
-    ) -> tuple[Mapping[str, float], SensedMemory]:
-        sense, act = self._compiled
-        readings, sensors = sense.step(memory.sensors, measurement, dt)
+    def step(self, memory: Memories, measurement: Measurement, dt: float) -> tuple[Mapping[str, float], Memories]:
+        (sense, act), (sensors, before, actuation) = self._compiled, memory
+        readings, sensors = sense.step(sensors, measurement, dt)
         seen = Measurement(readings, measurement.setpoints, {**measurement.ranges, **self.ranges})
-        commands, own = self.controller.step(memory.controller, seen, dt)
+        commands, own = self.controller.step(before, seen, dt)
         points = {**measurement.setpoints, **with_prefix(COMMANDED, commands)}
-        valves, actuation = act.step(memory.actuation, seen._replace(setpoints=points), dt)
+        valves, actuation = act.step(actuation, seen._replace(setpoints=points), dt)
         memories = zip(self.actuation.initial_memory, actuation, strict=True)
         applied = {key.rpartition("outer.")[2].removeprefix("law."): value for key, value in memories}
         attained = {name: applied[name] for name in commands}
         if any(abs(attained[name] - value) > 1e-9 * abs(value) for name, value in commands.items()):
             only = {**seen.ranges, **{name: (value, value) for name, value in attained.items()}}
-            _, own = self.controller.step(memory.controller, seen._replace(ranges=only), dt)
-        return valves, SensedMemory(sensors, own, actuation)
+            _, own = self.controller.step(before, seen._replace(ranges=only), dt)
+        return valves, (sensors, own, actuation)
 
-    def notes(self, memory: SensedMemory) -> tuple[str, ...]:
+    def notes(self, memory: Memories) -> tuple[str, ...]:
         """The remarks of the controller."""
-        return self.controller.notes(memory.controller)
+        _, own, _ = memory
+        return self.controller.notes(own)
 
 
 BAR = 1e5
@@ -201,7 +196,7 @@ def complete(joint: BenchmarkJoint, contender: Contender, seed: int = 1) -> Comp
     tuned = {**tuned, **with_prefix("actuation.", own)} if tuned else {}
     columns = united(contender.law.measured_columns, law.measured_columns)
     sense = WithSensors(PassedSignals(columns), tuple(known[name] for name in columns), float(seed))
-    return CompleteLaw(SensedController(contender.law, law, limited, sense), tuned, commissioned)
+    return CompleteLaw(SensedController(sense, contender.law, law, limited), tuned, commissioned)
 
 
 def _check_columns(joint: BenchmarkJoint, contender: Contender, path: str | Path = "FILE.toml") -> None:

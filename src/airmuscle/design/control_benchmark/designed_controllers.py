@@ -12,6 +12,7 @@ from ...core import Reference, Value, model, ops, parameter, select_prefix, unit
 from ...core.declaration import forwarded
 from ...engine.loop import ControlLaw, Controller, EnclosingLaw, LawDesign, Measurement, Memory, Sampled
 from ...physics.analysis.linear_model import LinearModel
+from .contenders import Memories
 from .joints import ENCODER_STEP, BenchmarkJoint
 from .signals import angular_acceleration
 
@@ -192,10 +193,6 @@ class DeviationLaw(EnclosingLaw):
         return command, {"started": 1.0, "speed": speed, **with_prefix("law.", later)}
 
 
-Memories = tuple[Any, Any, Any]
-"""Memories of the feed-forward, of the deviations and of the designed controller."""
-
-
 @model
 class AlongMotion(Controller):
     """u = u_ff + u_c:  predictive control u_c of the deviation from the motion beside the feed-forward of the model.
@@ -234,4 +231,5 @@ class AlongMotion(Controller):
 
     def notes(self, memory: Memories) -> tuple[str, ...]:
         """The remarks of the designed controller."""
-        return self.design.predictive.notes(memory[-1])
+        *_, own = memory
+        return self.design.predictive.notes(own)

@@ -194,32 +194,25 @@ def track(
     state = (np.asarray(record[name])[late] for name in (*joint.pressures, "angle"))
     reached = np.asarray(AntagonisticInverse(plant.muscles, plant.mechanism).stiffness(*state), dtype=float)
     stiff = np.interp(time[late], signals.time, signals.stiffness)
+    settling = overshoot = math.nan
+    if task.event is not None:
+        outside = np.flatnonzero((np.abs(error) > SETTLING_BAND) & (time > task.event))
+        settling = float(np.append(time, math.inf)[outside[-1] + 1] - task.event) if outside.size else 0.0
+        change = wanted[-1] - wanted[0]
+        if not (task.torque or task.stiffening or change == 0.0):
+            overshoot = max(0.0, 100.0 * float(((angle - wanted[-1]) / change)[judged].max()))
     return TrackingMetrics(
         rmse=math.sqrt(time_mean(t, error[judged] ** 2)),
         max_error=float(magnitude.max()),
         itae=float(np.trapezoid((t - t[0]) * magnitude, t)),
-        settling=_settling(task, time, error),
-        overshoot=_overshoot(task, wanted, angle, judged),
+        settling=settling,
+        overshoot=overshoot,
         steady=time_mean(time[late], np.abs(error[late])) if task.event is not None else math.nan,
         air=time_mean(t, _drawn_flow(plant, record)[judged]) / REFERENCE_DENSITY * 1e3,
         strokes=float(strokes.sum()),
         valve_life=2.0 * RATED_STROKES / float(strokes.max()) / 3600.0 if strokes.max() > 0 else math.inf,
         stiffness_error=100.0 * math.sqrt(time_mean(time[late], (reached / stiff - 1.0) ** 2)),
     )
-
-
-def _settling(task: ControlTask, time: Array, error: Array) -> float:
-    if task.event is None:
-        return math.nan
-    outside = np.flatnonzero((np.abs(error) > SETTLING_BAND) & (time > task.event))
-    return float(np.append(time, math.inf)[outside[-1] + 1] - task.event) if outside.size else 0.0
-
-
-def _overshoot(task: ControlTask, wanted: Array, angle: Array, judged: Mask) -> float:
-    change = wanted[-1] - wanted[0]
-    if task.event is None or task.torque or task.stiffening or change == 0.0:
-        return math.nan
-    return max(0.0, 100.0 * float(((angle - wanted[-1]) / change)[judged].max()))
 
 
 def _drawn_flow(plant: Plant, record: Recording) -> Array:

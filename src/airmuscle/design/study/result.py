@@ -52,11 +52,15 @@ def sobol_indices(metric: Array, parameters: int, seed: int = 0) -> SobolIndices
     table = metric.reshape(-1, parameters + 2)
     complete = np.isfinite(table).all(axis=1)
     known = table[complete]
-    terms, count, undefined = _summands(known), len(known), np.full(parameters, np.nan)
+    count, undefined = len(known), np.full(parameters, np.nan)
     varies = len(known) and np.ptp(known) > 1e-12 * np.abs(known).max() and np.ptp(known[:, [0, -1]]) > 0
     if not varies:  # by more than rounding errors
         no_interval = np.tile(undefined, (2, 1))
         return SobolIndices(undefined, undefined, no_interval, no_interval, count, len(table) - count)
+    centred = known - known[:, [0, -1]].mean()
+    a, mixed, b = centred[:, :1], centred[:, 1:-1], centred[:, -1:]
+    # what the estimators average, per base point (n, 2 d + 2); a bootstrap sample is a matrix product
+    terms = np.hstack([b * (mixed - a), 0.5 * (a - mixed) ** 2, 0.5 * (a + b), 0.5 * (a * a + b * b)])
     first, total = _indices(terms.mean(axis=0)[None, :], parameters)
     generator = np.random.default_rng(seed)
     samples = []
@@ -66,13 +70,6 @@ def sobol_indices(metric: Array, parameters: int, seed: int = 0) -> SobolIndices
     tails = [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2]
     intervals = [np.nanquantile(np.concatenate([pair[i] for pair in samples]), tails, axis=0) for i in (0, 1)]
     return SobolIndices(first[0], total[0], intervals[0], intervals[1], count, len(table) - count)
-
-
-def _summands(table: Array) -> Array:
-    """The terms that the estimators average, per base point (n, 2 d + 2); a bootstrap sample is a matrix product."""
-    table = table - table[:, [0, -1]].mean() if len(table) else table
-    a, mixed, b = table[:, :1], table[:, 1:-1], table[:, -1:]
-    return np.hstack([b * (mixed - a), 0.5 * (a - mixed) ** 2, 0.5 * (a + b), 0.5 * (a * a + b * b)])
 
 
 def _indices(means: Array, parameters: int) -> tuple[Array, Array]:

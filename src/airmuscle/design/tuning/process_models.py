@@ -160,31 +160,22 @@ def ultimate_point(
     t, y = t[late], y[late]
     extent = float(np.ptp(y)) / 2
     around = y - (y.max() + y.min()) / 2
-    rising = _rising_crossings(around, DEAD_BAND * extent)
-    if rising.size < 3:
-        raise _no_oscillation(rising.size, extent)
-    crossings = t[rising] - around[rising] * (t[rising + 1] - t[rising]) / (around[rising + 1] - around[rising])
-    period = float(crossings[-1] - crossings[0]) / (rising.size - 1)
-    whole = (t >= crossings[0]) & (t < crossings[-1])
-    a = waveform_amplitude(t[whole], y[whole], period, rising.size - 1)
-    if a <= abs(hysteresis):
-        raise _no_oscillation(rising.size, a)
+    # rows before the first rising crossing of zero between each row below the dead band and the next row above it
+    decided = np.flatnonzero(np.abs(around) > DEAD_BAND * extent)
+    lows = decided[:-1][(around[decided[:-1]] < 0) & (around[decided[1:]] > 0)]
+    zeros = np.flatnonzero((around[:-1] < 0) & (around[1:] >= 0))
+    rising, a = zeros[np.searchsorted(zeros, lows)], extent
+    if rising.size >= 3:
+        crossings = t[rising] - around[rising] * (t[rising + 1] - t[rising]) / (around[rising + 1] - around[rising])
+        period = float(crossings[-1] - crossings[0]) / (rising.size - 1)
+        whole = (t >= crossings[0]) & (t < crossings[-1])
+        a = waveform_amplitude(t[whole], y[whole], period, rising.size - 1)
+    if rising.size < 3 or a <= abs(hysteresis):
+        raise ParameterError(
+            f"relay experiment: {rising.size} rising crossings and an amplitude of {a:.4g} in the second half; at "
+            "least three crossings and an amplitude above the hysteresis are needed. Record for longer."
+        )
     return UltimatePoint(4 * amplitude / (math.pi * math.sqrt(a**2 - hysteresis**2)), period, NOTE)
-
-
-def _no_oscillation(crossings: int, amplitude: float) -> ParameterError:
-    return ParameterError(
-        f"relay experiment: {crossings} rising crossings and an amplitude of {amplitude:.4g} in the second half; at "
-        "least three crossings and an amplitude above the hysteresis are needed. Record for longer."
-    )
-
-
-def _rising_crossings(values: Array, band: float) -> npt.NDArray[np.intp]:
-    """The rows before the first rising crossing of zero between each row below -band and the next row above band."""
-    decided = np.flatnonzero(np.abs(values) > band)
-    lows = decided[:-1][(values[decided[:-1]] < 0) & (values[decided[1:]] > 0)]
-    crossings = np.flatnonzero((values[:-1] < 0) & (values[1:] >= 0))
-    return np.asarray(crossings[np.searchsorted(crossings, lows)], dtype=np.intp)
 
 
 def waveform_amplitude(time: Array, values: Array, period: float, periods: int) -> float:
