@@ -14,7 +14,7 @@ from widths import widened
 
 import airmuscle as am
 from airmuscle.design import JointRequirement, LiftRequirement, SizingConditions, choose, scenario_text
-from airmuscle.design.sizing import MOVING, RESTING, air_path, fill_time
+from airmuscle.design.sizing import MOVING, RESTING, air_path
 from airmuscle.files import load_scenario
 
 LIFT = ("size", "--load", "20 kg", "--stroke", "40 mm", "--supply", "6 bar")
@@ -218,7 +218,7 @@ def test_a_valve_of_the_library_reaches_the_cycle_time_if_it_fills_and_discharge
     row = next(row for row in slow if row["valve"] == "matrix-821")
     choice = choose(am.load("dmsp-20-300"), LiftRequirement(stroke=0.04, mass=20.0), CONDITIONS)
     path = air_path(choice)
-    assert row["fills_in"] == pytest.approx(fill_time(choice, am.load("matrix-821").valve, path))
+    assert row["fills_in"] == pytest.approx(path.time(am.load("matrix-821").valve, filling=True))
     assert (row["conductance"], row["warning"]) == (am.load("matrix-821").valve.conductance, "")
     assert max(row["fills_in"], row["discharges_in"]) < MOVING * 4.0
 

@@ -186,24 +186,21 @@ def column_heading(name: str) -> str:
 def recording_card(recording: Any, units: Mapping[str, str]) -> Card:
     """The display of a Recording; `units` are SI units of columns that are no known quantity."""
     rows: list[tuple[str, ...]] = [("column", "unit", "first", "minimum", "maximum", "last")]
-    rows += [_row(name, values, units) for name, values in recording.columns.items()]
+    for name, values in recording.columns.items():
+        factor, unit = display_scale(name)
+        finite = values[np.isfinite(values)] * factor
+        finite[np.abs(finite) < ROUNDING * np.max(np.abs(finite), initial=0.0)] = 0.0
+        shown = (finite[0], finite.min(), finite.max(), finite[-1]) if finite.size else ()
+        rows.append((name, unit or units.get(name, ""), *(f"{value:.4g}" for value in shown)))
+
+    def draw() -> Any:
+        every = slice(None, None, max(1, -(-len(recording) // MAX_POINTS)))
+        columns = {name: values[every] for name, values in recording.columns.items()}
+        time = columns.pop("time", None)
+        return plot_columns(columns, time, recording.origin, units=units, limit=MAX_PANELS)
+
     title = f"{recording.origin}: {len(recording)} rows of {len(recording.columns)} columns"
-    return Card(title, rows, (lambda: _draw(recording, units)) if len(recording) else None, recording.notes)
-
-
-def _row(name: str, values: Array, units: Mapping[str, str]) -> tuple[str, ...]:
-    factor, unit = display_scale(name)
-    finite = values[np.isfinite(values)] * factor
-    finite[np.abs(finite) < ROUNDING * np.max(np.abs(finite), initial=0.0)] = 0.0
-    shown = (finite[0], finite.min(), finite.max(), finite[-1]) if finite.size else ()
-    return (name, unit or units.get(name, ""), *(f"{value:.4g}" for value in shown))
-
-
-def _draw(recording: Any, units: Mapping[str, str]) -> Any:
-    every = slice(None, None, max(1, -(-len(recording) // MAX_POINTS)))
-    columns = {name: values[every] for name, values in recording.columns.items() if name != "time"}
-    time = recording.columns["time"][every] if "time" in recording.columns else None
-    return plot_columns(columns, time, recording.origin, units=units, limit=MAX_PANELS)
+    return Card(title, rows, draw if len(recording) else None, recording.notes)
 
 
 class RowNote(str):

@@ -15,9 +15,7 @@ from .requirement_and_choice import by_reserve as by_reserve
 from .scenario import MOVING as MOVING
 from .scenario import RESTING as RESTING
 from .scenario import air_path as air_path
-from .scenario import discharge_time as discharge_time
 from .scenario import discharge_valve as discharge_valve
-from .scenario import fill_time as fill_time
 from .scenario import fill_valve as fill_valve
 from .scenario import scenario_text as scenario_text
 from .scenario import scenario_valves as scenario_valves

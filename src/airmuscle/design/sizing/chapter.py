@@ -12,7 +12,7 @@ from ...physics.muscle.characteristic.validity_range import validity_range_of
 from ...physics.muscle.isobars import compute_isobars, isobar_figure
 from ...report.chapter import Chapter, Plot, Table, TableColumn
 from . import JointRequirement, LiftRequirement, MuscleChoice, SizingConditions, SizingResult
-from .scenario import MOVING, SizingScenario, air_path, discharge_time, fill_time, scenario_valves
+from .scenario import MOVING, SizingScenario, air_path, scenario_valves
 
 SHORT_UNSUITABLE, SHORT_VALVES = 3, 4
 """Rows of the brief view (chosen)."""
@@ -155,7 +155,7 @@ def _valves(choice: MuscleChoice | None) -> Table | None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", AirmuscleWarning)  # the table states them
         known: list[Any] = list(map(load, list_valves()))
-    times = {each.name: (fill_time(choice, each.valve, path), discharge_time(choice, each.exhaust or each.valve, path))
+    times = {each.name: (path.time(each.valve, filling=True), path.time(each.exhaust or each.valve, filling=False))
              for each in known}  # fmt: skip
     reaching = {each.name for each in known if max(times[each.name]) <= limit}
     suitable = {each.name for each in known if each.name in reaching and not each.warning}

@@ -12,7 +12,7 @@ from ...files.library.write import scenario_toml
 from ...physics import AntagonisticJoint, HangingMass, Isotonic, LinearDamper, Mechanism, Muscle, Plant, SpringLoad
 from ...physics.pneumatics import FillDischarge, Orifice, ProportionalRegulator, SecondOrderLag, Supply, Valve
 from ...physics.pneumatics.gas import Isothermal, absolute_pressure
-from .requirement_and_choice import JointRequirement, LiftRequirement, MuscleChoice
+from .requirement_and_choice import JointRequirement, LiftRequirement, MuscleChoice, SizingConditions
 
 STATIONS = 65
 """Stations of the quasi-static path (chosen)."""
@@ -27,6 +27,18 @@ class AirPath(NamedTuple):
 
     pressure: Array
     mass: Array
+    conditions: SizingConditions
+
+    def time(self, orifice: Orifice, *, filling: bool) -> float:
+        """Time [s] in which an open valve fills one muscle from the supply, or discharges it into the surroundings."""
+        ambient = self.conditions.ambient
+        if filling:
+            supply = absolute_pressure(self.conditions.supply, ambient)
+            flow = orifice.mass_flow(supply, self.pressure, 1.0, ambient.temperature)
+        else:
+            flow = orifice.mass_flow(self.pressure, ambient.pressure, 1.0, ambient.temperature)
+        slowness = 1.0 / np.maximum(flow, 1e-300)
+        return float(np.sum(0.5 * (slowness[1:] + slowness[:-1]) * np.diff(self.mass)))
 
 
 def air_path(choice: MuscleChoice) -> AirPath:
@@ -51,41 +63,22 @@ def air_path(choice: MuscleChoice) -> AirPath:
         pressures = first.pressure + fraction * (last.pressure - first.pressure)
     volumes = np.array(list(map(muscle.volume, pressures.tolist(), contractions.tolist())))
     absolute = np.asarray(absolute_pressure(pressures, ambient))
-    return AirPath(absolute, np.asarray(Isothermal().air_mass(absolute, volumes, ambient)))
+    return AirPath(absolute, np.asarray(Isothermal().air_mass(absolute, volumes, ambient)), choice.conditions)
 
 
 def fill_valve(choice: MuscleChoice, duration: float) -> Valve:
     """Valve between the supply and one muscle that fills it in a time [s]. Raises SolveError."""
-    return _valve(choice, fill_time(choice, Valve(TRIAL, CRITICAL_RATIO)), duration)
+    return _valve(choice, duration, filling=True)
 
 
 def discharge_valve(choice: MuscleChoice, duration: float) -> Valve:
     """Valve between one muscle and the surroundings that discharges it in a time [s]. Raises SolveError."""
-    return _valve(choice, discharge_time(choice, Valve(TRIAL, CRITICAL_RATIO)), duration)
+    return _valve(choice, duration, filling=False)
 
 
-def fill_time(choice: MuscleChoice, orifice: Orifice, path: AirPath | None = None) -> float:
-    """Time [s] in which an open valve at the supply fills one muscle. Raises SolveError."""
-    path, ambient = path or air_path(choice), choice.conditions.ambient
-    supply = absolute_pressure(choice.conditions.supply, ambient)
-    return _time(orifice.mass_flow(supply, path.pressure, 1.0, ambient.temperature), path)
-
-
-def discharge_time(choice: MuscleChoice, orifice: Orifice, path: AirPath | None = None) -> float:
-    """Time [s] in which an open valve discharges one muscle into the surroundings. Raises SolveError."""
-    path, ambient = path or air_path(choice), choice.conditions.ambient
-    return _time(orifice.mass_flow(path.pressure, ambient.pressure, 1.0, ambient.temperature), path)
-
-
-def _time(flow: Any, path: AirPath) -> float:
-    slowness = 1.0 / np.maximum(flow, 1e-300)
-    return float(np.sum(0.5 * (slowness[1:] + slowness[:-1]) * np.diff(path.mass)))
-
-
-def _valve(choice: MuscleChoice, time: float, duration: float) -> Valve:
-    """The valve that moves the air in a duration; `time` is that of the trial conductance."""
+def _valve(choice: MuscleChoice, duration: float, *, filling: bool) -> Valve:
     limit = 1e-5
-    conductance = TRIAL * time / duration
+    conductance = TRIAL * air_path(choice).time(Valve(TRIAL, CRITICAL_RATIO), filling=filling) / duration
     if not 0.0 < conductance <= limit:
         raise SolveError(
             f"{choice.entry.name}: to move its air in {duration:.3g} s, a valve needs a sonic conductance of "
