@@ -102,9 +102,12 @@ def _curves(quantity: str, names: list[str]) -> tuple[Curve, ...]:
     """The curves of a panel; columns of one part have one colour and differ in their variant."""
     curves: list[Curve] = []
     variants: list[str] = []
-    for name in sorted(names, key=lambda name: _role_of(name, quantity) != ""):
+    roles = {}
+    for name in names:  # that of the prefix, or of the set point of a pressure regulator
+        prefix, _, _, tail = _parts_of(name)
+        roles[name] = ROLES.get(prefix, "") or (_PRESSURE_SETPOINTS.get(tail, "") if quantity == "pressure" else "")
+    for name, role in sorted(roles.items(), key=lambda item: item[1] != ""):
         _, base, part, tail = _parts_of(name)
-        role = _role_of(name, quantity)
         own = role or (tail != quantity and quantity == "opening")
         variants += [tail] if not role and tail not in variants else []
         rest = part if tail == quantity or role in _PRESSURE_SETPOINTS.values() else base
@@ -114,12 +117,6 @@ def _curves(quantity: str, names: list[str]) -> tuple[Curve, ...]:
         label = " ".join(filter(None, (role, rest))).replace("_", " ") or tail.replace("_", " ")
         curves.append(Curve(name, label or name, part, role, variant))
     return tuple(curves)
-
-
-def _role_of(name: str, quantity: str) -> str:
-    """The role of a column in its panel: that of its prefix, or of the set point of a pressure regulator."""
-    prefix, _, _, tail = _parts_of(name)
-    return ROLES.get(prefix, "") or (_PRESSURE_SETPOINTS.get(tail, "") if quantity == "pressure" else "")
 
 
 def plot_columns(

@@ -80,25 +80,16 @@ def true_intervals(mask: Mask) -> list[Interval]:
 
 def level_intervals(values: Array, band: float, *, within: Interval | None = None) -> Iterator[Interval]:
     """Consecutive intervals, each as long as possible, whose values fit into a band of width `band`."""
-    whole = within or Interval(0, len(values))
-    start = whole.start
-    while start < whole.stop:
-        stop = _first_row_outside(values[: whole.stop], start, band)
+    start, end = (within.start, within.stop) if within else (0, len(values))
+    while start < end:
+        size, is_outside = 64, np.zeros(0, dtype=bool)
+        while not is_outside.any() and is_outside.size < end - start:  # in windows of doubling size
+            window = values[start : min(start + size, end)]
+            is_outside = np.maximum.accumulate(window) - np.minimum.accumulate(window) > band
+            size *= 2
+        stop = start + int(np.argmax(is_outside)) if is_outside.any() else end
         yield Interval(start, stop)
         start = stop
-
-
-def _first_row_outside(values: Array, start: int, band: float) -> int:
-    """The first row after `start` that does not fit into the band, searched in windows of doubling size."""
-    size = 64
-    while True:
-        window = values[start : start + size]
-        outside = np.maximum.accumulate(window) - np.minimum.accumulate(window) > band
-        if outside.any():
-            return start + int(np.argmax(outside))
-        if start + size >= len(values):
-            return len(values)
-        size *= 2
 
 
 def running_median(values: Array, width: int) -> Array:
@@ -108,15 +99,13 @@ def running_median(values: Array, width: int) -> Array:
     padded = np.pad(np.asarray(values, dtype=float), width // 2, constant_values=np.nan)
     rows = max(1, _MAX_WINDOW_VALUES // width)
     windows = np.lib.stride_tricks.sliding_window_view(padded, width)
-    return np.concatenate([_medians(windows[i : i + rows]) for i in range(0, len(values), rows)])
-
-
-def _medians(windows: Array) -> Array:
-    """The median of the finite values of each window (N, W); NaN where there is none."""
-    ordered = np.sort(windows, axis=1)  # NaN last
-    count = np.maximum(np.count_nonzero(~np.isnan(ordered), axis=1), 1)[:, None]
-    middle = np.take_along_axis(ordered, np.hstack([(count - 1) // 2, count // 2]), axis=1)
-    return np.asarray(np.where(middle[:, 0] == middle[:, 1], middle[:, 0], 0.5 * (middle[:, 0] + middle[:, 1])))
+    medians = []
+    for first in range(0, len(values), rows):
+        ordered = np.sort(windows[first : first + rows], axis=1)  # NaN last
+        count = np.maximum(np.count_nonzero(~np.isnan(ordered), axis=1), 1)[:, None]
+        low, high = np.take_along_axis(ordered, np.hstack([(count - 1) // 2, count // 2]), axis=1).T
+        medians.append(np.where(low == high, low, 0.5 * (low + high)))
+    return np.concatenate(medians)
 
 
 LEVEL_WIDTHS = (0.02, 0.01, 0.005, 0.002)

@@ -29,6 +29,8 @@ class CaseGroup:
     varied          values (m,) of the parameters in which the m plants differ, by path
     initial_states  values (m,) by state
     scales          the controlled columns with their scales
+    air             the states that hold the air of the muscles
+    kept            the columns from which metrics are computed
     """
 
     places: npt.NDArray[np.intp]
@@ -36,18 +38,8 @@ class CaseGroup:
     varied: Mapping[str, Array]
     initial_states: Mapping[str, Array]
     scales: Mapping[str, float]
-
-    @property
-    def kept(self) -> tuple[str, ...]:
-        """The columns from which metrics are computed."""
-        errors = (column for name in self.scales for column in (name, f"{SETPOINT}{name}"))
-        commands = (f"{COMMAND}{name}" for name in self.cases[0].loop.controller.inputs)
-        return (*errors, *commands, *self.air_states)
-
-    @property
-    def air_states(self) -> tuple[str, ...]:
-        """The states that hold the air of the muscles."""
-        return tuple(s.name for s in self.cases[0].plant.states if s.name.rpartition(".")[2] == AIR_MASS)
+    air: tuple[str, ...]
+    kept: tuple[str, ...]
 
 
 def group_cases(cases: Sequence[LoopCase], index: TrackingIndex) -> tuple[CaseGroup, ...]:
@@ -72,7 +64,10 @@ def _group(cases: list[LoopCase], places: npt.NDArray[np.intp], index: TrackingI
         raise error.located(f"case '{first.name}'") from None
     varied = {paths[i]: table[:, i] for i in differing.tolist()}
     states = {name: np.array([start[name] for start in starts]) for name in starts[0]}
-    return CaseGroup(places, tuple(cases), varied, states, scales)
+    air = tuple(s.name for s in first.plant.states if s.name.rpartition(".")[2] == AIR_MASS)
+    commands = (f"{COMMAND}{name}" for name in first.loop.controller.inputs)
+    kept = (*(column for name in scales for column in (name, f"{SETPOINT}{name}")), *commands, *air)
+    return CaseGroup(places, tuple(cases), varied, states, scales, air, kept)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)
@@ -123,7 +118,7 @@ class Evaluator:
             index = self.index.values(batch.time - batch.time[0], batch.columns, group.scales)
         completed = (batch.status == 0) & np.isfinite(index)
         metrics.index[at] = np.where(completed, index, np.inf).reshape(shape)
-        drawn = [np.maximum(np.diff(batch[name], axis=1), 0.0).sum(axis=1) for name in group.air_states]
+        drawn = [np.maximum(np.diff(batch[name], axis=1), 0.0).sum(axis=1) for name in group.air]
         air = np.sum(drawn, axis=0) if drawn else np.full(len(batch), np.nan)
         metrics.air[at] = air.reshape(shape) / self.duration
         strokes = [

@@ -92,10 +92,14 @@ def perturbed_family(
             values = [leaf.value * (factor if leaf.path in chosen else 1.0) for leaf in leaves(plant)]
             with located_errors(f"{symbol} x {factor:g}"):
                 changed.append((f"{symbol} x {factor:g}", with_parameters(plant, values)))
-    if perturbations.leak:
-        leaking = _leaking(plant, perturbations.leak)
-        notes += [] if leaking else ["no case with a leak: a circuit has no conductance"]
-        changed += [("leak", leaking)] if leaking else []
+    known = [[leaf.value for leaf in leaves(each) if _CONDUCTANCE.search(leaf.path)] for each in plant.circuits]
+    if perturbations.leak and not all(known):
+        notes.append("no case with a leak: a circuit has no conductance")
+    elif perturbations.leak:
+        leaks = (Valve(perturbations.leak * max(each), LEAK_CRITICAL_RATIO) for each in known)
+        circuits = tuple(map(WithLeak, plant.circuits, leaks))
+        circuit = circuits if isinstance(plant.circuit, tuple) else circuits[0]
+        changed.append(("leak", dataclasses.replace(plant, circuit=circuit)))
     drawn = list(_draws(plant, uncertainties, fitted, perturbations.draws, seed))
     if perturbations.draws and not drawn:
         notes.append("no drawn parameters: neither the scenario nor a muscle file states the uncertainty of parameters")
@@ -111,17 +115,6 @@ def perturbed_family(
         delayed = dataclasses.replace(loop, controller=WithSensors(law, sensors))
         cases.append(LoopCase(f"delay {perturbations.delay}", plant, delayed, cases[0].initial_state, "law"))
     return PerturbedFamily(tuple(cases), tuple(notes))
-
-
-def _leaking(plant: Plant, share: float) -> Plant | None:
-    """The plant with a leak at every muscle; None where a circuit has no conductance."""
-    circuits = []
-    for circuit in plant.circuits:
-        known = [leaf.value for leaf in leaves(circuit) if _CONDUCTANCE.search(leaf.path)]
-        if not known:
-            return None
-        circuits.append(WithLeak(circuit, Valve(share * max(known), LEAK_CRITICAL_RATIO)))
-    return dataclasses.replace(plant, circuit=tuple(circuits) if isinstance(plant.circuit, tuple) else circuits[0])
 
 
 def _draws(
