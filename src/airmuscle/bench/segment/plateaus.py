@@ -125,7 +125,10 @@ def _steady_parts(values: Array, band: float, within: Interval, min_rows: int) -
         inside = values[level.rows]  # without the start and the end of a ramp from or to the level
         near = np.flatnonzero(np.abs(inside - np.median(inside)) <= 0.25 * band)
         part = Interval(level.start + int(near[0]), level.start + int(near[-1]) + 1) if near.size else Interval(0, 0)
-        if len(part) >= min_rows and not _drifts(values[part.rows], band):
+        count = DRIFT_PARTS if len(part) >= 5 * DRIFT_PARTS else 3
+        medians = [float(np.median(each)) for each in np.array_split(values[part.rows], count) if each.size]
+        drift = max(medians, default=0.0) - min(medians, default=0.0)
+        if len(part) >= min_rows and not drift > MAX_DRIFT * band:
             yield part
 
 
@@ -133,12 +136,6 @@ def _band(values: Array, sensor: Sensor) -> float:
     """The band of a constant quantity [SI]: of its quasi-static change, its noise, or rounding."""
     rounding = 1e-9 * float(np.max(np.abs(values)))
     return max(2.0 * MAX_CHANGE * float(np.ptp(values)), 8.0 * sensor.std, rounding)
-
-
-def _drifts(values: Array, band: float) -> bool:
-    count = DRIFT_PARTS if len(values) >= 5 * DRIFT_PARTS else 3
-    parts = [float(np.median(part)) for part in np.array_split(values, count) if part.size]
-    return max(parts) - min(parts) > MAX_DRIFT * band
 
 
 def plateau_points(recording: Recording, plateaus: tuple[Plateau, ...]) -> Recording:

@@ -66,7 +66,8 @@ def _products(result: SizingResult) -> Table:
     groups: dict[tuple[str, int], list[MuscleChoice]] = {}
     for choice in result.choices:
         groups.setdefault((product_of(choice), choice.total_count), []).append(choice)
-    first = [group[0] for group in groups.values()]
+    first, cycle = [group[0] for group in groups.values()], result.conditions.cycle_time
+    volumes = [choice.reference_volume for choice in first]
     lengths = [sorted(choice.length for choice in group) for group in groups.values()]
     columns: dict[str, Any] = {
         "product": [product for product, _ in groups],
@@ -80,7 +81,7 @@ def _products(result: SizingResult) -> Table:
             [(c.design.extended.pressure, c.design.contracted.pressure) for c in first], "Pa", "bar", 3
         ),
         "reserve": TableColumn([choice.design.reserve for choice in first], "1", "%", 3),
-        "air a minute": TableColumn(list(map(_air_a_minute, first)), "m3 (ANR)", "l (ANR)", 3),
+        "air a minute": TableColumn([v and 60.0 * v / cycle for v in volumes], "m3 (ANR)", "l (ANR)", 3),
         "law": TableColumn([choice.entry.name for choice in first], brief=False),
     }
     note = "Each product by the law of its best choice; length by all laws: the range by its published laws."
@@ -120,11 +121,12 @@ def _common(result: SizingResult) -> dict[str, Any]:
 
 def _air(result: SizingResult) -> Table:
     """Air and dimensions of all choices."""
-    choices = result.choices
+    choices, cycle = result.choices, result.conditions.cycle_time
+    volumes = [choice.reference_volume for choice in choices]
     columns: dict[str, Any] = {
         **_common(result),
-        "air a cycle": TableColumn([choice.reference_volume for choice in choices], "m3 (ANR)", "l (ANR)"),
-        "air a minute": TableColumn(list(map(_air_a_minute, choices)), "m3 (ANR)", "l (ANR)"),
+        "air a cycle": TableColumn(volumes, "m3 (ANR)", "l (ANR)"),
+        "air a minute": TableColumn([v and 60.0 * v / cycle for v in volumes], "m3 (ANR)", "l (ANR)"),
         "energy of the air": TableColumn([choice.air_energy for choice in choices], "J"),
         "efficiency": TableColumn([choice.efficiency for choice in choices], "1", "%"),
         "diameter": TableColumn([choice.diameter for choice in choices], "m", "mm"),
@@ -140,11 +142,6 @@ def _air(result: SizingResult) -> Table:
         "divided by it. A minute: without pauses. Diameter: at the contracted end, without the wall."
     )
     return Table("air", "Air and dimensions", columns, note)
-
-
-def _air_a_minute(choice: MuscleChoice) -> float | None:
-    volume = choice.reference_volume
-    return None if volume is None else 60.0 * volume / choice.conditions.cycle_time
 
 
 def _valves(choice: MuscleChoice | None) -> Table | None:

@@ -111,7 +111,7 @@ def first_order_of_step(
 
     T = 1.5 (t_63 - t_28), L = t_63 - T. Raises ParameterError for an output that does not settle or does not change.
     """
-    t, y, initial = _step_rows(time, output, step, step_time)
+    t, y, initial = _rows(time, output, step, step_time)
     change = float(y[-max(1, y.size // 10) :].mean() - initial)
     spread = float(np.ptp(y[-max(1, y.size // 10) :]))
     if change == 0.0 or spread > UNSETTLED * abs(change):
@@ -132,7 +132,7 @@ def integrator_of_step(
 
     The dead time is where the line passes through the initial output. Arguments as in `first_order_of_step`.
     """
-    t, y, initial = _step_rows(time, output, step, step_time)
+    t, y, initial = _rows(time, output, step, step_time)
     half = t >= t[-1] / 2
     slope, offset = np.polyfit(t[half], y[half], 1)
     if slope == 0.0:
@@ -155,7 +155,7 @@ def ultimate_point(
     for dead time alone; the `note` of the result says so. Reference: Åström and Hägglund (1984). Raises
     ParameterError for an output that does not oscillate.
     """
-    t, y = _rows(time, output, amplitude)
+    t, y, _ = _rows(time, output, amplitude)
     late = t >= t[-1] / 2
     t, y = t[late], y[late]
     extent = float(np.ptp(y)) / 2
@@ -235,7 +235,10 @@ def _two_arcs(phase: Array, values: Array, extrema: Array) -> tuple[float, float
     return residual, 0.25 * float(high + back_high - low - back_low)
 
 
-def _rows(time: npt.ArrayLike, output: npt.ArrayLike, size: float) -> tuple[Array, Array]:
+def _rows(
+    time: npt.ArrayLike, output: npt.ArrayLike, size: float, step_time: float | None = None
+) -> tuple[Array, Array, float]:
+    """The rows from a step on, or all, with times counted from it or from the first row, and the initial value."""
     t, y = np.asarray(time, dtype=float), np.asarray(output, dtype=float)
     if t.ndim != 1 or t.shape != y.shape or t.size < MIN_ROWS or not (np.diff(t) > 0).all():
         raise ParameterError(
@@ -244,17 +247,9 @@ def _rows(time: npt.ArrayLike, output: npt.ArrayLike, size: float) -> tuple[Arra
         )
     if not (np.isfinite(y).all() and math.isfinite(size) and size != 0.0):
         raise ParameterError(f"experiment: the output must be finite and the step, {size}, finite and not 0.")
-    return t - t[0], y
-
-
-def _step_rows(
-    time: npt.ArrayLike, output: npt.ArrayLike, step: float, step_time: float | None
-) -> tuple[Array, Array, float]:
-    """The rows from the step on, with times counted from it, and the initial value."""
-    t, y = _rows(time, output, step)
     if step_time is None:
-        return t, y, float(y[0])
-    t = t + float(np.asarray(time, dtype=float)[0] - step_time)
+        return t - t[0], y, float(y[0])
+    t = (t - t[0]) + float(t[0] - step_time)
     after = t >= 0.0
     if not (t <= 0.0).any() or np.count_nonzero(after) < MIN_ROWS:
         raise ParameterError(
