@@ -137,25 +137,24 @@ def pressure_lines(rows: BenchRows) -> list[PressureLine]:
         return []
     edges = np.unique(np.quantile(pull.contraction, np.linspace(0.0, 1.0, LEVELS + 1)))
     level = np.clip(np.searchsorted(edges, pull.contraction, side="right"), 1, max(edges.size - 1, 1))
-    lines = [line for i in range(1, max(edges.size, 2)) if (line := _line(pull.at(level == i))) is not None]
+    lines = []
+    for i in range(1, max(edges.size, 2)):
+        part = pull.at(level == i)
+        if part.force.size < MIN_ROWS or np.ptp(part.pressure) < 0.5 * np.max(part.pressure):
+            continue
+        middle = float(np.median(part.contraction))
+        offset = part.contraction - middle
+        columns = [np.ones(offset.size), part.pressure]
+        if np.ptp(offset) > 1e-3:
+            columns += [offset, part.pressure * offset]
+        matrix = np.column_stack(columns)
+        scale = np.maximum(np.linalg.norm(matrix, axis=0), 1e-300)
+        values, _, rank, _ = np.linalg.lstsq(matrix / scale, part.force, rcond=None)
+        if rank < matrix.shape[1] or not values[1] > 0:
+            continue
+        residual = part.force - matrix @ (values / scale)
+        variance = float(residual @ residual) / max(offset.size - rank, 1)
+        error = float(np.sqrt(variance * np.linalg.inv((matrix / scale).T @ (matrix / scale))[0, 0])) / float(scale[0])
+        lines.append(PressureLine(middle, float(values[0] / scale[0]), float(values[1] / scale[1]), error))
     spread = len(lines) >= MIN_LEVELS and lines[-1].contraction - lines[0].contraction >= MIN_RANGE
     return lines if spread else []
-
-
-def _line(rows: BenchRows) -> PressureLine | None:
-    """The line of one level; None unless the pressure varies by half of its maximum."""
-    if rows.force.size < MIN_ROWS or np.ptp(rows.pressure) < 0.5 * np.max(rows.pressure):
-        return None
-    offset, middle = rows.contraction - float(np.median(rows.contraction)), float(np.median(rows.contraction))
-    columns = [np.ones(offset.size), rows.pressure]
-    if np.ptp(offset) > 1e-3:
-        columns += [offset, rows.pressure * offset]
-    matrix = np.column_stack(columns)
-    scale = np.maximum(np.linalg.norm(matrix, axis=0), 1e-300)
-    values, _, rank, _ = np.linalg.lstsq(matrix / scale, rows.force, rcond=None)
-    if rank < matrix.shape[1] or not values[1] > 0:
-        return None
-    residual = rows.force - matrix @ (values / scale)
-    variance = float(residual @ residual) / max(offset.size - rank, 1)
-    error = float(np.sqrt(variance * np.linalg.inv((matrix / scale).T @ (matrix / scale))[0, 0])) / float(scale[0])
-    return PressureLine(middle, float(values[0] / scale[0]), float(values[1] / scale[1]), error)

@@ -98,24 +98,19 @@ def check_elongation(recordings: Sequence[Recording]) -> Iterator[str]:
     if rows.force.size < MIN_LEVEL_ROWS or not rows.greatest > 0:
         return
     level = np.digitize(rows.pressure, np.quantile(rows.pressure, np.linspace(0.0, 1.0, PRESSURE_LEVELS + 1))[1:-1])
-    slopes = [_slope(rows.at(level == i)) for i in range(PRESSURE_LEVELS)]
-    known = np.array([slope for slope in slopes if slope is not None])
-    if known.size and np.mean(known > 0) >= MIN_RISING:
+    slopes = []  # of the force over the contraction at equal pressure [N], where enough varies
+    for part in (rows.at(level == i) for i in range(PRESSURE_LEVELS)):
+        if part.force.size >= MIN_LEVEL_ROWS and np.ptp(part.contraction) >= MIN_RANGE:
+            scaled = (part.pressure - np.mean(part.pressure)) / max(float(np.ptp(part.pressure)), 1.0)
+            matrix = np.column_stack([np.ones(scaled.size), part.contraction, scaled])
+            slopes.append(float(np.linalg.lstsq(matrix, part.force, rcond=None)[0][1]))
+    if slopes and np.mean(np.array(slopes) > 0) >= MIN_RISING:
         yield (
             f"{file_list([each.origin for each in recordings])}: the force rises with the contraction at nearly every "
             "pressure, but that of a muscle falls. The column probably counts the elongation, or the displacement from "
             "the shortest length: the contraction (L0 - L)/L0 is 0 at the resting length and grows as the muscle "
             "shortens."
         )
-
-
-def _slope(rows: BenchRows) -> float | None:
-    """The slope of the force over the contraction at equal pressure [N]; None where too little varies."""
-    if rows.force.size < MIN_LEVEL_ROWS or np.ptp(rows.contraction) < MIN_RANGE:
-        return None
-    scaled = (rows.pressure - np.mean(rows.pressure)) / max(float(np.ptp(rows.pressure)), 1.0)
-    matrix = np.column_stack([np.ones(scaled.size), rows.contraction, scaled])
-    return float(np.linalg.lstsq(matrix, rows.force, rcond=None)[0][1])
 
 
 CODES = (99.0, 999.0, 999.9, 9999.0, 9999.9, 99999.0, 999999.0, 32767.0, 32768.0, 1e30, 1e31, 1e36, 1e37, 1e38)

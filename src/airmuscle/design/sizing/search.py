@@ -3,6 +3,7 @@
 import contextlib
 import dataclasses
 import functools
+import itertools
 import warnings
 from collections.abc import Callable, Iterable
 
@@ -62,8 +63,10 @@ class SizingResult(ShortRepr):
         low, high = 0.0, 1.0
         for _ in range(BISECTIONS):
             fraction, choice = 0.5 * (low + high), None
-            with contextlib.suppress(ParameterError):
-                choice = _any_choice(self.requirement.reduced(**{what: fraction}), self.conditions, entries)
+            for entry, count in itertools.product(entries, (self.conditions.max_count, self.conditions.min_count)):
+                with contextlib.suppress(AirmuscleError):
+                    choice = choose(entry, self.requirement.reduced(**{what: fraction}), self.conditions, count)
+                    break
             low, high, best = (low, fraction, best) if choice is None else (fraction, high, choice)
         if best is None:
             return ""
@@ -238,12 +241,3 @@ def _depends_on_length(entry: Entry, search: Search, lengths: tuple[float, float
     grid = np.linspace(*first.contraction_range, 17)
     short, long = (np.asarray(muscle.force(muscle.pressure_range[1], grid)) for muscle in (first, second))
     return not np.allclose(short, long, rtol=1e-9, atol=1e-9 * float(np.abs(short).max()))
-
-
-def _any_choice(requirement: Requirement, conditions: SizingConditions, entries: list[Entry]) -> MuscleChoice | None:
-    """A choice of any of the entries, with the maximum number of muscles or with one; None if there is none."""
-    for entry in entries:
-        for count in (conditions.max_count, conditions.min_count):
-            with contextlib.suppress(AirmuscleError):
-                return choose(entry, requirement, conditions, count)
-    return None

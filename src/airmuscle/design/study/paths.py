@@ -6,7 +6,6 @@ such a field is declared with `custom_field` and one of the readers, which recei
 
 import copy
 import dataclasses
-import itertools
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -48,13 +47,12 @@ class ScenarioTemplate:
 
     def parameters(self) -> dict[str, ScenarioParameter]:
         """All parameters that may vary, by path."""
-        plant, input_table = self.scenario.plant, self.tables.get("input", {})
-        of_plant = enumerate(leaves(plant))
-        available = [ScenarioParameter(leaf.path, leaf.declared.unit, leaf.declared.bounds, i) for i, leaf in of_plant]
-        of_tables = _input_parameters(input_table, self.scenario), _run_parameters(self.tables["run"], self.scenario)
-        for keys, unit in itertools.chain(*of_tables):
-            available.append(ScenarioParameter(_format_path(keys), unit, (-math.inf, math.inf), keys))
-        return {parameter.path: parameter for parameter in available}
+        declared = ((leaf.path, leaf.declared) for leaf in leaves(self.scenario.plant))
+        known = {path: ScenarioParameter(path, d.unit, d.bounds, i) for i, (path, d) in enumerate(declared)}
+        of_input = _input_parameters(self.tables.get("input", {}), self.scenario)
+        for keys, unit in (*of_input, *_run_parameters(self.tables["run"], self.scenario)):
+            known[_format_path(keys)] = ScenarioParameter(_format_path(keys), unit, (-math.inf, math.inf), keys)
+        return known
 
     def parameter(self, path: str, where: str) -> ScenarioParameter:
         """The parameter with a path. Raises ParameterError with the closest path."""

@@ -106,20 +106,18 @@ def tuning_chapter(
     if runs:
         caption = "Nominal case with present and tuned gains."
         plots.append(Plot("response", caption, partial(response_figure, runs, column, unit)))
+    values = {
+        "objective": tuning.objective, "objective with the present gains": tuning.present_objective,
+        "simulated loops": tuning.simulated_loops, "sets of gains": len(tuning.history), "seed": tuning.seed,
+        "interrupted": tuning.interrupted,
+    }  # fmt: skip
     bound = [f"'{path}' is on a bound of its range; a wider range may give a smaller objective"
              for path in tuning.on_bound]  # fmt: skip
     return Chapter(
         name="tuning",
         title=title,
         summary=_summary(tuning),
-        values=(
-            NamedValue("objective", tuning.objective, brief=False),
-            NamedValue("objective with the present gains", tuning.present_objective, brief=False),
-            NamedValue("simulated loops", tuning.simulated_loops, brief=False),
-            NamedValue("sets of gains", len(tuning.history), brief=False),
-            NamedValue("seed", tuning.seed, brief=False),
-            NamedValue("interrupted", tuning.interrupted, brief=False),
-        ),
+        values=tuple(NamedValue(name, value, brief=False) for name, value in values.items()),
         tables=(gain_table(tuning, units), case_table(tuning, units), *([rule_table(rules)] if rules else [])),
         plots=tuple(plots),
         notes=(*notes, *bound),
