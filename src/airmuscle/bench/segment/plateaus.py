@@ -104,7 +104,12 @@ def find_plateaus(
     if "time" not in recording or "pressure" not in recording or len(recording) < MIN_ROWS:
         return ()
     sensors = sensors or estimate_sensors(recording)
-    bands = {name: _band(recording[name], sensors[name]) for name in columns if name in recording and name in sensors}
+    bands = {}
+    for name in columns:
+        if name in recording and name in sensors:  # of its quasi-static change, its noise, or rounding
+            rounding = 1e-9 * float(np.max(np.abs(recording[name])))
+            change = 2.0 * MAX_CHANGE * float(np.ptp(recording[name]))
+            bands[name] = max(change, 8.0 * sensors[name].std, rounding)
     min_rows = max(MIN_ROWS, count_rows(MIN_DURATION, recording["time"], MIN_ROWS))
     intervals = true_intervals(quasi_static_rows(recording, sensors))
     for name, band in bands.items():
@@ -130,12 +135,6 @@ def _steady_parts(values: Array, band: float, within: Interval, min_rows: int) -
         drift = max(medians, default=0.0) - min(medians, default=0.0)
         if len(part) >= min_rows and not drift > MAX_DRIFT * band:
             yield part
-
-
-def _band(values: Array, sensor: Sensor) -> float:
-    """The band of a constant quantity [SI]: of its quasi-static change, its noise, or rounding."""
-    rounding = 1e-9 * float(np.max(np.abs(values)))
-    return max(2.0 * MAX_CHANGE * float(np.ptp(values)), 8.0 * sensor.std, rounding)
 
 
 def plateau_points(recording: Recording, plateaus: tuple[Plateau, ...]) -> Recording:

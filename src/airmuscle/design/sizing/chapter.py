@@ -226,14 +226,7 @@ def _figure(choice: MuscleChoice) -> Any:
     radius = "" if choice.design.radius is None else f", radius {1e3 * choice.design.radius:.4g} mm"
     title = f"{choice.size}{radius}"
     figure = isobar_figure(entry.characteristic, title, compute_isobars(entry.characteristic, valid), valid)
-    _draw_limits(figure.axes[0], choice)
-    _draw_motion(figure.axes[0], choice)
-    plotting.legend_outside(figure.axes[0])
-    return figure
-
-
-def _draw_limits(axes: Any, choice: MuscleChoice) -> None:
-    muscle = choice.muscle
+    axes, muscle = figure.axes[0], choice.muscle
     contraction = np.linspace(*muscle.contraction_range, POINTS)
     label = f"capacity, {muscle.pressure_range[1] / 1e3:.4g} kPa"
     axes.plot(100 * contraction, muscle.capacity(contraction), color=plotting.BLACK, linewidth=1.8, label=label)
@@ -242,6 +235,9 @@ def _draw_limits(axes: Any, choice: MuscleChoice) -> None:
     permitted = muscle.contraction_range[1]
     if 100 * permitted < axes.get_xlim()[1]:
         axes.axvline(100 * permitted, color=plotting.BLACK, linestyle="-.", linewidth=1.0, label="maximum contraction")
+    _draw_motion(axes, choice)
+    plotting.legend_outside(axes)
+    return figure
 
 
 def _draw_motion(axes: Any, choice: MuscleChoice) -> None:

@@ -107,10 +107,23 @@ def scenario_text(choice: MuscleChoice) -> str:
 
     Raises SolveError for a choice without a geometry, or a joint with several muscles on each side.
     """
-    described = _lift if isinstance(choice.requirement, LiftRequirement) else _joint
-    plant, inputs, run, is_inertia_chosen = described(choice)
-    title = f"{choice.size}: {choice.requirement.describe()}"
-    return scenario_toml(title, plant, inputs, run, _note(choice, is_inertia_chosen))
+    is_lift = isinstance(choice.requirement, LiftRequirement)
+    plant, inputs, run, is_inertia_chosen = (_lift if is_lift else _joint)(choice)
+    damper = "" if choice.entry.damper is not None else f", the damper (damping ratio {DAMPING_RATIO:g})"
+    inertia = ", the moving mass or inertia" if is_inertia_chosen else ""
+    note = (
+        "Sized by airmuscle size; SI units.\n"
+        f"The valves are sized after ISO 6358 to fill and to discharge in {100 * MOVING:.4g} % of the cycle.\n"
+        f"Chosen: this part, the critical pressure ratio of the valves, isothermal air{damper}{inertia}.\n"
+    )
+    if is_lift:
+        note += (
+            "The times of the valves are for isothermal air: with the default gas, which warms while it fills, they "
+            "lift 3 to 6 % of the stroke too far. Delete the gas to see it, and close a loop where that matters."
+        )
+    else:
+        note += "Chosen: the regulators, and a pendulum that gives the torque at both ends of the range."
+    return scenario_toml(f"{choice.size}: {choice.requirement.describe()}", plant, inputs, run, note)
 
 
 class SizingScenario(NamedTuple):
@@ -232,22 +245,3 @@ def _joint(choice: MuscleChoice) -> tuple[Plant, dict[str, Any], dict[str, Any],
         "initial_state": {"pressure": middle, "angle": 0.0},
     }
     return plant, inputs, run, inertia != requirement.inertia
-
-
-def _note(choice: MuscleChoice, chosen_inertia: bool) -> str:
-    lines = [
-        "Sized by airmuscle size; SI units.",
-        f"The valves are sized after ISO 6358 to fill and to discharge in {100 * MOVING:.4g} % of the cycle.",
-        "Chosen: this part, the critical pressure ratio of the valves, isothermal air"
-        + ("" if choice.entry.damper is not None else f", the damper (damping ratio {DAMPING_RATIO:g})")
-        + (", the moving mass or inertia" if chosen_inertia else "")
-        + ".",
-    ]
-    if isinstance(choice.requirement, LiftRequirement):
-        lines.append(
-            "The times of the valves are for isothermal air: with the default gas, which warms while it fills, they "
-            "lift 3 to 6 % of the stroke too far. Delete the gas to see it, and close a loop where that matters."
-        )
-    if isinstance(choice.requirement, JointRequirement):
-        lines.append("Chosen: the regulators, and a pendulum that gives the torque at both ends of the range.")
-    return "\n".join(lines)

@@ -105,41 +105,37 @@ def load_study(path: str | Path) -> Study:
     tables, location = read_toml(file), Location.of_file(file)
     check_keys(tables, TABLES, location)
     template = _read_scenario(tables.get("scenario"), location)
-    with ambient_pressure(template.scenario.plant.ambient.pressure):
-        return _build_study(file, tables, location, template)
-
-
-def _build_study(file: Path, tables: Mapping[str, Any], location: Location, template: ScenarioTemplate) -> Study:
-    """The study of a scenario, whose ambient pressure is that of the texts."""
-    vary = _require_table(tables, "vary", location)
-    parameters = {path: template.parameter(path, str(location.inside("vary"))) for path in vary}
-    variations = []
-    for path, parameter in parameters.items():
-        entry, (low, high) = Location(f'{location}, [vary], "{path}"', "", location.folder), parameter.bounds
-        variations.append(read_variation(vary[path], parameter.unit, entry))
-        if outside := [v for v in variations[-1].support if np.isfinite(v) and not low <= v <= high]:
-            unit = "" if parameter.unit == "1" else f" {parameter.unit}"
-            raise ParameterError(f"{entry} includes {outside[0]:g}{unit}; allowed range: {low:g} to {high:g}{unit}.")
-    table = _require_table(tables, "design", location)
-    design: Design = TableReader(classes=DESIGNS).build(table, location.inside("design"))
-    with located_errors(location.inside("design")):
-        values = design.values(variations)
-    metrics = _require_table(tables, "metrics", location)
-    chunk_size = read_count(tables.get("chunk_size", CHUNK_SIZE), "1", f"{location}, chunk_size")
-    if not chunk_size:
-        raise ParameterError(f"{location}, chunk_size is 0; it must be at least 1.")
-    return Study(
-        title=read_text(tables, "title", location, needed=False) or template.scenario.title,
-        path=file,
-        template=template,
-        parameters=tuple(parameters.values()),
-        variations=tuple(variations),
-        follow=_read_follow(tables.get("follow", {}), template, list(parameters), location.inside("follow")),
-        design=design,
-        values=values,
-        metrics=_read_metrics(metrics, template.scenario, location.inside("metrics")),
-        chunk_size=chunk_size,
-    )
+    with ambient_pressure(template.scenario.plant.ambient.pressure):  # that of the texts
+        vary = _require_table(tables, "vary", location)
+        parameters = {name: template.parameter(name, str(location.inside("vary"))) for name in vary}
+        variations = []
+        for name, parameter in parameters.items():
+            entry, (low, high) = Location(f'{location}, [vary], "{name}"', "", location.folder), parameter.bounds
+            variations.append(read_variation(vary[name], parameter.unit, entry))
+            if outside := [v for v in variations[-1].support if np.isfinite(v) and not low <= v <= high]:
+                unit = "" if parameter.unit == "1" else f" {parameter.unit}"
+                allowed = f"{low:g} to {high:g}{unit}"
+                raise ParameterError(f"{entry} includes {outside[0]:g}{unit}; allowed range: {allowed}.")
+        inside, table = location.inside("design"), _require_table(tables, "design", location)
+        design: Design = TableReader(classes=DESIGNS).build(table, inside)
+        with located_errors(inside):
+            values = design.values(variations)
+        metrics = _require_table(tables, "metrics", location)
+        chunk_size = read_count(tables.get("chunk_size", CHUNK_SIZE), "1", f"{location}, chunk_size")
+        if not chunk_size:
+            raise ParameterError(f"{location}, chunk_size is 0; it must be at least 1.")
+        return Study(
+            title=read_text(tables, "title", location, needed=False) or template.scenario.title,
+            path=file,
+            template=template,
+            parameters=tuple(parameters.values()),
+            variations=tuple(variations),
+            follow=_read_follow(tables.get("follow", {}), template, list(parameters), location.inside("follow")),
+            design=design,
+            values=values,
+            metrics=_read_metrics(metrics, template.scenario, location.inside("metrics")),
+            chunk_size=chunk_size,
+        )
 
 
 def _read_scenario(value: Any, location: Location) -> ScenarioTemplate:

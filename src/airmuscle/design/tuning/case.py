@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core import Array, Leaf, ShortRepr, abridged, check_field_types, leaves, structure, with_parameters
+from ...core import Array, ShortRepr, abridged, check_field_types, leaves, structure, with_parameters
 from ...core.errors import ParameterError, PhysicsError, check_known
 from ...engine.loop import Controller, ControlLoop
 from ...physics.equilibrium import find_equilibrium
@@ -57,23 +57,22 @@ def gain_ranges(controller: Controller, bounds: Any) -> tuple[GainRange, ...]:
         raise ParameterError(f'bounds: they are {what}; give a range for each gain, {{"gain": (0.1, 10.0)}}.')
     known = {leaf.path: leaf for leaf in leaves(controller)}
     check_known(f"bounds: {type(controller).__name__} has no parameter", bounds, known)
-    return tuple(_gain_range(known[path], pair) for path, pair in bounds.items())
-
-
-def _gain_range(leaf: Leaf, pair: Any) -> GainRange:
-    declared, where = leaf.declared, f"bounds: '{leaf.path}' ({leaf.declared.symbol}, {leaf.declared.meaning})"
-    try:
-        low, high = (float(bound) for bound in pair)
-    except (TypeError, ValueError):
-        raise ParameterError(
-            f"{where} is {abridged(pair)}; give two numbers, (minimum, maximum), in SI units."
-        ) from None
-    if not (math.isfinite(low) and math.isfinite(high) and low < high):
-        raise ParameterError(f"{where} is {low:g} to {high:g}; the minimum must be below the maximum, both finite.")
-    smallest, greatest = declared.bounds
-    if low < smallest or high > greatest:
-        raise ParameterError(f"{where} is {low:g} to {high:g}; allowed range: {smallest:g} to {greatest:g}.")
-    return GainRange(leaf.path, low, high)
+    ranges = []
+    for path, pair in bounds.items():
+        declared = known[path].declared
+        where, (smallest, greatest) = f"bounds: '{path}' ({declared.symbol}, {declared.meaning})", declared.bounds
+        try:
+            low, high = (float(bound) for bound in pair)
+        except (TypeError, ValueError):
+            raise ParameterError(
+                f"{where} is {abridged(pair)}; give two numbers, (minimum, maximum), in SI units."
+            ) from None
+        if not (math.isfinite(low) and math.isfinite(high) and low < high):
+            raise ParameterError(f"{where} is {low:g} to {high:g}; the minimum must be below the maximum, both finite.")
+        if low < smallest or high > greatest:
+            raise ParameterError(f"{where} is {low:g} to {high:g}; allowed range: {smallest:g} to {greatest:g}.")
+        ranges.append(GainRange(path, low, high))
+    return tuple(ranges)
 
 
 def to_gains(ranges: Sequence[GainRange], coordinates: Array) -> Array:

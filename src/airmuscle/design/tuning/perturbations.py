@@ -80,7 +80,7 @@ def perturbed_family(
     ParameterError where a perturbed parameter is outside its declared range.
     """
     cases, notes = [LoopCase("nominal", plant, loop, initial_state(plant))], list[str]()
-    changed: list[tuple[str, Plant]] = []
+    changed = list[tuple[str, Plant]]()
     nonzero = [leaf.path for leaf in leaves(plant) if leaf.value != 0.0]
     loads, rotors, supplies = (set(filter(kind.search, nonzero)) for kind in (LOAD, ROTOR, SUPPLY))
     for factors, symbol, chosen in (
@@ -97,13 +97,12 @@ def perturbed_family(
         notes.append("no case with a leak: a circuit has no conductance")
     elif perturbations.leak:
         leaks = (Valve(perturbations.leak * max(each), LEAK_CRITICAL_RATIO) for each in known)
-        circuits = tuple(map(WithLeak, plant.circuits, leaks))
-        circuit = circuits if isinstance(plant.circuit, tuple) else circuits[0]
-        changed.append(("leak", dataclasses.replace(plant, circuit=circuit)))
-    drawn = list(_draws(plant, uncertainties, fitted, perturbations.draws, seed))
+        circuits: Any = tuple(map(WithLeak, plant.circuits, leaks))
+        made = circuits if isinstance(plant.circuit, tuple) else circuits[0]
+        changed.append(("leak", dataclasses.replace(plant, circuit=made)))
+    changed += (drawn := list(_draws(plant, uncertainties, fitted, perturbations.draws, seed)))
     if perturbations.draws and not drawn:
         notes.append("no drawn parameters: neither the scenario nor a muscle file states the uncertainty of parameters")
-    changed += drawn
     for name, each in changed:
         with located_errors(f"case '{name}'"):
             cases.append(LoopCase(name, each, loop, initial_state(each)))
