@@ -1,8 +1,4 @@
-"""Sizing of muscles for a lift or a joint: shortest muscles of a catalogue, ranked, and a scenario of the choice.
-
-It is a package of its own between the library, whose entries it scales, and the reports that show its result. The
-analysis of a given plant (equilibria, statics of a joint) is below the library and knows no catalogue.
-"""
+"""Sizing of muscles for a lift or a joint: shortest muscles of a catalogue, ranked, and a scenario of the choice."""
 
 from ...core.stubs import attach_stub
 

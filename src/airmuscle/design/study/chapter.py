@@ -28,18 +28,13 @@ _DISPLAY_UNITS = {
 """Factor and unit in which quantities with these SI units are displayed."""
 
 
-def _display_scale(unit: str) -> tuple[float, str]:
-    """Factor and unit in which a quantity with an SI unit is displayed."""
-    return _DISPLAY_UNITS.get(unit, (1.0, unit))
-
-
-def _axis_label(name: str, unit: str) -> str:
-    """The label of an axis: name and unit, on two lines if they are long."""
-    shown = _display_scale(unit)[1]
+def _shown(name: str, unit: str) -> tuple[float, str]:
+    """Factor by which a quantity with an SI unit is displayed, and label of its axis, on two lines if it is long."""
+    factor, shown = _DISPLAY_UNITS.get(unit, (1.0, unit))
     if len(name) > MAX_LABEL_LENGTH:
         name = f"{name.rpartition('.')[0]}\n.{name.rpartition('.')[2]}"
     between = "\n" if len(name) + len(shown) > MAX_LABEL_LENGTH and "\n" not in name else " "
-    return f"{name}{between}[{shown}]" if shown else name
+    return factor, f"{name}{between}[{shown}]" if shown else name
 
 
 def _panels(count: int, height: float = 2.3, **options: Any) -> tuple[Any, Iterator[Any]]:
@@ -57,9 +52,9 @@ def _histograms(result: StudyResult) -> Plot:
     study = result.study
     figure, panels = _panels(len(study.scalars))
     for name, axis in zip(study.scalars, panels, strict=True):
-        factor, _ = _display_scale(study.units[name])
+        factor, label = _shown(name, study.units[name])
         values = result[name][np.isfinite(result[name])] * factor
-        axis.set(xlabel=_axis_label(name, study.units[name]), ylabel="runs")
+        axis.set(xlabel=label, ylabel="runs")
         axis.yaxis.get_major_locator().set_params(integer=True)
         if values.size:
             equal = np.ptp(values) <= 1e-12 * np.abs(values).max()
@@ -76,19 +71,19 @@ def _histograms(result: StudyResult) -> Plot:
 def _scatter(result: StudyResult, name: str) -> Plot:
     study = result.study
     figure, panels = _panels(len(study.parameters), sharey=True)
-    factor, _ = _display_scale(study.units[name])
+    factor, label = _shown(name, study.units[name])
     finite = np.flatnonzero(np.isfinite(result[name]))
     drawn = finite[:: max(1, -(-finite.size // MAX_POINTS))]
     few = drawn.size <= FEW_POINTS
     style = {"marker": "o", "linestyle": "none", "markersize": 5.0 if few else 2.4, "alpha": 0.9 if few else 0.5,
              "markeredgewidth": 0, "color": BLUE}  # fmt: skip
     for i, (parameter, axis) in enumerate(zip(study.parameters, panels, strict=True)):
-        parameter_factor, _ = _display_scale(parameter.unit)
+        parameter_factor, parameter_label = _shown(parameter.path, parameter.unit)
         axis.plot(study.values[drawn, i] * parameter_factor, result[name][drawn] * factor, **style)
-        axis.set_xlabel(_axis_label(parameter.path, parameter.unit))
+        axis.set_xlabel(parameter_label)
         axis.locator_params(axis="x", nbins=5)
         if i % PANELS_PER_ROW == 0:
-            axis.set_ylabel(_axis_label(name, study.units[name]))
+            axis.set_ylabel(label)
     subset = f" {drawn.size} of {finite.size} runs are drawn." if drawn.size < finite.size else ""
     caption = f"{name} against each varied parameter, one point per run.{subset}"
     return Plot(f"scatter-{_file_stem(name)}", caption, figure)
@@ -124,16 +119,15 @@ def _sensitivity_bars(result: StudyResult, indices: dict[str, SobolIndices]) -> 
 def _time_series_plot(result: StudyResult, name: str) -> Plot:
     study = result.study
     series, rows = study.time_series[name], result[name]
-    factor, _ = _display_scale(study.units[name])
+    factor, label = _shown(series.column, study.units[name])
     available = np.isfinite(rows).any(axis=0)
-    low, median, high = np.full((3, available.size), np.nan)
+    low, median, high = quantiles = np.full((3, available.size), np.nan)
     if available.any():
-        quantiles = np.nanquantile(rows[:, available] * factor, [0.05, 0.5, 0.95], axis=0)
-        low[available], median[available], high[available] = quantiles
+        quantiles[:, available] = np.nanquantile(rows[:, available] * factor, [0.05, 0.5, 0.95], axis=0)
     figure, axis = new_figure()
     axis.fill_between(series.times, low, high, color=SKY, alpha=0.45, linewidth=0, label="5 % to 95 % of the runs")
     axis.plot(series.times, median, color=BLUE, label="median")
-    axis.set(xlabel="time [s]", ylabel=_axis_label(series.column, study.units[name]))
+    axis.set(xlabel="time [s]", ylabel=label)
     legend_below(figure, axis)
     return Plot(f"time-series-{_file_stem(name)}", f"{name}: {series.column} over time, over all runs.", figure)
 
