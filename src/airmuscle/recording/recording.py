@@ -216,10 +216,7 @@ def row_notes(recordings: Iterable[Recording]) -> list[str]:
 
 def list_rows(label: str, rows: Sequence[Any] | Any, most: int) -> str:
     """The first of the row numbers, with the word for a row: `lines 12, 15 and 5 more`."""
-    numbers = [str(row) for row in rows[:most]]
-    more = len(rows) - len(numbers)
     if len(rows) == 1:
-        return f"{label} {numbers[0]}"
-    if more:
-        return f"{label}s {', '.join(numbers)} and {more} more"
-    return f"{label}s {', '.join(numbers[:-1])} and {numbers[-1]}"
+        return f"{label} {rows[0]}"
+    *others, last = [*map(str, rows[:most]), *([f"{len(rows) - most} more"] if len(rows) > most else [])]
+    return f"{label}s {', '.join(others)} and {last}"

@@ -156,5 +156,4 @@ def pressure_lines(rows: BenchRows) -> list[PressureLine]:
         variance = float(residual @ residual) / max(offset.size - rank, 1)
         error = float(np.sqrt(variance * np.linalg.inv((matrix / scale).T @ (matrix / scale))[0, 0])) / float(scale[0])
         lines.append(PressureLine(middle, float(values[0] / scale[0]), float(values[1] / scale[1]), error))
-    spread = len(lines) >= MIN_LEVELS and lines[-1].contraction - lines[0].contraction >= MIN_RANGE
-    return lines if spread else []
+    return lines if len(lines) >= MIN_LEVELS and lines[-1].contraction - lines[0].contraction >= MIN_RANGE else []

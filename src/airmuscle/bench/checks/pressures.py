@@ -227,8 +227,7 @@ def check_force_zero(recordings: Sequence[Recording]) -> Iterator[str]:
             return
     if rows.slack.force.size >= MIN_ROWS:
         return
-    positive = (line.intercept for line in pressure_lines(rows) if line.intercept > 3.0 * line.error)
-    offset = max(positive, default=0.0)
+    offset = max((line.intercept for line in pressure_lines(rows) if line.intercept > 3.0 * line.error), default=0.0)
     if offset > MAX_EXTRAPOLATED * rows.greatest:
         yield (
             f"{file_list([each.origin for each in given])}: the force extrapolates to {offset:.3g} N at zero pressure, "

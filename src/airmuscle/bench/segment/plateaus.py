@@ -140,6 +140,5 @@ def _steady_parts(values: Array, band: float, within: Interval, min_rows: int) -
 def plateau_points(recording: Recording, plateaus: tuple[Plateau, ...]) -> Recording:
     """A recording with one row for each plateau, as input for a static fit of a stepped test."""
     columns = {name: np.array([p.values[name] for p in plateaus]) for name in recording}
-    rows = sum(len(p.interval) for p in plateaus)
-    note = f"{len(plateaus)} plateaus replace {rows} of {len(recording)} rows."
+    note = f"{len(plateaus)} plateaus replace {sum(len(p.interval) for p in plateaus)} of {len(recording)} rows."
     return dataclasses.replace(recording, columns=columns, notes=(*recording.notes, note))

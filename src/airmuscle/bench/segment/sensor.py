@@ -70,9 +70,8 @@ def _sample_time(steps: Array) -> float:
     if not (steps > 0).any():
         return 0.0
     median = float(np.median(steps[steps > 0]))
-    if (steps > 0).all() or (steps < 0).any():
-        return median
-    return float(steps[steps <= GAP_FACTOR * median].mean())
+    is_rounded = not (steps > 0).all() and not (steps < 0).any()
+    return float(steps[steps <= GAP_FACTOR * median].mean()) if is_rounded else median
 
 
 def count_rows(seconds: float, time: Array | None, min_rows: int) -> int:

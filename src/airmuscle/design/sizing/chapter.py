@@ -184,8 +184,7 @@ def _unsuitable(result: SizingResult) -> Table | None:
         "maximum number tried": TableColumn([item.count or None for item in result.unsuitable], short="number"),
         "reason": [item.reason for item in result.unsuitable],
     }
-    title = "Muscles that do not meet the requirement"
-    return Table("unsuitable", title, columns, brief=SHORT_UNSUITABLE)
+    return Table("unsuitable", "Muscles that do not meet the requirement", columns, brief=SHORT_UNSUITABLE)
 
 
 def _settings(result: SizingResult) -> tuple[tuple[str, str, str], ...]:
@@ -223,8 +222,8 @@ def sizing_plot(choice: MuscleChoice) -> Plot:
 def _figure(choice: MuscleChoice) -> Any:
     entry = choice.entry
     valid = validity_range_of(entry.characteristic, entry.validity_range)
-    radius = "" if choice.design.radius is None else f", radius {1e3 * choice.design.radius:.4g} mm"
-    title = f"{choice.size}{radius}"
+    radius = choice.design.radius
+    title = choice.size if radius is None else f"{choice.size}, radius {1e3 * radius:.4g} mm"
     figure = isobar_figure(entry.characteristic, title, compute_isobars(entry.characteristic, valid), valid)
     axes, muscle = figure.axes[0], choice.muscle
     contraction = np.linspace(*muscle.contraction_range, POINTS)

@@ -119,9 +119,8 @@ class LiftSearch:
         starts = np.unique(np.linspace(low, max(low, high - used), MOUNTINGS))
         displacement, load = self._path
         contractions = np.minimum(starts[:, None] + displacement / length, muscle.contraction_range[1])
-        margins = self.margin(muscle, contractions, load)
-        possible = np.flatnonzero((margins >= -ROUNDING * load.greatest).all(axis=1))
-        return float(starts[possible[0]]) if possible.size else None
+        is_possible = (self.margin(muscle, contractions, load) >= -ROUNDING * load.greatest).all(axis=1)
+        return float(starts[is_possible.argmax()]) if is_possible.any() else None
 
     def required_length(self, muscle: StaticMuscle) -> float:
         """Shortest length [m] for a law that does not depend on it. Raises SolveError, with the reason."""

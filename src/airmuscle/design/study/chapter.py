@@ -90,8 +90,7 @@ def _scatter(result: StudyResult, name: str) -> Plot:
 
 
 def _sensitivity_bars(result: StudyResult, indices: dict[str, SobolIndices]) -> Plot:
-    study = result.study
-    count, paths = len(indices), [parameter.path for parameter in study.parameters]
+    count, paths = len(indices), [parameter.path for parameter in result.study.parameters]
     figure, axes = new_figure(count, 1, height=0.8 + count * (0.7 + 0.42 * len(paths)), squeeze=False, sharex=True)
     rows = np.arange(len(paths))
     bar = {"height": 0.38, "error_kw": {"elinewidth": 0.9, "ecolor": BLACK, "capsize": 2}}
@@ -171,12 +170,16 @@ def study_chapter(result: StudyResult, *, execution: str = "") -> Chapter:
     tables = [result.statistics()] if study.scalars else []
     tables += [sensitivity_table(study, indices)] if indices else []
     tables += [failure_table(result)] if result.failed.size else []
+    summary = [f"{len(study)} runs, {study.design}. {RESULTS_FILE} contains one row per run."]
+    if study.time_series:
+        names = ", ".join(study.time_series)
+        summary.append(f"{TIME_SERIES_FILE} contains the time series ({names}), one row per run, and their times.")
     scenario = study.template.scenario
     metrics = [(f"metric {name}", str(metric), "study") for name, metric in study.metrics.items()]
     return Chapter(
         name="study",
         title=study.title,
-        summary=(*summary(result), execution),
+        summary=(*summary, execution),
         values=(
             NamedValue("runs", len(study), brief=False),
             NamedValue("failed runs", int(result.failed.size), brief=False),
@@ -193,15 +196,6 @@ def study_chapter(result: StudyResult, *, execution: str = "") -> Chapter:
             ("input signal", str(scenario.problem.input), "scenario"),
         ),
     )
-
-
-def summary(result: StudyResult) -> Iterator[str]:
-    """The paragraphs above the tables: number of runs, files."""
-    study = result.study
-    yield f"{len(study)} runs, {study.design}. {RESULTS_FILE} contains one row per run."
-    if study.time_series:
-        names = ", ".join(study.time_series)
-        yield f"{TIME_SERIES_FILE} contains the time series ({names}), one row per run, and their times."
 
 
 def _notes(result: StudyResult, indices: dict[str, SobolIndices]) -> Iterator[str]:

@@ -38,8 +38,7 @@ def simulate_all(scenarios: Sequence[Scenario], times: Array) -> Iterator[Record
     for scenario in scenarios:
         try:
             problem = scenario.problem
-            within = times[(times >= problem.start_time) & (times < problem.end_time)]
-            instants = np.append(within, problem.end_time)
+            instants = np.append(times[(times >= problem.start_time) & (times < problem.end_time)], problem.end_time)
             rows = output_times(problem.output_times, problem.start_time, problem.duration, instants)
             yield solve(dataclasses.replace(problem, output_times=rows)).raise_if_incomplete().recording
         except RUN_ERRORS as error:

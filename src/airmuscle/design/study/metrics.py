@@ -139,9 +139,7 @@ class Overshoot(Scalar):
 
     def _evaluate(self, time: Array, values: Array) -> float:
         change = values[-1] - values[0]
-        if change == 0.0:
-            return math.nan
-        return max(0.0, float(((values - values[-1]) / change).max()))
+        return max(0.0, float(((values - values[-1]) / change).max())) if change != 0.0 else math.nan
 
 
 @dataclasses.dataclass(frozen=True)

@@ -50,8 +50,7 @@ def sobol_indices(metric: Array, parameters: int, seed: int = 0) -> SobolIndices
     The intervals are percentiles (95 %) of 1000 bootstrap samples of the base points, drawn with `seed`.
     """
     table = metric.reshape(-1, parameters + 2)
-    complete = np.isfinite(table).all(axis=1)
-    known = table[complete]
+    known = table[np.isfinite(table).all(axis=1)]
     count, undefined = len(known), np.full(parameters, np.nan)
     varies = len(known) and np.ptp(known) > 1e-12 * np.abs(known).max() and np.ptp(known[:, [0, -1]]) > 0
     if not varies:  # by more than rounding errors

@@ -258,5 +258,4 @@ class _Search:
         self.metrics.append(metrics)
         self.values.append(values)
         self.progress(sum(map(len, self.values)) * len(self.evaluator.cases), self.budget)
-        failed = 1.0 - metrics.completed.mean(axis=1)
-        return np.where(np.isfinite(values), values, 1e30 * (1.0 + failed))
+        return np.where(np.isfinite(values), values, 1e30 * (1.0 + (1.0 - metrics.completed.mean(axis=1))))
