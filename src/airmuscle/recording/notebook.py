@@ -45,9 +45,7 @@ class NotebookDisplay(ShortRepr, abc.ABC):
 def render_card(card: Card) -> str:
     """A card as well-formed HTML without scripts: all texts are escaped, and the chart is an image in the page."""
     parts = [f'<div style="max-width: 62em"><p style="margin: 0.3em 0"><b>{_text(card.title)}</b></p>']
-    parts.append(_chart(card))
-    if card.table:
-        parts.append(_table(card.table))
+    parts += [_chart(card), _table(card.table) if card.table else ""]
     parts += [f'<p style="margin: 0.3em 0; font-size: 90%">{_text(note)}</p>' for note in card.notes[:MAX_NOTES]]
     if len(card.notes) > MAX_NOTES:
         parts.append(f'<p style="margin: 0.3em 0; font-size: 90%">and {len(card.notes) - MAX_NOTES} more notes</p>')

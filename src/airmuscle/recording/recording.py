@@ -13,15 +13,13 @@ from .columns import ZERO_NOT_STATED, display_scale, quantity_of, split_unit
 from .notebook import Card, NotebookDisplay
 from .plot import plot_columns
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 MAX_PANELS, MAX_POINTS = 4, 20_000
 """Maximum number of panels, and of rows of the chart; of more, every n-th row is drawn."""
 ROUNDING = 1e-12
 """Values below this fraction of the largest one of a column are shown as 0 (chosen)."""
-
-
-if TYPE_CHECKING:
-    import pandas as pd
-
 MAX_REPR = 400
 """Maximum number of characters of the names of the columns in a representation."""
 

@@ -19,8 +19,7 @@ PERMITTED_ANGLE, BANDWIDTH = (2e-3, 0.2), (3.0, 100.0)
 """Ranges of the permitted error [rad] of LQG and MPC, from which their bandwidth follows, and of the bandwidth [rad/s]
 of ADRC, which are also sought on a truth."""
 _SLIDING = (3e-3, 0.3)
-_LEAD, _FRICTION = "feed_forward.lead_time", "feedback.feed_forward.amplitude"
-FEED_FORWARD: Bounds = {_LEAD: (0.0, MAX_LEAD), _FRICTION: (0.0, 3e4)}
+FEED_FORWARD: Bounds = {"feed_forward.lead_time": (0.0, MAX_LEAD), "feedback.feed_forward.amplitude": (0.0, 3e4)}
 """Gains of the feed-forward that are tuned for the models."""
 COMMISSIONED: Bounds = {
     **FEED_FORWARD,

@@ -47,27 +47,25 @@ def group_cases(cases: Sequence[LoopCase], index: TrackingIndex) -> tuple[CaseGr
     members: dict[Any, list[int]] = {}
     for i, case in enumerate(cases):
         members.setdefault((id(structure(case.plant)), id(case.loop), case.controller_path), []).append(i)
-    return tuple(_group([cases[i] for i in places], np.array(places), index) for places in members.values())
-
-
-def _group(cases: list[LoopCase], places: npt.NDArray[np.intp], index: TrackingIndex) -> CaseGroup:
-    first, starts = cases[0], [case.start() for case in cases]
-    table = np.array([flatten(case.plant) for case in cases])
-    differing = np.flatnonzero((table != table[0]).any(axis=0))
-    paths = [leaf.path for leaf in leaves(first.plant)]
-    outputs = first.plant.outputs(starts[0], dict.fromkeys(first.plant.inputs, 0.0))
-    columns = (*(s.name for s in first.plant.states), *outputs)
-    try:
-        first.loop.check_columns(columns, first.plant.inputs)
-        scales = index.scales_for(first.loop.controller.setpoints, columns)
-    except AirmuscleError as error:
-        raise error.located(f"case '{first.name}'") from None
-    varied = {paths[i]: table[:, i] for i in differing.tolist()}
-    states = {name: np.array([start[name] for start in starts]) for name in starts[0]}
-    air = tuple(s.name for s in first.plant.states if s.name.rpartition(".")[2] == AIR_MASS)
-    commands = (f"{COMMAND}{name}" for name in first.loop.controller.inputs)
-    kept = (*(column for name in scales for column in (name, f"{SETPOINT}{name}")), *commands, *air)
-    return CaseGroup(places, tuple(cases), varied, states, scales, air, kept)
+    groups = []
+    for places in members.values():
+        together = tuple(cases[i] for i in places)
+        first, starts = together[0], [case.start() for case in together]
+        table, paths = np.array([flatten(case.plant) for case in together]), [leaf.path for leaf in leaves(first.plant)]
+        varied = {paths[i]: table[:, i] for i in np.flatnonzero((table != table[0]).any(axis=0)).tolist()}
+        states = {name: np.array([start[name] for start in starts]) for name in starts[0]}
+        outputs = first.plant.outputs(starts[0], dict.fromkeys(first.plant.inputs, 0.0))
+        columns = (*(s.name for s in first.plant.states), *outputs)
+        try:
+            first.loop.check_columns(columns, first.plant.inputs)
+            scales = index.scales_for(first.loop.controller.setpoints, columns)
+        except AirmuscleError as error:
+            raise error.located(f"case '{first.name}'") from None
+        air = tuple(s.name for s in first.plant.states if s.name.rpartition(".")[2] == AIR_MASS)
+        commands = (f"{COMMAND}{name}" for name in first.loop.controller.inputs)
+        kept = (*(column for name in scales for column in (name, f"{SETPOINT}{name}")), *commands, *air)
+        groups.append(CaseGroup(np.array(places), together, varied, states, scales, air, kept))
+    return tuple(groups)
 
 
 @dataclasses.dataclass(frozen=True, eq=False)

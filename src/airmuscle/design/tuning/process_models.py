@@ -185,32 +185,25 @@ def waveform_amplitude(time: Array, values: Array, period: float, periods: int) 
     clearly smaller residual variance. The series rounds off the corners at the extrema of a relay oscillation of a
     first-order process, by 2.4 % of the amplitude with 15 harmonics; polynomials need 50 rows a period.
     """
-    phase, wave, variance = _harmonic_wave(time, values, period, values.size // periods)
+    rows = values.size // periods
+    count = max(1, min(MAX_HARMONICS, max(rows // ROWS_PER_HARMONIC, min(SURE_HARMONICS, (rows - 1) // 2))))
+    order, phase = np.arange(1, count + 1), np.arange(32 * count) / (32 * count)
+    phases, fine = 2 * math.pi / period * np.outer(time, order), 2 * math.pi * np.outer(phase, order)
+    matrix = np.column_stack([np.ones(time.size), np.cos(phases), np.sin(phases)])
+    coefficients = np.linalg.lstsq(matrix, values, rcond=None)[0]
+    variance = float(np.sum((values - matrix @ coefficients) ** 2)) / max(values.size - 2 * count - 1, 1)
+    wave = np.column_stack([np.cos(fine), np.sin(fine)]) @ coefficients[1:]
     amplitude = 0.5 * float(np.ptp(wave))
     if values.size < 2 * ROWS_PER_ARC * periods:
         return amplitude
     from scipy.optimize import minimize
 
-    rows, start = time / period, np.array([phase[wave.argmin()], phase[wave.argmax()]])
+    place, start = time / period, np.array([phase[wave.argmin()], phase[wave.argmax()]])
     simplex = start + START_STEP * np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
     options = {"initial_simplex": simplex, "xatol": 1e-5, "fatol": 0.0, "maxiter": 80}
-    found = minimize(lambda at: _two_arcs(rows, values, at)[0], start, method="Nelder-Mead", options=options).x
-    residual, of_arcs = _two_arcs(rows, values, found)
+    found = minimize(lambda at: _two_arcs(place, values, at)[0], start, method="Nelder-Mead", options=options).x
+    residual, of_arcs = _two_arcs(place, values, found)
     return of_arcs if residual / (values.size - 2 * (ARC_DEGREE + 2)) < BETTER * variance else amplitude
-
-
-def _harmonic_wave(time: Array, values: Array, period: float, rows: int) -> tuple[Array, Array, float]:
-    """Phases [periods] and values of the Fourier series through the rows, over one period, and residual variance."""
-    count = max(1, min(MAX_HARMONICS, max(rows // ROWS_PER_HARMONIC, min(SURE_HARMONICS, (rows - 1) // 2))))
-    order = np.arange(1, count + 1)
-    phases = 2 * math.pi / period * np.outer(time, order)
-    matrix = np.column_stack([np.ones(time.size), np.cos(phases), np.sin(phases)])
-    coefficients = np.linalg.lstsq(matrix, values, rcond=None)[0]
-    residual = float(np.sum((values - matrix @ coefficients) ** 2))
-    phase = np.arange(32 * count) / (32 * count)
-    fine = 2 * math.pi * np.outer(phase, order)
-    wave = np.column_stack([np.cos(fine), np.sin(fine)]) @ coefficients[1:]
-    return phase, np.asarray(wave), residual / max(values.size - 2 * count - 1, 1)
 
 
 def _two_arcs(phase: Array, values: Array, extrema: Array) -> tuple[float, float]:
