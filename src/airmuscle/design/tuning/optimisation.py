@@ -178,7 +178,7 @@ class _Search:
         self.present_count, self.converged, self.reasons = 0, False, Counter[str]()
         self.gains, self.metrics, self.values = list[Array](), list[CaseMetrics](), list[Array]()
         self._calls = DistributedCalls(executor, Evaluator.metrics, evaluator)
-        self._sets_of_a_task = SETS_OF_A_TASK if executor else self.sets
+        self._sets_of_a_task = self.sets if executor is None else SETS_OF_A_TASK
 
     @property
     def population(self) -> int:
