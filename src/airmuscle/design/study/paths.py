@@ -140,9 +140,7 @@ def _input_parameters(table: Mapping[str, Any], scenario: Scenario) -> Iterator[
 
 def _run_parameters(table: Mapping[str, Any], scenario: Scenario) -> Iterator[tuple[Keys, str]]:
     """Keys and units of the numbers under [run]."""
-    for name in ("duration", "start_time", "output_times"):
-        if name in table:
-            yield ("run", name), "s"
+    yield from ((("run", name), "s") for name in ("duration", "start_time", "output_times") if name in table)
     yield ("run", "initial_state", "pressure"), "Pa"
     for coordinate in scenario.plant.mechanism.coordinates:
         yield ("run", "initial_state", coordinate.name), coordinate.unit
