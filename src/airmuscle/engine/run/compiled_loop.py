@@ -97,11 +97,6 @@ class CompiledRun:
         self._memories, self._called_at = [state.controller] * 2, -1
         self.status, self.stopped_at = Status.DONE, float(self.loop.edges[0])
 
-    @property
-    def room(self) -> int:
-        """Rows for which this run has arrays."""
-        return len(self._rows)
-
     def _make_arrays(self, n: int, m: int) -> None:
         prepared, controller, law = self.prepared, self.prepared.loop.controller, self.loop.law
         inputs, intervals = prepared.inputs, self.loop.edges.size - 1

@@ -17,7 +17,7 @@ from ..loop.control_loop import ControlLoop, ControlLoopState, designed_loop
 from .integrators import Integrator, default_integrator
 
 MAX_KEPT_ROWS = 100_000
-"""Output times that are kept with a plant for its next run, 0.8 MB (chosen)."""
+"""Rows of a run up to which its output times, or its loop, are kept with a plant for its next run (chosen)."""
 LARGEST = sys.float_info.max
 """The largest finite number."""
 MAX_OUTPUT_STEP = 0.01

@@ -22,7 +22,7 @@ from ..loop import ControlLaw, ControlLoop, InputSignal, PiecewiseLinear, Schedu
 from .compiled_law import parameters_of
 from .compiled_loop import CompiledLoop, CompiledRun
 from .integrators import INTERRUPT_CHECK_STEPS, BoundIntegrator, Integrator, RawSolution, default_integrator
-from .problem import Problem, check_input_range, plain_numbers
+from .problem import MAX_KEPT_ROWS, Problem, check_input_range, plain_numbers
 from .sampled_loop import prepare_loop
 from .solution import Solution, early_end, make_solution, possible_rows, status_of_state
 
@@ -30,14 +30,18 @@ _AT_POSSIBLE_STATE = {Status.DONE, Status.INTERRUPTED, Status.TOO_MANY_STEPS}
 """How a run ends at a possible state."""
 INSTANTS = 1000
 """Instants between two rows at which the first impossible state is looked for (chosen)."""
-MAX_KEPT_ROWS = 100_000
-"""Rows up to which a run is kept (chosen)."""
 _NO_TIMES = np.empty(0)
 _NO_INPUT = -1, (np.inf, -np.inf)
 
 
 def solve(problem: Problem) -> Solution:
-    """The solution of a problem; a run that ended early is returned as far as it was computed, with its status."""
+    """The solution of a problem; a run that ended early is returned as far as it was computed, with its status.
+
+    With a ControlLoop the recording also has `setpoint.`, `measured.` and `command.` columns: the set points in time,
+    and the controller's measurements and commands at the last sample. Every sampling instant is a row. Measurements are
+    taken just before the command of the same instant: an output that jumps with an input has not jumped yet. Split at a
+    sampling instant and continued, a run equals the run in one, to the last bit; split between two, to the tolerance.
+    """
     compiled, integrator = problem.compiled, problem.integrator
     assert integrator is not None
     if isinstance(problem.input, ControlLoop):
@@ -65,13 +69,7 @@ def _end_between_rows(problem: Problem, raw: RawSolution) -> RawSolution:
 
 
 def _solve_closed_loop(problem: Problem, loop: ControlLoop) -> Solution:
-    """The solution of a problem with a ControlLoop, and the state from which the run can be continued.
-
-    The recording also has `setpoint.`, `measured.` and `command.` columns: the set points in time, and the controller's
-    measurements and commands at the last sample. Every sampling instant is a row. Measurements are taken just before
-    the command of the same instant: an output that jumps with an input has not jumped yet. Split at a sampling instant
-    and continued, a run equals the run in one, to the last bit; split between two, to the integrator's tolerance.
-    """
+    """The solution of a problem with a ControlLoop, and the state from which the run can be continued."""
     compiled, form, law = problem.compiled, form_of(problem), loop.controller
     control_state = problem.control_state or loop.init(problem.start_time)
     pool = compiled.description.cache.loops
@@ -85,7 +83,7 @@ def _solve_closed_loop(problem: Problem, loop: ControlLoop) -> Solution:
         run.restart(compiled, problem.initial_vector, parameters_of(law), control_state)
     run.integrate()
     solution = _loop_solution(problem, loop, run)
-    if form is not None and run.status == Status.DONE and run.room <= MAX_KEPT_ROWS:
+    if form is not None and run.status == Status.DONE and len(solution.recording) <= MAX_KEPT_ROWS:
         pool.give_back(form, run)  # it holds the signals, which the form names by their identity
     return solution
 

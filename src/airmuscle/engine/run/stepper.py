@@ -114,7 +114,11 @@ class Stepper:
         if not isinstance(dt, (float, numbers.Real)) or not 0.0 < dt <= LARGEST:
             raise ParameterError(f"Stepper: dt is {one_line(dt)} s; it must be positive and finite.")
         if hasattr(inputs, "keys"):
-            inputs = self._by_name(inputs)
+            given, inputs = inputs, self.inputs.tolist()
+            for name, value in given.items():  # the others keep their present values
+                if name not in self.input_names:
+                    check_known("Stepper: no input", name, self.input_names)
+                inputs[self.input_names.index(name)] = value
         try:
             if len(inputs) != self._given.size:
                 raise ValueError
@@ -204,15 +208,6 @@ class Stepper:
             *self._limits.arrays, self.state, self.inputs, self.outputs, self._always,
         )  # fmt: skip
         self._kernels, self._begin, self._end = (begin, end), begin.runner, end.runner
-
-    def _by_name(self, inputs: Mapping[str, float]) -> list[Any]:
-        """The inputs in their order; those that are not given keep their present values."""
-        values: list[Any] = self.inputs.tolist()
-        for name, value in inputs.items():
-            if name not in self.input_names:
-                check_known("Stepper: no input", name, self.input_names)
-            values[self.input_names.index(name)] = value
-        return values
 
     def _settle(self) -> Array:
         """Compute the outputs at the present state and the given inputs."""

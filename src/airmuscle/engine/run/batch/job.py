@@ -149,15 +149,15 @@ class BatchJob:
     ) -> None:
         reached = raw.reached
         states = np.ascontiguousarray(raw.rows[:reached])
-        values = [*states.T]
-        if ((self.kept >= states.shape[1]) & (self.kept < self.own)).any():  # outputs or inputs are stored
+        values, kept = [*states.T], self.kept.tolist()
+        if any(len(values) <= place < self.own for place in kept):  # outputs or inputs are stored
             recorder: RowRecorder = self._recorders.borrow(None) or RowRecorder(one)
             recorder.adopt(one)
             table = recorder.evaluate(states, self.times[:reached], segments, self.start_time)
             self._recorders.give_back(None, recorder)
             values += [*table.outputs.T, *table.inputs.T]
         with np.errstate(over="ignore"):  # a column in single precision
-            for place, (name, column) in zip(self.kept.tolist(), self.columns.items(), strict=True):
+            for place, (name, column) in zip(kept, self.columns.items(), strict=True):
                 if place < self.own:
                     column[index, :reached] = values[place]
                 else:
