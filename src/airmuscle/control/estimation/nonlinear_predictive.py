@@ -153,9 +153,7 @@ class NonlinearModelPredictive(EstimatingController, MultivariableController):
         wanted     set points (q,), `low` and `high` limits of the commanded inputs (m,) [SI]
         variables  those of the last solution, from which the search starts
         """
-        names = compile_system(self.estimator.plant).description.input_names
-        start = dict(zip(names, self._all_inputs(self.init().applied), strict=True))
-        program = self._idle.pop() if self._idle else PredictiveProgram(self, start)
+        program = self._idle.pop() if self._idle else PredictiveProgram(self, self._all_inputs(self.init().applied))
         solution = program.solve(state, wanted, low, high, variables)
         self._idle.append(program)
         return solution

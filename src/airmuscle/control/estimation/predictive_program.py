@@ -1,7 +1,7 @@
 """Nonlinear programs of predictive control: target and plan of a plant as CasADi expressions, solved by Ipopt."""
 
 import functools
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -39,14 +39,15 @@ class PredictiveProgram:
     weights, terminal    (n, n) of the states of each sample and of the last one; those of the inputs are 1
     """
 
-    def __init__(self, controller: Any, inputs: Mapping[str, float]) -> None:
-        self.controller, self.inputs, estimator = controller, inputs, controller.estimator
+    def __init__(self, controller: Any, inputs: Sequence[float]) -> None:
+        self.controller, estimator = controller, controller.estimator
+        self.inputs = dict(zip(estimator.plant.inputs, inputs, strict=True))
         states, permitted = [s.name for s in estimator.plant.states], controller.permitted
         magnitudes = dict(zip(states, estimator.magnitudes.tolist(), strict=False))
         self.scale = scale = np.array([permitted.get(name, size) for name, size in magnitudes.items()])
         self.sizes = sizes = np.array([permitted[name] for name in controller.commanded])
         point = dict(zip(states, controller.first.mean.tolist(), strict=False))
-        linear = linearise(estimator.plant, point, inputs).select(inputs=list(controller.commanded))
+        linear = linearise(estimator.plant, point, self.inputs).select(inputs=list(controller.commanded))
         a, b = held(linear.A * scale / scale[:, None], linear.B * sizes / scale[:, None], estimator.sample_time)
         self.weights = np.diag([1.0 if name in permitted else 0.0 for name in states])
         self.slacks = len(controller.limits) if np.isfinite(controller.slack_weight) else 0
