@@ -1,7 +1,6 @@
 """Diagnostics of a plant: extrapolation, geometry limits, components beyond their validity, assumptions."""
 
-from collections.abc import Iterator, Mapping, Sequence
-from typing import NamedTuple
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -110,37 +109,12 @@ def _shown_unit(quantity: str) -> tuple[float, str]:
     return {"pressure": (1e3, "kPa"), "speed": (1.0, "m/s"), "force": (1.0, "N")}.get(quantity, (0.01, "%"))
 
 
-def rated_temperature(muscles: Sequence[Muscle], ambient_temperature: float) -> list[Diagnostic]:
-    """Diagnostics of muscles for which the maker does not permit this ambient temperature [K]."""
-    return [
-        Diagnostic(DiagnosticCode.RATING, muscle.name, f"{muscle.name}: {text}")
-        for muscle in muscles
-        if muscle.ratings
-        for text in muscle.ratings.excesses(temperature=ambient_temperature)
-    ]
-
-
-def components(remarks: Mapping[str, str]) -> list[Diagnostic]:
-    """Diagnostics of components that were beyond the validity of their model, by the prefixes of their names."""
-    named = ((name.removesuffix("."), text) for name, text in remarks.items())
-    return [Diagnostic(DiagnosticCode.COMPONENT, name, f"{name}: {text}") for name, text in named]
-
-
-class Enclosure(NamedTuple):
-    """A muscle with its contraction, the contraction of its contractile part, and its volume [m3]."""
-
-    muscle: Muscle
-    contraction: float
-    inner_contraction: float
-    volume: float
-
-
-def geometry_limit_hint(enclosure: Enclosure) -> str:
-    """Remedy for a muscle at a limit of its geometry; empty if it is not at a limit.
+def geometry_limit_hint(muscle: Muscle, contraction: float) -> str:
+    """Remedy for a muscle whose contractile part is at a limit of its geometry; empty if it is not at a limit.
 
     The force is singular there if at 1 bar it grows beyond all bounds towards this end of the range, or is not finite.
     """
-    muscle, inner = enclosure.muscle, float(enclosure.inner_contraction)
+    inner = float(contraction)
     low, high = muscle.geometry.contraction_range
     margin = MARGIN * (high - low)
     if low + margin < inner < high - margin:

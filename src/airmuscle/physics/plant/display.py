@@ -71,9 +71,8 @@ class Animation:
         axes[0, 1].set_ylabel(f"{coordinate if len(self._scene.coordinates) == 1 else 'angles'} [{unit}]")
         for i, name in enumerate(pressures):
             label = name.removesuffix(".pressure") if len(pressures) > 1 else None
-            axes[1, 1].plot(
-                time, recording[name] / _BAR, color=LINES[i], linestyle="-" if i == 0 else "--", label=label
-            )
+            dashes = "-" if i == 0 else "--"
+            axes[1, 1].plot(time, recording[name] / _BAR, color=LINES[i], linestyle=dashes, label=label)
         axes[1, 1].set(xlabel="time [s]", ylabel="gauge pressure [bar]")
         if len(pressures) > 1:
             axes[1, 1].legend(loc="best", frameon=False, fontsize=8)
@@ -169,11 +168,9 @@ class PlantDisplay(NotebookDisplay):
             length = quantity_text(muscle.geometry.resting_length, "m", "mm")
             label = "muscle" if muscle.name == "muscle" else f"muscle {muscle.name}"
             rows.append((label, f"{type(muscle.contractile).__name__}, {length}"))
-        rows += [
-            (f"circuit {p}".rstrip("."), _brief(c)) for p, c in zip(plant.circuit_prefixes, plant.circuits, strict=True)
-        ]
-        rows.append(("mechanism", _brief(plant.mechanism)))
-        rows.append(("gas", _brief(plant.gas)))
+        circuits = zip(plant.circuit_prefixes, plant.circuits, strict=True)
+        rows += [(f"circuit {prefix}".rstrip("."), _brief(circuit)) for prefix, circuit in circuits]
+        rows += [("mechanism", _brief(plant.mechanism)), ("gas", _brief(plant.gas))]
         rows.append(("ambient", f"{quantity_text(plant.ambient.pressure, 'Pa', 'kPa', 6)} absolute"))
         rows.append((f"{len(plant.states)} states", ", ".join(s.name for s in plant.states)))
         rows.append((f"{len(plant.inputs)} inputs", ", ".join(plant.inputs)))

@@ -46,7 +46,8 @@ class WithEnergyMeters(System):
     @property
     def meters(self) -> tuple[StateVariable, ...]:
         """All meters."""
-        return (*_METERS, _FRICTION) if any(_has_friction(m) for m in self.plant.muscles) else _METERS
+        frictionless = all(isinstance(muscle.friction, NoFriction) for muscle in self.plant.muscles)
+        return _METERS if frictionless else (*_METERS, _FRICTION)
 
     @property
     def states(self) -> tuple[StateVariable, ...]:
@@ -119,10 +120,6 @@ def total_air(state: Mapping[str, Any]) -> Value:
     return sum(value for name, value in state.items() if name.endswith("air_mass"))
 
 
-def _has_friction(muscle: Muscle) -> bool:
-    return not isinstance(muscle.friction, NoFriction)
-
-
 def _muscle_powers(part: Muscle, muscle: MuscleState) -> dict[str, Value]:
     """Power that the elements of a muscle deliver and absorb [W]."""
     pressure, inner, speed = muscle.pressure, muscle.inner_contraction, muscle.inner_speed
@@ -138,4 +135,6 @@ def _muscle_powers(part: Muscle, muscle: MuscleState) -> dict[str, Value]:
         "element_work": absorbed,
         "damping_heat": part.damper.force(pressure, inner, speed) * speed,
     }
-    return {**powers, "friction_work": muscle.friction * speed} if _has_friction(part) else powers
+    if not isinstance(part.friction, NoFriction):
+        powers["friction_work"] = muscle.friction * speed
+    return powers

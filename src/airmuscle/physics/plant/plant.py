@@ -1,21 +1,26 @@
 """Plant: muscles, the circuits that feed them, the mechanism that they act on, and the ambient air."""
 
 import functools
+import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any, ClassVar
 
-from ...core import GeometryLimitError, ParameterError, Value, Values, model
+import numpy as np
+
+from ...core import Array, GeometryLimitError, ParameterError, Value, Values, model
 from ...core.diagnostics import ColumnLimit, Columns, Diagnostic, DiagnosticCode
 from ...core.system import Input, StateVariable, add_prefix, select_prefix, with_prefix
-from ..equilibrium.equilibrium import equilibria_at_ambient_pressure, equilibrium_at_ambient_pressure
+from ...engine.compile.program import compile_system
+from ..equilibrium.equilibrium import complete_inputs, find_equilibrium, find_equilibrium_of_each
 from ..mechanism import Mechanism
 from ..muscle import Muscle
+from ..muscle.friction import NoFriction
 from ..pneumatics import DEFAULT_GAS, Ambient, Circuit, CircuitFlows, Gas
 from . import diagnostics
 from .display import PlantDisplay
-from .static_plant import MuscleState, PlantEvaluation, StaticPlant, air_states, muscle_outputs, states_of_muscle
-from .validation import check_parts, check_unique, convert_pressures
+from .static_plant import MuscleState, PlantEvaluation, StaticPlant, air_states, states_of_muscle
+from .validation import check_parts, convert_pressures
 
 _AIR_STATES = ("air_mass", "internal_energy")
 _ROUNDING = 1e-3
@@ -42,7 +47,9 @@ class Plant(PlantDisplay, StaticPlant):
     def check(self) -> None:
         check_parts(self)
         convert_pressures(self)
-        check_unique([*(s.name for s in self.states), *self.inputs])
+        names = [*(s.name for s in self.states), *self.inputs]
+        for name in (n for n in names if names.count(n) > 1):
+            raise ParameterError(f"Plant: two of its parts use the name '{name}'; rename one of them.")
 
     @functools.cached_property
     def states(self) -> tuple[StateVariable, ...]:
@@ -82,8 +89,15 @@ class Plant(PlantDisplay, StaticPlant):
         lengths = {"resting_length": self.resting_lengths[0]} if len(self.muscles) == 1 else {}
         return {"ambient": self.ambient.pressure, **lengths}
 
-    default_state = equilibrium_at_ambient_pressure
-    default_states = equilibria_at_ambient_pressure
+    def default_state(self) -> dict[str, float]:
+        """The state of `find_equilibrium` at gauge pressure 0 and inputs 0."""
+        return find_equilibrium(self, pressure=0.0)
+
+    def default_states(self, parameters: Array) -> Array:
+        """The same (N, n) for plants of this structure with parameters (N, P); NaN where there is none. Raises
+        ParameterError where an input cannot be 0."""
+        inputs = np.array(list(complete_inputs(self, None).values()), dtype=float)
+        return find_equilibrium_of_each(compile_system(self), parameters, (0.0,) * len(self.muscles), inputs)
 
     def affects_default_state(self, path: str) -> bool:
         """Whether a parameter affects the equilibrium; those of a circuit without states do not."""
@@ -131,7 +145,15 @@ class Plant(PlantDisplay, StaticPlant):
         """The outputs from an evaluation."""
         outputs: dict[str, Value] = {}
         for part, prefix, muscle, flow in zip(self.muscles, self.prefixes, at.muscles, at.flows, strict=True):
-            outputs |= with_prefix(prefix, muscle_outputs(part, muscle, flow.mass))
+            own = {"pressure": muscle.pressure, "contraction": muscle.contraction, "force": muscle.tension}
+            own |= {"volume": muscle.volume, "mass_flow": flow.mass}
+            if not isinstance(part.friction, NoFriction):
+                own["friction"] = muscle.friction
+            if part.friction.identified_range is not None:
+                own["shortening_speed"] = muscle.inner_speed
+            if "internal_energy" in muscle.states:
+                own["temperature"] = muscle.air.temperature
+            outputs |= with_prefix(prefix, own)
         for (prefix, _), circuit in zip(self._circuits(), at.circuits, strict=True):
             outputs |= self._outside(prefix, circuit.outputs)
         return outputs | {c.acceleration: at.accelerations[c.name] for c in self.mechanism.coordinates}
@@ -151,12 +173,13 @@ class Plant(PlantDisplay, StaticPlant):
                     f"{100 * contraction:.2f} %; choose a contraction further within its range."
                 )
 
-    def _enclosures(self, state: Mapping[str, float]) -> list[diagnostics.Enclosure]:
+    def _enclosures(self, state: Mapping[str, float]) -> list[tuple[Muscle, float, float, float]]:
+        """Each muscle with its contraction, the contraction of its contractile part, and its volume [m3]."""
         enclosures, contractions = [], self.mechanism.contractions(state, self.resting_lengths)
         for muscle, prefix, contraction in zip(self.muscles, self.prefixes, contractions, strict=True):
             own = select_prefix(prefix, state)
             inner = muscle.inner_contraction(contraction, own)
-            enclosures.append(diagnostics.Enclosure(muscle, contraction, inner, muscle.volume(inner, own)))
+            enclosures.append((muscle, contraction, inner, muscle.volume(inner, own)))
         return enclosures
 
     def describe(self) -> tuple[Diagnostic, ...]:
@@ -170,13 +193,21 @@ class Plant(PlantDisplay, StaticPlant):
         remarks: dict[str, str] = {}
         for prefix, circuit in circuits:
             remarks |= self._outside(prefix, circuit.validity_warnings(self._within(prefix, columns), self.ambient))
-        return [*rated, *diagnostics.extrapolation(limits, columns), *diagnostics.components(remarks)]
+        named = ((name.removesuffix("."), text) for name, text in remarks.items())
+        parts = [Diagnostic(DiagnosticCode.COMPONENT, name, f"{name}: {text}") for name, text in named]
+        return [*rated, *diagnostics.extrapolation(limits, columns), *parts]
 
     @functools.cached_property
     def _checks(self) -> tuple[list[Diagnostic], Any, list[tuple[str, Circuit]]]:
         """Diagnostics of every run, and the limits of columns and the circuits that `diagnose` compares a run with."""
-        rated = diagnostics.rated_temperature(self.muscles, self.ambient.temperature)
-        circuits = [each for each in self._circuits() if each[1].has_validity_range]
+        rated = [
+            Diagnostic(DiagnosticCode.RATING, muscle.name, f"{muscle.name}: {text}")
+            for muscle in self.muscles
+            if muscle.ratings
+            for text in muscle.ratings.excesses(temperature=self.ambient.temperature)
+        ]
+        limited = (type(circuit).validity_warnings is not Circuit.validity_warnings for circuit in self.circuits)
+        circuits = list(itertools.compress(self._circuits(), limited))
         return rated, diagnostics.with_tolerance(self.column_limits), circuits
 
     @functools.cached_property
@@ -188,7 +219,7 @@ class Plant(PlantDisplay, StaticPlant):
     def failure_hint(self, state: Mapping[str, float]) -> str:
         """Remedy for the first muscle that is at, or beyond, a limit of its geometry."""
         try:
-            hints = map(diagnostics.geometry_limit_hint, self._enclosures(state))
+            hints = (diagnostics.geometry_limit_hint(muscle, inner) for muscle, _, inner, _ in self._enclosures(state))
             return next(filter(None, hints), "")
         except GeometryLimitError as error:
             return str(error)

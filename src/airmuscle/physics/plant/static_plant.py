@@ -8,8 +8,7 @@ from typing import Any, NamedTuple
 from ...core import ParameterError, StateVariable, System, Value, Values, check_known, select_prefix, with_prefix
 from ..mechanism import Mechanism
 from ..muscle import Muscle
-from ..muscle.friction import NoFriction
-from ..pneumatics import Air, Ambient, Circuit, CircuitFlows, Flow, Gas, key_by_muscle, key_by_port
+from ..pneumatics import Air, Ambient, Circuit, CircuitFlows, Flow, Gas, port_prefix
 from ..pneumatics.gas import absolute_pressure, gauge_pressure
 from .validation import as_quantity, check_pressures
 
@@ -36,39 +35,6 @@ class MuscleState(NamedTuple):
     volume_rate: Value
     states: Values
     rates: Values
-
-
-def muscle_state(
-    muscle: Muscle, state: Values, contraction: Value, speed: Value, gas: Gas, ambient: Ambient
-) -> MuscleState:
-    """A muscle with its own state and that of its air, at a contraction and a shortening speed of its fittings."""
-    inner = muscle.inner_contraction(contraction, state)
-    volume = muscle.volume(inner, state)
-    air = gas.air(state, volume, ambient)
-    pressure = gauge_pressure(air.pressure, ambient)
-    pull = muscle.compute_force(pressure, inner, contraction, speed, state)
-    rates = muscle.rates(state, pressure, pull.inner_speed)
-    growth = muscle.geometry.volume_derivative(inner) * pull.inner_speed / muscle.geometry.resting_length
-    growth = sum((rates[s.name] for s in muscle.wall.states), growth)
-    return MuscleState(
-        contraction, speed, volume, air, pressure, pull.tension, pull.friction, inner, pull.inner_speed, growth, state,
-        rates,
-    )  # fmt: skip
-
-
-def muscle_outputs(muscle: Muscle, instant: MuscleState, mass_flow: Value) -> dict[str, Value]:
-    """The outputs of a muscle by their own names: those of every muscle, and those of the elements that it has."""
-    outputs = {
-        "pressure": instant.pressure, "contraction": instant.contraction, "force": instant.tension,
-        "volume": instant.volume, "mass_flow": mass_flow,
-    }  # fmt: skip
-    if not isinstance(muscle.friction, NoFriction):
-        outputs["friction"] = instant.friction
-    if muscle.friction.identified_range is not None:
-        outputs["shortening_speed"] = instant.inner_speed
-    if "internal_energy" in instant.states:
-        outputs["temperature"] = instant.air.temperature
-    return outputs
 
 
 def states_of_muscle(prefix: str, muscle: Muscle, states: tuple[StateVariable, ...]) -> list[StateVariable]:
@@ -150,22 +116,44 @@ class StaticPlant(MuscleSystem):
         return [tuple(air_states)] if self._shared else [(air,) for air in air_states]
 
     def _outside(self, prefix: str, values: Mapping[str, Any]) -> dict[str, Any]:
-        """Values under a circuit's own names, by the plant's names."""
-        return key_by_muscle(self.prefixes, values) if self._shared else with_prefix(prefix, values)
+        """Values under a circuit's own names, by the plant's names: of a shared one, port i is that of muscle i."""
+        if not self._shared:
+            return with_prefix(prefix, values)
+        muscles, named = {port_prefix(number): prefix for number, prefix in enumerate(self.prefixes, 1)}, {}
+        for name, value in values.items():
+            port, dot, rest = name.partition(".")
+            named[muscles[port + dot] + rest if port + dot in muscles else name] = value
+        return named
 
     def _within(self, prefix: str, values: Values) -> Values:
-        """Values under the plant's names, by a circuit's own names."""
-        return key_by_port(self.prefixes, values) if self._shared else select_prefix(prefix, values)
+        """Values under the plant's names, by a circuit's own names: of a shared one, of muscle i also by port i."""
+        if not self._shared:
+            return select_prefix(prefix, values)
+        named = dict(values)
+        for number, muscle in enumerate(self.prefixes, 1):
+            named |= with_prefix(port_prefix(number), select_prefix(muscle, values))
+        return named
 
     def muscle_states(self, state: Values, inputs: Values = MappingProxyType({})) -> tuple[MuscleState, ...]:
         """Every muscle at a state; `inputs` are required if shortenings are inputs."""
         place = {**inputs, **state}
         contractions = self.mechanism.contractions(place, self.resting_lengths)
         speeds = self.mechanism.contraction_speeds(place, place, self.resting_lengths)
-        return tuple(
-            muscle_state(m, select_prefix(prefix, state), contraction, speed, self.gas, self.ambient)
-            for m, prefix, contraction, speed in zip(self.muscles, self.prefixes, contractions, speeds, strict=True)
-        )
+        instants = []
+        for muscle, prefix, contraction, v in zip(self.muscles, self.prefixes, contractions, speeds, strict=True):
+            own = select_prefix(prefix, state)
+            inner = muscle.inner_contraction(contraction, own)
+            volume = muscle.volume(inner, own)
+            air = self.gas.air(own, volume, self.ambient)
+            pressure = gauge_pressure(air.pressure, self.ambient)
+            tension, friction, speed = muscle.compute_force(pressure, inner, contraction, v, own)
+            rates = muscle.rates(own, pressure, speed)
+            growth = muscle.geometry.volume_derivative(inner) * speed / muscle.geometry.resting_length
+            growth = sum((rates[s.name] for s in muscle.wall.states), growth)
+            instants.append(
+                MuscleState(contraction, v, volume, air, pressure, tension, friction, inner, speed, growth, own, rates)
+            )
+        return tuple(instants)
 
     def state_at(self, *, pressure: float | str | Sequence[float | str], **values: float | str) -> dict[str, float]:
         """A state by the gauge pressure [Pa] of the muscle (or of each), and by states by name; also texts with a unit.

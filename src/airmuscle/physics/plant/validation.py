@@ -29,8 +29,17 @@ def check_parts(plant: Any) -> None:
                 f"{type(part).__name__} of {muscle.name} is not closed-form and cannot be part of a plant. Use "
                 "as_force_law(law, validity_range) for a characteristic, as_polynomial(geometry) for a geometry."
             )
-    for muscle in plant.muscles:
-        _check_validity_limits(muscle.contractile)
+    for law, declared in ((m.contractile, declared) for m in plant.muscles for declared in parameters(ValidityRange)):
+        limit, (low, high) = getattr(law, declared.name, None), declared.bounds
+        if limit is None:
+            continue
+        smallest, largest = float(np.min(limit)), float(np.max(limit))  # a limit may be a column (N,)
+        if not low <= smallest <= largest <= high:
+            unit = "" if declared.unit == "1" else f" {declared.unit}"
+            raise ParameterError(
+                f"{type(law).__name__}.{declared.name} ({declared.symbol}, {declared.meaning}) is "
+                f"{smallest if smallest < low else largest:g}{unit}; allowed range: {low:g} to {high:g}{unit}."
+            )
     check_structure((tuple(plant.muscles), tuple(plant.circuits), plant.mechanism))
     _check_counts(plant.muscles, plant.circuits, plant.mechanism)
     if isinstance(plant.circuit, tuple) and any(c.port_count != 1 for c in plant.circuits):
@@ -50,27 +59,6 @@ def convert_pressures(plant: Any) -> None:
     for each in plant.circuits:
         check_not_shared(f"Plant: its {type(each).__name__}", each.supply)
         each.supply.check_ambient(plant.ambient)
-
-
-def _check_validity_limits(characteristic: Any) -> None:
-    """Raise ParameterError if a limit of a law's validity range is beyond its bounds; a limit may be a column (N,)."""
-    for declared in parameters(ValidityRange):
-        limit = getattr(characteristic, declared.name, None)
-        if limit is None:
-            return
-        (low, high), smallest, largest = declared.bounds, float(np.min(limit)), float(np.max(limit))
-        if not low <= smallest <= largest <= high:
-            unit = "" if declared.unit == "1" else f" {declared.unit}"
-            raise ParameterError(
-                f"{type(characteristic).__name__}.{declared.name} ({declared.symbol}, {declared.meaning}) is "
-                f"{smallest if smallest < low else largest:g}{unit}; allowed range: {low:g} to {high:g}{unit}."
-            )
-
-
-def check_unique(names: Sequence[str]) -> None:
-    """Raise ParameterError if two states or inputs share a name."""
-    for name in (n for n in names if names.count(n) > 1):
-        raise ParameterError(f"Plant: two of its parts use the name '{name}'; rename one of them.")
 
 
 def _check_counts(muscles: Sequence[Muscle], circuits: Sequence[Circuit], mechanism: Mechanism) -> None:

@@ -52,6 +52,5 @@ from .virial_gas import virial_coefficient_of_air as virial_coefficient_of_air
 
 # isort: split
 # For the other rooms, not in __all__
-from .circuit import key_by_muscle as key_by_muscle
-from .circuit import key_by_port as key_by_port
+from .circuit import port_prefix as port_prefix
 from .supply import check_not_shared as check_not_shared

@@ -2,8 +2,8 @@
 
 import abc
 import dataclasses
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, ClassVar, TypeVar
+from collections.abc import Iterator, Mapping
+from typing import Any, ClassVar
 
 from ...core import ParameterError, Reference, Value, Values, model, ops
 from ...core.declaration import forwarded
@@ -12,7 +12,6 @@ from .gas import NO_FLOW, Air, Airs, Ambient, Flow
 from .supply import AirSource, SharedSupply, Supply
 from .valve import Orifice, orifice_flow
 
-T = TypeVar("T")
 SUPPLY = "supply."
 """Prefix of the state names of the supply."""
 
@@ -71,11 +70,6 @@ class Circuit(abc.ABC):
         """Warnings by prefix of the part where a run left the validity range; `columns` are arrays (N,) by name."""
         return {}
 
-    @property
-    def has_validity_range(self) -> bool:
-        """Whether `validity_warnings` compares a run with a validity range; True where a class defines it."""
-        return type(self).validity_warnings is not Circuit.validity_warnings
-
     def states(self, ambient: Ambient) -> tuple[StateVariable, ...]:
         """State variables of circuit and supply."""
         return (*self.own_states(ambient), *add_prefix(SUPPLY, self.supply.states(ambient)))
@@ -108,23 +102,6 @@ class CircuitWrapper(Circuit, abc.ABC):
 def port_prefix(number: int) -> str:
     """Prefix of the names that belong to a port, counted from 1, of a circuit with several ports."""
     return f"port{number}."
-
-
-def key_by_muscle(prefixes: Sequence[str], values: Mapping[str, T]) -> dict[str, T]:
-    """The values of a circuit, with the prefix of port i replaced by that of muscle i."""
-    muscles, keyed = {port_prefix(number): prefix for number, prefix in enumerate(prefixes, 1)}, dict[str, T]()
-    for name, value in values.items():
-        port, dot, rest = name.partition(".")
-        keyed[muscles[port + dot] + rest if port + dot in muscles else name] = value
-    return keyed
-
-
-def key_by_port(prefixes: Sequence[str], values: Mapping[str, T]) -> dict[str, T]:
-    """The values of a plant; those with the prefix of muscle i are repeated with the prefix of port i."""
-    keyed = dict(values)
-    for number, prefix in enumerate(prefixes, 1):
-        keyed |= {port_prefix(number) + n.removeprefix(prefix): v for n, v in values.items() if n.startswith(prefix)}
-    return keyed
 
 
 def ambient_air(ambient: Ambient) -> Air:

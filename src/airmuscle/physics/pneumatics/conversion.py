@@ -51,7 +51,16 @@ def conductance_from_flow(volume_flow: float, critical_ratio: float, upstream: f
     The air has 293.15 K. Raises ParameterError for a value that is not positive and finite, or if `downstream` is not
     less than `upstream`.
     """
-    return _positive("volume_flow", volume_flow) / _unit_flow(critical_ratio, upstream, downstream)
+    _positive("volume_flow", volume_flow)
+    _positive("upstream pressure", upstream)
+    _positive("downstream pressure", downstream)
+    if not downstream < upstream:
+        raise ParameterError(
+            f"the downstream pressure is {downstream:g} Pa; it must be less than the upstream pressure of {upstream:g} "
+            "Pa (both absolute)."
+        )
+    mass_flow = Valve(1e-8, critical_ratio).mass_flow(upstream, downstream, 1.0, REFERENCE_TEMPERATURE)
+    return volume_flow / float(mass_flow / (REFERENCE_DENSITY * 1e-8))
 
 
 def conductance_from_kv(kv: float, critical_ratio: float) -> float:
@@ -94,19 +103,6 @@ def leak_valve(
     ambient = Ambient() if ambient is None else ambient
     conductance = conductance_from_flow(volume_flow, critical_ratio, pressure + ambient.pressure, ambient.pressure)
     return Valve(conductance, critical_ratio)
-
-
-def _unit_flow(critical_ratio: float, upstream: float, downstream: float) -> float:
-    """Volume flow [m3/s] at the reference atmosphere for C = 1, by the law of `Valve` including its laminar chord."""
-    _positive("upstream pressure", upstream)
-    _positive("downstream pressure", downstream)
-    if not downstream < upstream:
-        raise ParameterError(
-            f"the downstream pressure is {downstream:g} Pa; it must be less than the upstream pressure of {upstream:g} "
-            "Pa (both absolute)."
-        )
-    law = Valve(1e-8, critical_ratio)
-    return float(law.mass_flow(upstream, downstream, 1.0, REFERENCE_TEMPERATURE) / (REFERENCE_DENSITY * 1e-8))
 
 
 def _positive(what: str, value: float) -> float:

@@ -4,6 +4,7 @@ import dataclasses
 from typing import ClassVar
 
 from ...core import Input, Reference, StateVariable, Value, Values, model, ops, parameter, published, within
+from ...core.declaration import forwarded
 from .circuit import CircuitFlows, ValvePair
 from .gas import Air, Airs, Ambient, absolute_pressure, gauge_pressure
 from .valve import ISO6358, proportional_opening
@@ -36,10 +37,7 @@ class ProportionalValve(ValvePair):
     overlap: float = parameter("1", "o", "overlap as a fraction of the stroke", bounds=(-0.5, 0.9), default=0.0)
     muscle_count: int = within(1, 2, default=1)
 
-    @property
-    def port_count(self) -> int:
-        return self.muscle_count
-
+    port_count = forwarded("muscle_count")
     inputs = (Input("command", "1", -1.0, 1.0, "spool position: 1 fills the first muscle, -1 discharges it"),)
 
     def own_states(self, ambient: Ambient) -> tuple[StateVariable, ...]:

@@ -266,9 +266,8 @@ class WithTubes(CircuitWrapper):
         in_tubes = [self.tube.air_states(tube, ambient) for tube in tubes]
         inner = self.circuit.supplied_flow(inlet, tuple(segments[0] for segments in in_tubes), state, inputs, ambient)
         rates, outputs, flows = dict(inner.rates), dict(inner.outputs), []
-        for prefix, tube, segments, inflow, air in zip(
-            self.prefixes, tubes, in_tubes, inner.flows, muscles, strict=True
-        ):
+        parts = zip(self.prefixes, tubes, in_tubes, inner.flows, muscles, strict=True)
+        for prefix, tube, segments, inflow, air in parts:
             tube_rates, outflow = self.tube.rates(tube, segments, inflow, air, ambient)
             rates |= with_prefix(prefix, tube_rates)
             for segment, in_segment in zip(self.tube.prefixes, segments, strict=True):
