@@ -8,10 +8,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from ...core import Array, ArrayProgram, ParameterError, Values, make_program
+from ...core import Array, ArrayProgram, Values, make_program
 from ...engine.compile.cache.kernel import Kernel, aligned_array
 from ...engine.compile.function import LANES, Function
-from ..muscle import ElasticSeriesElement
 from ..plant.plant import Plant
 from ..pneumatics.gas import absolute_pressure
 from .static_stiffness import enclosed_pressure_slope
@@ -46,9 +45,7 @@ ROOM = 4
 """Number of solutions of a point for which room is made at first (chosen)."""
 MAX_BISECTIONS = 80
 AT_PRESSURE = QUANTITIES[:4]
-
 pair_solutions = Kernel("pair_solutions", "newton")
-
 Rows = npt.NDArray[np.intp]
 Mask = npt.NDArray[np.bool_]
 Range = tuple[float, float]
@@ -93,25 +90,6 @@ class TracedRow:
 
 
 Functions = Sequence[TracedRow]
-
-
-def check_joint(plant: Plant) -> None:
-    """Raise ParameterError unless a plant is a joint: one angle, two muscles without series springs."""
-    coordinates, muscles = plant.mechanism.coordinates, plant.muscles
-    owner = type(plant.mechanism).__name__
-    if len(coordinates) != 1 or coordinates[0].unit != "rad" or len(muscles) != 2:
-        raise ParameterError(
-            f"joint_statics: {owner} has {len(coordinates)} coordinates "
-            f"({', '.join(c.name for c in coordinates) or 'none'}) and the plant {len(muscles)} muscles; one angle and "
-            "two muscles are required, such as an AntagonisticJoint. For other plants use find_equilibria and "
-            "stiffness."
-        )
-    for muscle in muscles:
-        if isinstance(muscle.series, ElasticSeriesElement):
-            raise ParameterError(
-                f"joint_statics: {muscle.name} has a series spring; only muscles with a RigidSeriesElement are "
-                "allowed. Use find_equilibria, or replace the series spring."
-            )
 
 
 def load_function(plant: Plant) -> TracedRow:
@@ -177,19 +155,6 @@ def taut_branch(function: TracedRow, angle: Array, levels: Array) -> tuple[Array
     torque, stiffness = function(angle[:, None], inner, "torque", "stiffness")
     invalid = (~taut.any(axis=1)).reshape(-1, 1)
     return np.where(invalid, np.nan, torque), np.where(invalid, np.nan, stiffness)
-
-
-def stiffness_range(pairs: list[tuple[Array, Array]], row: int, torque: float) -> tuple[float, float]:
-    """Extreme stiffnesses along the pressures of two taut muscles whose torques sum to `torque`; NaN without one."""
-    sums = []
-    for (own, own_k), (other, other_k) in (pairs, pairs[::-1]):
-        order = np.argsort(other[row])
-        x, k = other[row][order], other_k[row][order]
-        needed = torque - own[row]
-        inside = (needed >= x[0]) & (needed <= x[-1])
-        sums.append(own_k[row][inside] + np.interp(needed[inside], x, k))
-    both = np.concatenate(sums)
-    return (float(both.min()), float(both.max())) if both.size else (np.nan, np.nan)
 
 
 def affine_candidates(unlimited: Functions, pressures: Range, angle: Array, torque: Array, stiffness: Array) -> Array:

@@ -73,9 +73,7 @@ class LinearModel:
     def poles(self) -> tuple[Pole, ...]:
         """Eigenvalues of A, the slowest first. Enclosed air and friction at rest give poles at zero."""
         values = sorted(np.linalg.eigvals(self.A).tolist(), key=lambda s: (abs(s), s.imag))
-        return tuple(
-            Pole(complex(s), abs(s) / (2 * math.pi), -complex(s).real / abs(s) if s else math.nan) for s in values
-        )
+        return tuple(Pole(complex(s), abs(s) / math.tau, -complex(s).real / abs(s) if s else math.nan) for s in values)
 
     def select(self, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None) -> "LinearModel":
         """The model with only these inputs and outputs, in this order. Raises ParameterError for an unknown name."""
@@ -109,7 +107,21 @@ class LinearModel:
         """The model with Pade approximations of this order in place of the delays, as further states."""
         if not 1 <= order <= MAX_PADE:
             raise ParameterError(f"pade: the order is {order}; allowed range: 1 to {MAX_PADE}.")
-        return dataclasses.replace(self, **sampled_model.with_pade(self, order)) if any(self.delays.values()) else self
+        if not any(self.delays.values()):
+            return self
+        a, b, c, d, names = self.A, self.B.copy(), self.C, self.D.copy(), list(self.states)
+        for name, delay in self.delays.items():
+            if delay > 0:
+                j = self.inputs.index(name)
+                pa, pb, pc, pd = sampled_model.pade(delay, order)
+                a = np.block([[a, np.outer(b[:, j], pc)], [np.zeros((order, len(a))), pa]])
+                c = np.hstack([c, np.outer(d[:, j], pc)])
+                b = np.vstack([b, np.zeros((order, b.shape[1]))])
+                b[:, j] *= pd
+                b[-order:, j] = pb
+                d[:, j] *= pd
+                names += [f"{name}.delay{i}" for i in range(order)]
+        return dataclasses.replace(self, A=a, B=b, C=c, D=d, states=tuple(names), delays={})
 
     def sampled(self, sample_time: float) -> SampledModel:
         """The model at sampling instants, exact for inputs that are held over a sample time [s], with their delays."""
@@ -155,19 +167,16 @@ class LinearModel:
         return control.NonlinearIOSystem(*_responses(self, self.system), name=name, **names)
 
     def __repr__(self) -> str:
-        poles = [p.value for p in self.poles]
-        slow = ", ".join(_as_text(value, ROUNDING * abs(poles[-1])) for value in poles[:6])
+        poles, shown = np.array([pole.value for pole in self.poles]), []
+        for s in poles[:6].tolist():  # without parts that cannot be told from zero
+            real, imaginary = (0.0 if abs(x) <= ROUNDING * abs(poles[-1]) else x for x in (s.real, s.imag))
+            shown.append(f"{complex(real, imaginary):.4g}" if imaginary else f"{real:.4g}")
         more = ", ..." if len(self.states) > 6 else ""
         return (
-            f"LinearModel({len(self.states)} states, inputs {', '.join(self.inputs) or 'none'}, {len(self.outputs)} "
-            f"outputs; poles {slow}{more} 1/s{'; one-sided by ' if self.kinks else ''}{', '.join(self.kinks)})"
+            f"LinearModel({len(self.states)} states, inputs {', '.join(self.inputs) or 'none'}, "
+            f"{len(self.outputs)} outputs; poles {', '.join(shown)}{more} 1/s"
+            f"{'; one-sided by ' if self.kinks else ''}{', '.join(self.kinks)})"
         )
-
-
-def _as_text(pole: complex, smallest: float) -> str:
-    """A pole with four digits, without parts that are not above the smallest that can be told from zero."""
-    parts = [0.0 if abs(part) <= smallest else part for part in (pole.real, pole.imag)]
-    return f"{complex(*parts):.4g}" if parts[1] else f"{parts[0]:.4g}"
 
 
 def _responses(model: LinearModel, system: System) -> tuple[Callable[..., Array], Callable[..., Array]]:

@@ -2,7 +2,7 @@
 
 import dataclasses
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -159,9 +159,8 @@ def held(a: Array, b: Array, duration: float) -> tuple[Array, Array]:
 
     n, m = b.shape
     # states of units as different as kilograms of air and pascals: scaled, the exponential keeps its digits
-    balanced, (scale, _) = matrix_balance(
-        np.block([[a, b], [np.zeros((m, n + m))]]) * duration, permute=False, separate=True
-    )
+    both = np.block([[a, b], [np.zeros((m, n + m))]]) * duration
+    balanced, (scale, _) = matrix_balance(both, permute=False, separate=True)
     both = expm(balanced) * scale[:, None] / scale
     return both[:n, :n], both[:n, n:]
 
@@ -217,9 +216,7 @@ def pade(delay: float, order: int) -> tuple[Array, Array, Array, float]:
     """A (p, p), b (p,), c (p,), d of the Pade approximation exp(-s T) = P(-s)/P(s) of a delay [s] in state space."""
     factorial = math.factorial
     # P(s T) = sum of these times (s T)^k, the last one 1; controllable canonical form in the time t/T
-    below = np.array(
-        [factorial(2 * order - k) / (factorial(order - k) * factorial(k)) for k in range(order + 1)], dtype=float
-    )
+    below = np.array([factorial(2 * order - k) / (factorial(order - k) * factorial(k)) for k in range(order + 1)])
     below /= below[-1]
     above = below * (-1.0) ** np.arange(order + 1)
     a = np.eye(order, k=1)
@@ -227,22 +224,3 @@ def pade(delay: float, order: int) -> tuple[Array, Array, Array, float]:
     b, d = np.zeros(order), float(above[-1])
     b[-1] = 1.0
     return a / delay, b / delay, above[:-1] - d * below[:-1], d
-
-
-def with_pade(model: Any, order: int) -> dict[str, Any]:
-    """The fields A, B, C, D, states and delays of a LinearModel whose delays are Pade approximations as states."""
-    late: Mapping[str, float] = {name: delay for name, delay in model.delays.items() if delay > 0}
-    a, b, d, names = model.A, model.B.copy(), model.D.copy(), list(model.states)
-    c = model.C
-    for name, delay in late.items():
-        j = model.inputs.index(name)
-        pa, pb, pc, pd = pade(delay, order)
-        by_state, by_output = np.outer(b[:, j], pc), np.outer(d[:, j], pc)
-        a = np.block([[a, by_state], [np.zeros((order, len(a))), pa]])
-        c = np.hstack([c, by_output])
-        b = np.vstack([b, np.zeros((order, b.shape[1]))])
-        b[:, j] *= pd
-        b[-order:, j] = pb
-        d[:, j] *= pd
-        names += [f"{name}.delay{i}" for i in range(order)]
-    return {"A": a, "B": b, "C": c, "D": d, "states": tuple(names), "delays": {}}

@@ -49,17 +49,14 @@ def stiffness(plant: Plant, state: Mapping[str, float]) -> Stiffness:
     state_vector(plant, state)
     plant.check_state(state)
     ports = plant.muscle_states(state)
-    pairs = [_of_muscle(plant, muscle, port) for muscle, port in zip(plant.muscles, ports, strict=True)]
-    names = [m.name for m in plant.muscles]
-    lengths = [float(length) for length in plant.resting_lengths]
-    per_metre = [StiffnessPair(*(k / length for k in both)) for both, length in zip(pairs, lengths, strict=True)]
+    pairs = {m.name: _of_muscle(plant, m, port) for m, port in zip(plant.muscles, ports, strict=True)}
+    lengths = {m.name: float(m.geometry.resting_length) for m in plant.muscles}
+    per_metre = {name: StiffnessPair(*(k / lengths[name] for k in both)) for name, both in pairs.items()}
     coordinates = {
-        c.name: StiffnessPair(*(_against(plant, state, ports, ks, c.name) for ks in zip(*pairs, strict=True)))
+        c.name: StiffnessPair(*(_against(plant, state, ports, ks, c.name) for ks in zip(*pairs.values(), strict=True)))
         for c in plant.mechanism.coordinates
     }
-    return Stiffness(
-        dict(zip(names, pairs, strict=True)), dict(zip(names, per_metre, strict=True)), coordinates
-    )  # fmt: skip
+    return Stiffness(pairs, per_metre, coordinates)
 
 
 def _of_muscle(plant: Plant, muscle: Muscle, port: MuscleState) -> StiffnessPair:
@@ -109,10 +106,8 @@ def _against(
     def pull(x: Sequence[Value]) -> list[Value]:
         q = dict(zip(names, x, strict=True))
         contractions = mechanism.contractions(q, lengths)
-        tensions = [
-            port.tension - k * (contraction - port.contraction)
-            for port, k, contraction in zip(ports, stiffnesses, contractions, strict=True)
-        ]
+        moved = zip(ports, stiffnesses, contractions, strict=True)
+        tensions = [port.tension - k * (contraction - port.contraction) for port, k, contraction in moved]
         return [mechanism.generalised_forces(q, tensions, lengths)[name]]
 
     at = [float(state[n]) for n in names]

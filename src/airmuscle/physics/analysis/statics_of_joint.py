@@ -7,6 +7,7 @@ import numpy as np
 
 from ...core import BLUE, RED, Array, ParameterError, ShortRepr, SolveError, new_figure
 from ...recording import Recording
+from ..muscle import ElasticSeriesElement
 from ..plant.plant import Plant
 from ..pneumatics.gas import gauge_pressure
 from . import joint_torque
@@ -97,9 +98,8 @@ class JointStatics(ShortRepr):
         """
         angle, muscles, torques = recording[self.plant.mechanism.coordinates[0].name], [], []
         for prefix, function in zip(self.plant.prefixes, self.torques, strict=True):
-            stiffness, shut, arm = function(
-                angle, recording[f"{prefix}pressure"], "stiffness", "shut_valves", "moment_arm"
-            )
+            pressure = recording[f"{prefix}pressure"]
+            stiffness, shut, arm = function(angle, pressure, "stiffness", "shut_valves", "moment_arm")
             muscles.append((stiffness, shut))
             torques.append(arm * recording[f"{prefix}force"])
         constant, shut = (sum(values) for values in zip(*muscles, strict=True))
@@ -137,8 +137,18 @@ class JointStatics(ShortRepr):
         functions = self.unlimited if all(f.affine for f in self.unlimited) else self.torques
         levels = np.linspace(*self.pressure_range, LEVELS)
         pairs = [joint_torque.taut_branch(function, angle, levels) for function in functions]
-        limits = np.array([joint_torque.stiffness_range(pairs, row, torque[row]) for row in range(angle.size)])
-        return limits[:, 0], limits[:, 1]
+        limits = np.full((2, angle.size), np.nan)
+        for row in range(angle.size):
+            sums = []
+            for (own, own_k), (other, other_k) in (pairs, pairs[::-1]):
+                order = np.argsort(other[row])
+                x, k = other[row][order], other_k[row][order]
+                needed = torque[row] - own[row]
+                inside = (needed >= x[0]) & (needed <= x[-1])
+                sums.append(own_k[row][inside] + np.interp(needed[inside], x, k))
+            if (both := np.concatenate(sums)).size:
+                limits[:, row] = both.min(), both.max()
+        return limits[0], limits[1]
 
     def explain(self, angle: float, stiffness: float, load: float = 0.0) -> str:
         """Reason why no pressures give an angle and a stiffness under a load, with what is reachable."""
@@ -193,9 +203,8 @@ class JointStatics(ShortRepr):
         cocontraction = np.minimum(np.abs(q), np.abs(other_q))
         columns = (angle, k + other_k, shut + other_shut, cocontraction, stable)
         angle, constant, shut, cocontraction, stable = (np.where(known, value, np.nan) for value in columns)
-        both, tensions = (
-            np.where(known[..., None], v, np.nan) for v in (pressures, np.stack([tension, other_tension], axis=2))
-        )
+        rows, tensions = known[..., None], np.stack([tension, other_tension], axis=2)
+        both, tensions = (np.where(rows, v, np.nan) for v in (pressures, tensions))
         return JointPoints(angle, both, tensions, constant, shut, cocontraction, stable)
 
 
@@ -206,7 +215,20 @@ def joint_statics(plant: Plant, pressure_range: tuple[float, float] | None = Non
     supplies of the plant. Raises ParameterError for a plant that is not a joint with two muscles without series
     springs, and for an empty pressure range.
     """
-    joint_torque.check_joint(plant)
+    coordinates, muscles = plant.mechanism.coordinates, plant.muscles
+    if len(coordinates) != 1 or coordinates[0].unit != "rad" or len(muscles) != 2:
+        raise ParameterError(
+            f"joint_statics: {type(plant.mechanism).__name__} has {len(coordinates)} coordinates "
+            f"({', '.join(c.name for c in coordinates) or 'none'}) and the plant {len(muscles)} muscles; one angle and "
+            "two muscles are required, such as an AntagonisticJoint. For other plants use find_equilibria and "
+            "stiffness."
+        )
+    for muscle in muscles:
+        if isinstance(muscle.series, ElasticSeriesElement):
+            raise ParameterError(
+                f"joint_statics: {muscle.name} has a series spring; only muscles with a RigidSeriesElement are "
+                "allowed. Use find_equilibria, or replace the series spring."
+            )
     supplies = [circuit.supply for circuit in plant.circuits]
     air_states = [supply.air(supply.steady_state(plant.ambient), plant.ambient) for supply in supplies]
     lowest = min(float(gauge_pressure(air.pressure, plant.ambient)) for air in air_states)
@@ -245,11 +267,7 @@ def plot_reachable_region(statics: JointStatics, load: float = 0.0) -> Any:
         region.plot(np.degrees(angle), limit, color=BLUE)
     title = f"Reachable region, load {load:.4g} N m"
     region.set(xlabel="angle [deg]", ylabel="stiffness at constant pressure [N m/rad]", title=title)
-    _draw_plane(plane, statics, load)
-    return figure
 
-
-def _draw_plane(axes: Any, statics: JointStatics, load: float) -> None:
     levels = np.linspace(*statics.pressure_range, PRESSURES)
     first, second = (p.reshape(-1) for p in np.meshgrid(levels, levels))
     points = statics.angles((first, second), load)
@@ -267,7 +285,8 @@ def _draw_plane(axes: Any, statics: JointStatics, load: float) -> None:
         (points.constant_pressure, BLUE, "solid", "%.3g"),
         (np.degrees(points.angle), RED, "dashed", "%.3g°"),
     ):
-        lines = axes.contour(grid, grid, table(values), levels=7, colors=[colour], linestyles=style, linewidths=1.0)
-        axes.clabel(lines, fmt=text, fontsize=7)
-    axes.set(xlabel=f"pressure of {first_name} [bar]", ylabel=f"pressure of {second_name} [bar]")
-    axes.set_title("Solid: stiffness [N m/rad], dashed: angle")
+        lines = plane.contour(grid, grid, table(values), levels=7, colors=[colour], linestyles=style, linewidths=1.0)
+        plane.clabel(lines, fmt=text, fontsize=7)
+    plane.set(xlabel=f"pressure of {first_name} [bar]", ylabel=f"pressure of {second_name} [bar]")
+    plane.set_title("Solid: stiffness [N m/rad], dashed: angle")
+    return figure

@@ -19,31 +19,6 @@ MuscleValues: TypeAlias = float | str | Sequence[float | str] | None
 """One number for all muscles, or one for each; None where the other quantity is given."""
 
 
-def air_of_each(plant: StaticPlant, pressure: MuscleValues, air_mass: MuscleValues) -> tuple[float, ...]:
-    """The given pressures [Pa] or air masses [kg], one for each muscle. Raises ParameterError or UnitError."""
-    if (pressure is None) == (air_mass is None):
-        raise ParameterError("find_equilibrium: give either the pressure [Pa] or the air_mass [kg] of the muscles.")
-    name, given, unit = ("pressure", pressure, "Pa") if air_mass is None else ("air_mass", air_mass, "kg")
-    where = f"find_equilibrium: {name}"
-    several: Sequence[Any] = given if isinstance(given, tuple | list) else (given,) * len(plant.muscles)
-    ambient = plant.ambient.pressure
-    values = [quantity(v, unit, ambient=ambient, where=where) if isinstance(v, str) else v for v in several]
-    if len(values) != len(plant.muscles):
-        raise ParameterError(
-            f"find_equilibrium: {name} has {len(values)} values; the plant has {len(plant.muscles)} muscles."
-        )
-    for value in values:
-        if not isinstance(value, float | int | np.floating) or not np.isfinite(value):
-            names = ", ".join(prefix.removesuffix(".") for prefix in plant.prefixes)
-            raise ParameterError(
-                f"find_equilibrium: {name} is {one_line(value)}; it must be a finite number in {unit}"
-                f"{f', or a tuple with the values of {names}' if len(plant.muscles) > 1 else ''}."
-            )
-        if air_mass is not None and not value > 0:
-            raise ParameterError(f"find_equilibrium: air_mass is {value:g} kg; it must be greater than 0.")
-    return tuple(float(value) for value in values if value is not None)
-
-
 def complete_inputs(system: System, inputs: Mapping[str, float] | None) -> dict[str, float]:
     """Every input of a system, 0 unless given. Raises ParameterError for an unknown name or one beyond its range."""
     given = dict(inputs or {})
@@ -107,10 +82,8 @@ def find_equilibria(
         if everywhere is None or not one.accelerations(everywhere[:, np.isfinite(everywhere[0]), None]).any():
             raise no_equilibrium(one)
     states, stable = _judged(one, rows, x)
-    return tuple(
-        Equilibrium(dict(zip(one.names, state.tolist(), strict=True)), bool(s))
-        for state, s in zip(states, stable, strict=True)
-    )
+    named = (dict(zip(one.names, state.tolist(), strict=True)) for state in states)
+    return tuple(Equilibrium(state, bool(s)) for state, s in zip(named, stable, strict=True))
 
 
 def find_equilibrium(
@@ -130,18 +103,6 @@ def find_equilibrium(
     if not np.isfinite(state).all():
         raise no_equilibrium(one)
     return dict(zip(one.names, state.tolist(), strict=True))
-
-
-def equilibrium_at_ambient_pressure(plant: StaticPlant) -> dict[str, float]:
-    """The state of `find_equilibrium` at gauge pressure 0 and inputs 0."""
-    return find_equilibrium(plant, pressure=0.0)
-
-
-def equilibria_at_ambient_pressure(plant: StaticPlant, parameters: Array) -> Array:
-    """The states (N, n) of `find_equilibrium` at gauge pressure 0 and inputs 0, for plants of this structure with
-    parameters (N, P); NaN if none exists. Raises ParameterError where an input cannot be 0."""
-    inputs = np.array(list(complete_inputs(plant, None).values()), dtype=float)
-    return find_equilibrium_of_each(compile_system(plant), parameters, (0.0,) * len(plant.muscles), inputs)
 
 
 def find_equilibrium_of_each(
@@ -171,11 +132,30 @@ def _each_nearest(compiled: CompiledSystem, parameters: Array, pressures: tuple[
 def _statics(
     plant: StaticPlant, pressure: MuscleValues, air_mass: MuscleValues, inputs: Mapping[str, float] | None
 ) -> Statics:
-    """The checked arguments as a table of one plant."""
-    air = air_of_each(plant, pressure, air_mass)
-    values = np.array(list(complete_inputs(plant, inputs).values()), dtype=float)
-    compiled = compile_system(plant)
-    one = Statics.of_plants(compiled, compiled.parameters[None], air, values, pressure is None)
+    """The arguments as a table of one plant. Raises ParameterError or UnitError."""
+    if (pressure is None) == (air_mass is None):
+        raise ParameterError("find_equilibrium: give either the pressure [Pa] or the air_mass [kg] of the muscles.")
+    name, given, unit = ("pressure", pressure, "Pa") if air_mass is None else ("air_mass", air_mass, "kg")
+    where = f"find_equilibrium: {name}"
+    several: Sequence[Any] = given if isinstance(given, tuple | list) else (given,) * len(plant.muscles)
+    ambient = plant.ambient.pressure
+    values = [quantity(v, unit, ambient=ambient, where=where) if isinstance(v, str) else v for v in several]
+    if len(values) != len(plant.muscles):
+        raise ParameterError(
+            f"find_equilibrium: {name} has {len(values)} values; the plant has {len(plant.muscles)} muscles."
+        )
+    for value in values:
+        if not isinstance(value, float | int | np.floating) or not np.isfinite(value):
+            names = ", ".join(prefix.removesuffix(".") for prefix in plant.prefixes)
+            raise ParameterError(
+                f"find_equilibrium: {name} is {one_line(value)}; it must be a finite number in {unit}"
+                f"{f', or a tuple with the values of {names}' if len(plant.muscles) > 1 else ''}."
+            )
+        if air_mass is not None and not value > 0:
+            raise ParameterError(f"find_equilibrium: air_mass is {value:g} kg; it must be greater than 0.")
+    air = tuple(float(value) for value in values if value is not None)
+    commands, compiled = np.array(list(complete_inputs(plant, inputs).values()), dtype=float), compile_system(plant)
+    one = Statics.of_plants(compiled, compiled.parameters[None], air, commands, pressure is None)
     if not one.shut and not one.allowed().all():
         plant.state_at(pressure=air)
         raise EquilibriumError(f"{type(plant.mechanism).__name__}: the pressures {air} Pa are not allowed.")

@@ -109,7 +109,11 @@ def balances(plants: Statics, x: Array, f: Array) -> tuple[Rows, Array]:
         zero = np.pad(f == 0.0, ((0, 0), (1, 1)))
         exact = zero[:, 1:-1] & ~(zero[:, :-2] & zero[:, 2:])
         crossing = f[:, :-1] * f[:, 1:] < 0.0
-        nearing = _nears_zero(f)
+        # of three neighbours of equal sign, the second is nearest to zero
+        a, b, c = (np.sign(f[:, k : k + max(f.shape[1] - 2, 0)]) for k in range(3))
+        one_sign = (a == b) & (b == c) & (b != 0.0)
+        a, b, c = (np.abs(f[:, k : k + max(f.shape[1] - 2, 0)]) for k in range(3))
+        nearing = one_sign & (b <= np.minimum(a, c)) & (b < np.maximum(a, c))
     rows, i = np.nonzero(exact)
     root_parts = [(rows, x[rows, i])]
     rows, i = np.nonzero(crossing)
@@ -159,14 +163,6 @@ def between(plants: Statics, low: Array, high: Array) -> Array:
             plants, rows, ended = plants.of(kept), rows[kept], ended[kept]
             low, high, at_low, at_high, last = (v[kept] for v in (low, high, at_low, at_high, last))
     return roots
-
-
-def _nears_zero(f: Array) -> npt.NDArray[np.bool_]:
-    """Whether the second of three neighbours of equal sign is nearest to zero (N, K - 2)."""
-    a, b, c = (f[:, k : k + max(f.shape[1] - 2, 0)] for k in range(3))
-    one_sign = (np.sign(a) == np.sign(b)) & (np.sign(b) == np.sign(c)) & (b != 0.0)
-    a, b, c = np.abs(a), np.abs(b), np.abs(c)
-    return np.asarray(one_sign & (b <= np.minimum(a, c)) & (b < np.maximum(a, c)))
 
 
 def _pairs(plants: Statics, f: Array, rows: Rows, x: Array, sign: Array) -> list[tuple[Rows, Array]]:

@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from ...core import Array, EquilibriumError, GeometryLimitError, PhysicsError
 from ...engine.compile.program import CompiledSystem, Program
-from ..plant.static_plant import StaticPlant
+from ..plant.static_plant import StaticPlant, air_states
 from .single_dof import grid
 from .statics import MAX_PRESSURE, Rows, Statics
 
@@ -28,7 +28,12 @@ def are_stable(
     """
     plant, names = compiled.system, [s.name for s in compiled.system.states]
     assert isinstance(plant, StaticPlant)
-    air, moving = _kinds(plant)
+    air, friction, moving = set[str](), set[str](), {n for c in plant.mechanism.coordinates for n in (c.name, c.speed)}
+    for prefix, muscle in zip(plant.prefixes, plant.muscles, strict=True):
+        air |= {prefix + s.name for s in air_states(muscle, plant.gas, plant.ambient)}
+        friction |= {prefix + s.name for s in muscle.friction.states}
+        moving |= {prefix + s.name for s in muscle.states}
+    moving -= friction
     free = [i for i, n in enumerate(names) if n in moving]
     if not free:
         return np.ones(len(states), dtype=bool)
@@ -44,17 +49,6 @@ def are_stable(
     eigenvalues = np.linalg.eigvals(matrix[stable])
     stable[stable] = eigenvalues.real.max(axis=1) <= MARGIN * np.abs(eigenvalues).max(axis=1)
     return stable
-
-
-def _kinds(plant: StaticPlant) -> tuple[set[str], set[str]]:
-    """The states of the air in the muscles, and the states of the motion."""
-    air, friction = set[str](), set[str]()
-    for prefix, muscle in zip(plant.prefixes, plant.muscles, strict=True):
-        air |= {prefix + s.name for s in plant.gas.states(muscle.geometry.volume(0.05), plant.ambient)}
-        friction |= {prefix + s.name for s in muscle.friction.states}
-    moving = {n for c in plant.mechanism.coordinates for n in (c.name, c.speed)}
-    moving |= {p + s.name for p, m in zip(plant.prefixes, plant.muscles, strict=True) for s in m.states}
-    return air, moving - friction
 
 
 def _slopes(
@@ -131,7 +125,7 @@ def _without_coordinates(one: Statics) -> str:
 
 def _line(one: Statics, x: Array) -> str:
     plant = one.separate[0]
-    states = plant.muscle_states(one.state(one.place(x)))
+    states = plant.muscle_states(one.state(x))
     pulls = ", ".join(
         f"{m.name} pulls {float(state.tension) + 0.0:.4g} N at {round(float(state.pressure) / 1e3, 6) + 0.0:.4g} kPa "
         f"and a contraction of {100 * float(state.contraction):.1f} %"
@@ -141,9 +135,8 @@ def _line(one: Statics, x: Array) -> str:
     if len(x) == 1:
         unit = one.plants.mechanism.coordinates[0].unit
         return f"{pulls}, and the load accelerates at {accelerations[0]:+.4g} {unit}/s2"
-    moving = ", ".join(
-        f"{c.name} {a:+.4g} {c.unit}/s2" for c, a in zip(one.plants.mechanism.coordinates, accelerations, strict=True)
-    )
+    named = zip(one.plants.mechanism.coordinates, accelerations, strict=True)
+    moving = ", ".join(f"{c.name} {a:+.4g} {c.unit}/s2" for c, a in named)
     return f"{pulls}, and the accelerations are {moving}"
 
 
@@ -152,7 +145,7 @@ def _required_tension(one: Statics, x: Array) -> str:
     plant = one.separate[0]
     if len(plant.muscles) > 1:
         return ""
-    state, mechanism = one.state(one.place(x)), plant.mechanism
+    state, mechanism = one.state(x), plant.mechanism
     inputs = dict(zip(plant.inputs, one.inputs.tolist(), strict=True))
     accelerations = []
     for tension in (0.0, 1.0):
@@ -174,27 +167,18 @@ DISTINCT = 1e-6
 
 
 def equilibria_of_several_coordinates(statics: Statics) -> tuple[Rows, Array]:
-    """Row of the plant and coordinates (d,) of every equilibrium, sorted by row and coordinates."""
-    rows, places = [], []
+    """Row of the plant and coordinates (d,) of every equilibrium that start points lead to, in ascending order."""
+    rows, places = list[int](), list[Array]()
     for row in range(len(statics.parameters)):
-        equilibria = _equilibria(statics.of(np.array([row])))
+        one, equilibria = statics.of(np.array([row])), list[Array]()
+        x, sizes = starts(one), one.nominal_sizes()
+        f = one.accelerations(x[None])[0]
+        for place in _newton(one, x, f, sizes, RESIDUAL_TOLERANCE * np.abs(f).max()) if len(x) else ():
+            if all(np.abs((place - other) / sizes).max() > DISTINCT for other in equilibria):
+                equilibria.append(place)
         rows += [row] * len(equilibria)
-        places += equilibria
+        places += sorted(equilibria, key=tuple)
     return np.array(rows, dtype=np.intp), np.array(places).reshape(len(rows), len(statics.plants.mechanism.coordinates))
-
-
-def _equilibria(one: Statics) -> list[Array]:
-    """All equilibria of one plant that the start points lead to, sorted by their coordinates."""
-    sizes = one.nominal_sizes()
-    x = starts(one)
-    if not len(x):
-        return []
-    f = one.accelerations(x[None])[0]
-    equilibria: list[Array] = []
-    for place in _newton(one, x, f, sizes, RESIDUAL_TOLERANCE * np.abs(f).max()):
-        if all(np.abs((place - other) / sizes).max() > DISTINCT for other in equilibria):
-            equilibria.append(place)
-    return sorted(equilibria, key=tuple)
 
 
 def starts(one: Statics) -> Array:

@@ -3,13 +3,14 @@
 import dataclasses
 import functools
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from ...core import AirmuscleError, Array, Value, ops, tree
+from ...core.declaration import forwarded
 from ...engine.compile.cache.kernel import evaluate_rates
 from ...engine.compile.program import CompiledSystem
 from ..muscle import Muscle
@@ -124,10 +125,7 @@ class Statics:
         assert isinstance(plant, StaticPlant)
         return [tree.unflatten(plant, row.tolist()) for row in self.parameters]
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """The states, in their order."""
-        return self.compiled.description.state_names
+    names = forwarded("compiled.description.state_names")
 
     def limits(self, index: int) -> tuple[Array, Array, Array]:
         """Nominal size and limits (N, 1) of a coordinate."""
@@ -239,10 +237,9 @@ class Statics:
             evaluate_rates(self.compiled.address["rhs"], self.precomputed, self.inputs, states, rates)
         return np.asarray(rates[..., [self.names.index(c.speed) for c in self.plants.mechanism.coordinates]])
 
-    def state(self, x: Mapping[str, float]) -> dict[str, float]:
-        """The state at rest of the first plant at coordinates by name, as a mapping."""
-        place = np.array([[[x[c.name] for c in self.plants.mechanism.coordinates]]])
-        return dict(zip(self.names, self.states(place)[0, 0].tolist(), strict=True))
+    def state(self, x: Array) -> dict[str, float]:
+        """The state at rest of the first plant at coordinates (d,), as a mapping."""
+        return dict(zip(self.names, self.states(x[None, None])[0, 0].tolist(), strict=True))
 
 
 def _with_arrays(plant: StaticPlant, parameters: Array) -> StaticPlant:
