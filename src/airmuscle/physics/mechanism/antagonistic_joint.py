@@ -4,6 +4,7 @@ import abc
 from collections.abc import Sequence
 
 from ...core import ParameterError, Value, Values, model, ops, parameter
+from ...core.declaration import forwarded
 from .base import Coordinate, DampedCoordinate, angle_limit, gravity_parameter
 
 SAMPLES = 101
@@ -91,12 +92,11 @@ class AntagonisticJoint(DampedCoordinate):
         r_1 = r f(theta),                   r_2 = r f(-theta)
         eps_1 = eps_0 + r F(theta)/L0_1,    eps_2 = eps_0 + r F(-theta)/L0_2,    F(theta) = integral of f from 0
 
-    theta joint angle; the first muscle increases it, the second decreases it. r radius of both pulleys at theta = 0, f
-    their profile, mirrored for the second muscle (f = 1 for circular pulleys), eps_0 contraction of both at theta = 0,
-    J inertia, b viscous friction, M = m g l torque of the weight where it is horizontal, theta_g angle of the weight
-    from its hanging position at theta = 0 (0 for a hanging pendulum, pi/2 for a forearm that is horizontal at 0).
-    A negative M describes an inverted pendulum. `min_angle` and `max_angle` are the range of angles in which equilibria
-    are searched; they are not end stops (JointWithEndStops).
+    theta joint angle; the first muscle increases it, the second decreases it. f profile of the pulleys, mirrored for
+    the second muscle (f = 1 for circular pulleys), eps_0 contraction of both at theta = 0, M = m g l torque of the
+    weight where it is horizontal, theta_g its angle from hanging at theta = 0 (0 for a hanging pendulum, pi/2 for a
+    forearm that is horizontal at 0). A negative M describes an inverted pendulum. `min_angle` and `max_angle` are the
+    range of angles in which equilibria are searched; they are not end stops (JointWithEndStops).
     """
 
     radius: float = parameter("m", "r", "pulley radius of both muscles at angle 0", bounds=(1e-3, 1.0))
@@ -127,21 +127,15 @@ class AntagonisticJoint(DampedCoordinate):
                 )
 
     muscle_count = 2
-
-    @property
-    def total_inertia(self) -> Value:
-        return self.inertia
+    total_inertia = forwarded("inertia")
 
     @property
     def coordinates(self) -> tuple[Coordinate, ...]:
         return (Coordinate("angle", "angular_speed", "rad", 0.1, 1.0, self.min_angle, self.max_angle),)
 
     def contractions(self, q: Values, resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
-        angle, (first, second) = q["angle"], resting_lengths
-        return (
-            self.offset + self.radius * self.profile.integral(angle) / first,
-            self.offset + self.radius * self.profile.integral(-angle) / second,
-        )
+        sides = zip((q["angle"], -q["angle"]), resting_lengths, strict=True)
+        return tuple(self.offset + self.radius * self.profile.integral(angle) / length for angle, length in sides)
 
     def generalised_forces(self, q: Values, tensions: Sequence[Value], resting_lengths: Sequence[Value]) -> Values:
         first, second = (self.profile.ratio(angle) for angle in (q["angle"], -q["angle"]))
@@ -162,8 +156,7 @@ class Lever(DampedCoordinate):
         eps_i = 1 - sqrt((a_i cos phi - a_i)^2 + (h_i - a_i sin phi)^2)/L0_i,   h_i = L0_i (1 - eps_0i)
 
     phi angle from the horizontal, a_i lever arm of muscle i, whose fixed end is vertically above its attachment point
-    at phi = 0; b lever arm of the mass m; J inertia of the lever without the mass, d viscous friction. A muscle on a
-    negative arm acts in the opposite direction. eps_0i is the contraction of muscle i at phi = 0.
+    at phi = 0. A muscle on a negative arm acts in the opposite direction. J does not include the mass m of the load.
     """
 
     arms: tuple[float, ...] = parameter("m", "a_i", "lever arm of each muscle", bounds=(-10.0, 10.0))

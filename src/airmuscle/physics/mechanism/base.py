@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from ...core import STANDARD_GRAVITY, Input, StateVariable, Value, Values, autodiff, parameter
+from ...core.declaration import forwarded
 
 INFINITY = float("inf")
 
@@ -92,11 +93,8 @@ class Mechanism(abc.ABC):
         names = [c.name for c in self.coordinates]
         if not names:
             return tuple(0.0 for _ in resting_lengths)
-        rates = autodiff.jvp(
-            lambda x: self.contractions(dict(zip(names, x, strict=True)), resting_lengths),
-            [q[name] for name in names],
-            [v[c.speed] for c in self.coordinates],
-        )
+        at, speeds = [q[name] for name in names], [v[c.speed] for c in self.coordinates]
+        rates = autodiff.jvp(lambda x: self.contractions(dict(zip(names, x, strict=True)), resting_lengths), at, speeds)
         return tuple(length * rate for length, rate in zip(resting_lengths, rates, strict=True))
 
     def generalised_forces(self, q: Values, tensions: Sequence[Value], resting_lengths: Sequence[Value]) -> Values:
@@ -108,11 +106,9 @@ class Mechanism(abc.ABC):
         names = [c.name for c in self.coordinates]
         if not names:
             return {}
-        forces = autodiff.vjp(
-            lambda x: self.contractions(dict(zip(names, x, strict=True)), resting_lengths),
-            [q[name] for name in names],
-            [tension * length for tension, length in zip(tensions, resting_lengths, strict=True)],
-        )
+        pulls = [tension * length for tension, length in zip(tensions, resting_lengths, strict=True)]
+        at = [q[name] for name in names]
+        forces = autodiff.vjp(lambda x: self.contractions(dict(zip(names, x, strict=True)), resting_lengths), at, pulls)
         return dict(zip(names, forces, strict=True))
 
     @abc.abstractmethod
@@ -160,10 +156,7 @@ class Translation(DampedCoordinate):
 
     mass: float
 
-    @property
-    def total_inertia(self) -> Value:
-        return self.mass
-
+    total_inertia = forwarded("mass")
     coordinates = (Coordinate("position", "speed", "m", 0.01, 0.1),)
 
     def contractions(self, q: Values, resting_lengths: Sequence[Value]) -> tuple[Value, ...]:

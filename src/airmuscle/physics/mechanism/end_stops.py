@@ -12,10 +12,9 @@ from .wrapper import CoordinateWrapper
 class HuntCrossley:
     """Hunt-Crossley contact: F = K delta^(3/2) max(1 + c delta', 0).
 
-    delta contact depth [m], K stiffness, c damping. The force is zero and continuous at the beginning and the end of
-    contact and never pulls. For a slow impact at a speed v, the coefficient of restitution is about 1 - 2/3 c v (0.933
-    for c v = 0.1; the exact value is 0.938).
-    Reference: Hunt and Crossley (1975), with the exponent of Hertz.
+    delta contact depth [m]. The force is zero and continuous at the beginning and the end of contact and never pulls.
+    For a slow impact at a speed v, the coefficient of restitution is about 1 - 2/3 c v (0.933 for c v = 0.1; the exact
+    value is 0.938). Reference: Hunt and Crossley (1975), with the exponent of Hertz.
     """
 
     references: ClassVar[tuple[Reference, ...]] = (published("hunt-crossley-1975"),)
@@ -80,10 +79,8 @@ class EndStops(CoordinateWrapper):
         return {**forces, self.acted_on.name: forces[self.acted_on.name] + self.stop_force(q, v)}
 
     def own_loss(self, q: Values, v: Values, forces: Values, inputs: Values) -> Value:
-        return sum(
-            (self.contact.force(depth, speed) - self.contact.force(depth, 0.0)) * speed
-            for depth, speed in self._contacts(q, v)
-        )
+        force = self.contact.force
+        return sum((force(depth, speed) - force(depth, 0.0)) * speed for depth, speed in self._contacts(q, v))
 
     def potential_energy(self, q: Values) -> Value:
         contacts = self._contacts(q, {self.acted_on.speed: 0.0})

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 from ...core import Input, ParameterError, Value, Values, model, parameter
+from ...core.system import add_prefix
 from .base import Mechanism, Translation, gravity_parameter
 
 SHORTENING, SHORTENING_SPEED = "shortening", "shortening_speed"
@@ -28,8 +29,7 @@ class Isometric(Mechanism):
 class Isotonic(Translation):
     """Isotonic load: m y'' = F - F_c - d y', with y from the position at the resting length of the muscle.
 
-    F_c constant force, m moving mass without weight, d damping. The smaller the mass, the closer the tension is to F_c.
-    All muscles act on the same point in parallel.
+    The smaller the mass m, the closer the tension is to F_c. All muscles act on the same point in parallel.
     """
 
     force: float = parameter("N", "F_c", "constant force against the muscles", bounds=(0.0, 1e6))
@@ -61,8 +61,7 @@ class HangingMass(Translation):
 class SpringLoad(Translation):
     """Spring load: m y'' = F - F_0 - k y - d y', with y from the position at the resting length of the muscle.
 
-    m mass, k stiffness, d damping coefficient, F_0 preload at y = 0, which may include a weight m g. All muscles act on
-    the same point in parallel.
+    The preload F_0 at y = 0 may include a weight m g. All muscles act on the same point in parallel.
     """
 
     mass: float = parameter("kg", "m", "mass of the load", bounds=(1e-4, 1e5))
@@ -82,9 +81,8 @@ class SpringLoad(Translation):
 class Pulley(Translation):
     """Stepped pulley: (J/r^2 + i^2 m) y'' = F - i m g - d y', with y from the position at the muscle's resting length.
 
-    r radius of the drum on the muscle side, i r radius of the drum on the load side, so that the mass m is lifted by
-    i y; J inertia of the pulley, d viscous friction of the bearing, referred to the muscle. i = 1 only redirects the
-    rope; i = 1/2 also describes a block and tackle with half the load. All muscles act on the same point in parallel.
+    The drum on the load side has the radius i r, so that the mass m is lifted by i y; d is referred to the muscle. With
+    i = 1 it only redirects the rope; i = 1/2 is also a block and tackle. All muscles act on one point in parallel.
     """
 
     radius: float = parameter("m", "r", "radius of the drum on the muscle side", bounds=(1e-4, 10.0))
@@ -163,21 +161,16 @@ class ExternalLoad(Mechanism):
 
     @property
     def inputs(self) -> tuple[Input, ...]:
-        return tuple(
-            variable
-            for prefix in self._prefixes
-            for variable in (
-                Input(f"{prefix}{SHORTENING}", "m", -1e3, 1e3, "shortening from the resting length"),
-                Input(f"{prefix}{SHORTENING_SPEED}", "m/s", -1e3, 1e3, "derivative of the shortening"),
-            )
+        own = (
+            Input(SHORTENING, "m", -1e3, 1e3, "shortening from the resting length"),
+            Input(SHORTENING_SPEED, "m/s", -1e3, 1e3, "derivative of the shortening"),
         )
+        return tuple(each for prefix in self._prefixes for each in add_prefix(prefix, own))
 
     def contractions(self, q: Values, resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
         given = self.shortenings or (0.0,) * len(resting_lengths)
-        return tuple(
-            q.get(f"{prefix}{SHORTENING}", default) / length
-            for prefix, default, length in zip(self._prefixes, given, resting_lengths, strict=True)
-        )
+        ports = zip(self._prefixes, given, resting_lengths, strict=True)
+        return tuple(q.get(f"{prefix}{SHORTENING}", default) / length for prefix, default, length in ports)
 
     def contraction_speeds(self, q: Values, v: Values, resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
         return tuple(v.get(f"{prefix}{SHORTENING_SPEED}", 0.0) for prefix in self._prefixes)

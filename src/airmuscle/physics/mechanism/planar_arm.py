@@ -79,11 +79,8 @@ class Arm(Mechanism):
         )
 
     def contractions(self, q: Values, resting_lengths: Sequence[Value]) -> tuple[Value, ...]:
-        angles = self._angles(q)
-        return tuple(
-            route.offset + route.shortening(angles) / length
-            for route, length in zip(self.routes, resting_lengths, strict=True)
-        )
+        angles, muscles = self._angles(q), zip(self.routes, resting_lengths, strict=True)
+        return tuple(route.offset + route.shortening(angles) / length for route, length in muscles)
 
     @abc.abstractmethod
     def mass_matrix(self, q: Values) -> Matrix:
@@ -167,32 +164,25 @@ class PlanarArm(Arm):
 
     def mass_matrix(self, q: Values) -> Matrix:
         inner, count = self._link_matrix(self._link_angles(q)), len(self.links)
-        return [
-            [sum(inner[a][b] for a in range(i, count) for b in range(j, count)) for j in range(count)]
-            for i in range(count)
-        ]
+        places = range(count)
+        return [[sum(inner[a][b] for a in places[i:] for b in places[j:]) for j in places] for i in places]
 
     def tip(self, q: Values) -> tuple[Value, Value]:
         """Horizontal position and height [m] of the tip relative to the first joint."""
         pairs = list(zip(self.links, self._link_angles(q), strict=True))
-        return (
-            sum(link.length * ops.sin(angle) for link, angle in pairs),
-            -sum(link.length * ops.cos(angle) for link, angle in pairs),
-        )
+        across = sum(link.length * ops.sin(angle) for link, angle in pairs)
+        return across, -sum(link.length * ops.cos(angle) for link, angle in pairs)
 
     def acceleration(self, q: Values, v: Values, forces: Values, inputs: Values) -> Values:
         angles, speeds = self._link_angles(q), self._link_speeds(v)
         count, coupling, moments = len(angles), self._couplings(), self._mass_moments()
-        torques = [
-            forces[c.name] - link.damping * v[c.speed] for c, link in zip(self.coordinates, self.links, strict=True)
-        ]
+        pairs = zip(self.coordinates, self.links, strict=True)
+        torques = [forces[c.name] - link.damping * v[c.speed] for c, link in pairs]
         right = []
         for i in range(count):
-            centrifugal = sum(
-                coupling[i][j] * ops.sin(angles[i] - angles[j]) * speeds[j] ** 2 for j in range(count) if j != i
-            )
+            terms = (coupling[i][j] * ops.sin(angles[i] - angles[j]) * speeds[j] ** 2 for j in range(count) if j != i)
             beyond = torques[i + 1] if i + 1 < count else 0.0
-            right.append(torques[i] - beyond - centrifugal - self.gravity * moments[i] * ops.sin(angles[i]))
+            right.append(torques[i] - beyond - sum(terms) - self.gravity * moments[i] * ops.sin(angles[i]))
         links = solve_positive_definite(self._link_matrix(angles), right)
         joints = [links[0], *(links[i] - links[i - 1] for i in range(1, count))]
         return {c.name: value for c, value in zip(self.coordinates, joints, strict=True)}
@@ -232,8 +222,5 @@ class PlanarArm(Arm):
 
     def _link_matrix(self, angles: Sequence[Value]) -> Matrix:
         """A_ij cos(phi_i - phi_j) [kg m^2]."""
-        coupling, count = self._couplings(), range(len(angles))
-        return [
-            [coupling[i][j] * ops.cos(angles[i] - angles[j]) if i != j else coupling[i][i] for j in count]
-            for i in count
-        ]
+        a, count = self._couplings(), range(len(angles))
+        return [[a[i][j] * ops.cos(angles[i] - angles[j]) if i != j else a[i][i] for j in count] for i in count]

@@ -120,9 +120,8 @@ class SerialArm(Arm):
         return torques
 
     def potential_energy(self, q: Values) -> Value:
-        return sum(
-            link.mass * self.gravity * c[2] for link, c in zip(self.links, self._posture(q).centres, strict=True)
-        )
+        centres = self._posture(q).centres
+        return sum(link.mass * self.gravity * c[2] for link, c in zip(self.links, centres, strict=True))
 
     def _posture(self, q: Values) -> _Posture:
         columns: list[Vector] = [(1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)]

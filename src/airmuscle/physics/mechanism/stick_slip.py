@@ -167,10 +167,8 @@ class WithStickSlip(ForceWrapper):
         return (*self.inner.inner_states, *own)
 
     def inner_rates(self, q: Values, v: Values, forces: Values) -> dict[str, Value]:
-        own = {
-            _bristle(c): element.bristle_rate(q.get(_bristle(c), 0.0), v[c.speed])
-            for c, element in zip(self._angles, self.elements, strict=True)
-        }
+        joints = zip(self._angles, self.elements, strict=True)
+        own = {_bristle(c): element.bristle_rate(q.get(_bristle(c), 0.0), v[c.speed]) for c, element in joints}
         return {**self.inner.inner_rates(q, v, forces), **own}
 
     def generalised_forces(self, q: Values, tensions: Sequence[Value], resting_lengths: Sequence[Value]) -> Values:
@@ -182,9 +180,8 @@ class WithStickSlip(ForceWrapper):
             further = zip(*self.residual.evaluate([q[c.name] for c in self._angles], q), strict=True)
             for c, element, (torque, factor) in zip(self._angles, self.elements, further, strict=True):
                 forces[c.name] = forces[c.name] + torque
-                forces[friction_load(c)] = (
-                    factor * (element.coulomb_torque + forces[friction_load(c)]) - element.coulomb_torque
-                )
+                loaded = element.coulomb_torque + forces[friction_load(c)]
+                forces[friction_load(c)] = factor * loaded - element.coulomb_torque
         return forces
 
     def with_own_forces(self, q: Values, v: Values, forces: Values, inputs: Values) -> Values:
