@@ -44,7 +44,7 @@ from airmuscle.physics import (
     VirtualWork,
     as_force_law,
 )
-from airmuscle.physics.muscle.characteristic import SAM_30X290, maxwell_defect, virtual_work_defect
+from airmuscle.physics.muscle.characteristic import maxwell_defect, virtual_work_defect
 from airmuscle.physics.muscle.geometry import as_polynomial
 
 BRAID = Braid(0.01, 0.4363, 0.2)
@@ -203,12 +203,6 @@ def test_a_polynomial_volume_has_a_range_without_infinite_slopes_and_without_zer
         as_polynomial(Braid(0.01, 0.43632, 0.2))
     with pytest.raises(ParameterError, match="1 coefficients; at least two are required"):
         ChebyshevGeometry((1e-4,), 0.0, 0.2, 0.2)
-
-
-@pytest.mark.parametrize("force_degree", [1, 3])
-def test_plane_curves_determine_a_surface_of_one_degree_in_the_force(force_degree: int):
-    with pytest.raises(ParameterError, match=f"3 curves determine a surface of force_degree 2, not {force_degree}"):
-        SAM_30X290.interpolate(force_degree)
 
 
 def test_the_fibre_tension_of_straight_fibres_is_unbounded():

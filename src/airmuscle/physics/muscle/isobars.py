@@ -185,17 +185,24 @@ def isobar_figure(
 
     `measured` points are drawn with the curve of the same pressure.
     """
-    figure, axes = new_figure()
+    (figure, axes), ((across, _), (up, _)) = new_figure(), axis_scales()
     draw_isobars(axes, curves, textwrap.fill(title, 60, max_lines=MAX_TITLE_LINES, placeholder=" …"), point, measured)
     if validity_range is not None:
         low, high = validity_range.contraction
-        (across, _), label = axis_scales()[0], "outside the validity range"
+        label = "outside the validity range"
         for start, end in ((curves.contractions[0], low), (high, curves.contractions[-1])):
             if end - start > 1e-9:
                 axes.axvspan(across * start, across * end, facecolor="0.5", alpha=0.16, linewidth=0, label=label)
                 label = "_nolegend_"
     if point is not None:
-        _draw_working_point(axes, characteristic, curves, point)
+        forces = forces_along(characteristic, point.pressure, curves.contractions)
+        label = f"{quantity_text(point.pressure, 'Pa', 'kPa', 6)} (working point)"
+        line = {"color": plotting.RED, "linewidth": 2.0, "label": label, "zorder": 3}
+        axes.plot(across * curves.contractions, up * mask_slack(forces), **line)
+        label = f"working point\n{contraction_text(point.contraction)}, {quantity_text(point.force, 'N', 'N')}"
+        ring = {"marker": "o", "markersize": 7, "markerfacecolor": "white", "markeredgecolor": plotting.RED}
+        style = {"linestyle": "none", "markeredgewidth": 1.8, "label": label, "zorder": 4, "clip_on": point.force < 0}
+        axes.plot([across * point.contraction], [up * point.force], **ring, **style)
     plotting.legend_outside(axes, title="gauge pressure")
     return figure
 
@@ -204,18 +211,6 @@ def describe_point(point: WorkingPoint) -> str:
     """Return a working point as text in display units."""
     texts = (quantity_text(point.pressure, "Pa", "kPa"), contraction_text(point.contraction))
     return f"{', '.join(texts)}, {quantity_text(point.force, 'N', 'N')}"
-
-
-def _draw_working_point(axes: Any, characteristic: Characteristic, curves: Isobars, point: WorkingPoint) -> None:
-    forces = forces_along(characteristic, point.pressure, curves.contractions)
-    (across, _), (up, _) = axis_scales()
-    label = f"{quantity_text(point.pressure, 'Pa', 'kPa', 6)} (working point)"
-    line = {"color": plotting.RED, "linewidth": 2.0, "label": label, "zorder": 3}
-    axes.plot(across * curves.contractions, up * mask_slack(forces), **line)
-    label = f"working point\n{contraction_text(point.contraction)}, {quantity_text(point.force, 'N', 'N')}"
-    ring = {"marker": "o", "markersize": 7, "markerfacecolor": "white", "markeredgecolor": plotting.RED}
-    style = {"linestyle": "none", "markeredgewidth": 1.8, "label": label, "zorder": 4, "clip_on": point.force < 0}
-    axes.plot([across * point.contraction], [up * point.force], **ring, **style)
 
 
 def plot_isobars(

@@ -17,7 +17,7 @@ from .isobars import plot_isobars
 from .passive_elements import CreepElements, Damper, LinearDamper, LinearSpring, NoStop, RigidWall, Spring, Stop, Wall
 from .quantity_arguments import QuantityMethods, Units
 from .ratings import Ratings
-from .series import ElasticSeriesElement, RigidSeriesElement, SeriesElement, solve_inner_contraction, without_derivative
+from .series import ElasticSeriesElement, RigidSeriesElement, SeriesElement, solve_inner_contraction
 
 RELAXED: Values = MappingProxyType({})
 """Relaxed state of a muscle: every state that is not given is 0."""
@@ -107,10 +107,6 @@ class Muscle(QuantityMethods, NotebookDisplay):
             raise ParameterError("Muscle: name is ''; it must be a non-empty text, such as 'left'.")
         if isinstance(self.series, ElasticSeriesElement):
             self._check_series_elements()
-        self._check_lengths()
-
-    def _check_lengths(self) -> None:
-        """Warn of a law whose force depends on a resting length that is not that of the geometry."""
         law: Any = self.contractile
         while isinstance(law, Clamped):
             law = law.inner
@@ -121,7 +117,7 @@ class Muscle(QuantityMethods, NotebookDisplay):
                 f"length of {type(self.geometry).__name__} is {1e3 * length:.6g} mm. The force would be that of "
                 "another length; give both the same resting length.",
                 AirmuscleWarning,
-                stacklevel=5,
+                stacklevel=4,
             )
 
     def _check_series_elements(self) -> None:
@@ -154,7 +150,7 @@ class Muscle(QuantityMethods, NotebookDisplay):
             state[INNER_CONTRACTION] = solve_inner_contraction(
                 autodiff.value_and_derivative(self, "internal_imbalance", 3, wrt=1)
                 if self.contractile.traceable and self.geometry.traceable
-                else without_derivative(self.internal_imbalance),
+                else lambda *at: (self.internal_imbalance(*at), float("nan")),
                 self.series.stiffness * length,
                 limits,
                 pressure,

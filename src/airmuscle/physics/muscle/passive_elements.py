@@ -130,10 +130,9 @@ class CreepElements:
     @property
     def states(self) -> tuple[StateVariable, ...]:
         """Stretch of each spring [m]."""
-        count = range(1, len(self.relaxation_times) + 1)
-        return tuple(
-            StateVariable(f"creep{i}", "m", 1e-3, f"stretch of the spring of creep element {i}") for i in count
-        )
+        numbers = range(1, len(self.relaxation_times) + 1)
+        meaning = "stretch of the spring of creep element"
+        return tuple(StateVariable(f"creep{i}", "m", 1e-3, f"{meaning} {i}") for i in numbers)
 
     def force(self, state: Values) -> Value:
         """Force against contraction [N]."""
@@ -144,27 +143,21 @@ class CreepElements:
         return {s.name: speed - state[s.name] / tau for s, tau in zip(self.states, self.relaxation_times, strict=True)}
 
 
-class Stop(abc.ABC):
-    """Element that limits the contraction of a muscle by a pushing force (interface)."""
+class Stop:
+    """Element that limits the contraction of a muscle by a pushing force (base class: no force)."""
 
-    @abc.abstractmethod
     def force(self, contraction: Value, speed: Value, resting_length: Value) -> Value:
         """Force [N] against contraction at a speed of shortening [m/s]."""
+        return 0.0
 
-    @abc.abstractmethod
     def static_force_and_damping(self, contraction: Value, resting_length: Value) -> tuple[Value, Value]:
         """Force [N] at zero speed, and the slope of the force over the speed of shortening [N s/m]."""
+        return 0.0, 0.0
 
 
 @model
 class NoStop(Stop):
     """No end stop: the contraction is limited by the force law alone."""
-
-    def force(self, contraction: Value, speed: Value, resting_length: Value) -> Value:
-        return 0.0
-
-    def static_force_and_damping(self, contraction: Value, resting_length: Value) -> tuple[Value, Value]:
-        return 0.0, 0.0
 
 
 @model
@@ -254,9 +247,8 @@ class SwellingWall(_FirstOrderWall):
 
         V_w' = (V_g g(p) - V_w)/tau,   g(p) = s(p) - s(0),   s(p) = 1/(1 + exp(-(p - p_h)/p_w))
 
-    V_g volume increase up to the shortest length, p_h gauge pressure at the midpoint of the increase, p_w its width in
-    pressure, tau time constant. This lumped model is chosen, not published. Fix the contraction of the muscle
-    (`Isometric`) when it is used; the force of the muscle then has no meaning.
+    p gauge pressure. This lumped model is chosen, not published. Fix the contraction of the muscle (`Isometric`) when
+    it is used; the force of the muscle then has no meaning.
     """
 
     growth_volume: float = parameter("m3", "V_g", "volume increase up to the shortest length", bounds=(0.0, 1e-1))

@@ -12,8 +12,6 @@ from ...core import NUMBERS, ParameterError, one_line, quantity
 _ARRAY, _DOUBLE = np.ndarray, np.dtype(np.float64)
 _EXAMPLES = {"Pa": "'3 bar'", "N": "'200 N'", "1": "'10 %'"}
 """A text for each unit of an argument."""
-
-
 Units = Mapping[str, Sequence[str]]
 """Units of the leading arguments of methods, by the name of the method."""
 RatioCheck = Callable[[Any, object], None]

@@ -68,19 +68,9 @@ class CubicSeriesSpring(ElasticSeriesElement):
 CONTRACTION_TOLERANCE = 1e-15
 """Contractions that differ by less are equal (chosen, a few rounding errors)."""
 MAX_ITERATIONS = 200
-Imbalance = Callable[[Value, Value, Value], tuple[Array, Array]]
+Imbalance = Callable[[Value, Value, Value], tuple[Value, Value]]
 """Force imbalance [N] and its derivative with respect to the inner contraction [N], as a function of gauge pressure
-[Pa], inner contraction and contraction of the muscle."""
-
-
-def without_derivative(imbalance: Callable[[Value, Value, Value], Value]) -> Imbalance:
-    """The imbalance of a law that is not closed-form; its derivative is NaN, so that bisection is used."""
-
-    def evaluate(pressure: Value, inner: Value, contraction: Value) -> tuple[Array, Array]:
-        value = np.asarray(imbalance(pressure, inner, contraction), dtype=float)
-        return value, np.full(value.shape, np.nan)
-
-    return evaluate
+[Pa], inner contraction and contraction of the muscle. Where the derivative is NaN, the solution is bisected."""
 
 
 def solve_inner_contraction(
@@ -104,7 +94,7 @@ def solve_inner_contraction(
 
 
 def find_largest_nonnegative(
-    function: Callable[[Array], tuple[Array, Array]], low: Array, high: Array, start: Array
+    function: Callable[[Array], tuple[Value, Value]], low: Array, high: Array, start: Array
 ) -> Array:
     """The largest x in [low, high] at which a decreasing function is not negative; element-wise, shape (N,) or ().
 

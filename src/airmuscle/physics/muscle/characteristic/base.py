@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable
 from typing import ClassVar, NamedTuple, Self
 
 from ....core import IdentificationError, Reference, Value, autodiff, model, ops, parameter
+from ....core.declaration import forwarded
 from ..quantity_arguments import QuantityMethods, Units
 from .solve import check_solution, describe_range, solve_direction, warn_above_whole_length
 from .validity_range import MeasuredPoints
@@ -236,12 +237,8 @@ class Clamped(ForceLaw):
     min_force: float = parameter("N", "F_min", "lower limit of the force", fitted=False, default=0.0)
     max_force: float = parameter("N", "F_max", "upper limit of the force", fitted=False, default=1.0e5)
 
-    @property
-    def contraction_range(self) -> tuple[float, float]:
-        return self.inner.contraction_range
+    contraction_range = forwarded("inner.contraction_range")
+    unclamped_force = forwarded("inner.unclamped_force")
 
     def force(self, pressure: Value, contraction: Value) -> Value:
         return ops.clip(self.inner.force(pressure, contraction), self.min_force, self.max_force)
-
-    def unclamped_force(self, pressure: Value, contraction: Value) -> Value:
-        return self.inner.unclamped_force(pressure, contraction)

@@ -60,16 +60,9 @@ class PlaneCurves:
             f"No plane curve at {force:g} N; curves exist at {loads} N. Use a surface between these loads."
         )
 
-    def interpolate(self, force_degree: int = 2) -> "BorzikovaExponential":
-        """Return the exponential surface through all curves, of which there must be `force_degree` + 1.
-
-        Raises ParameterError for another number of curves.
-        """
-        if len(self.curves) != force_degree + 1:
-            raise ParameterError(
-                f"PlaneCurves: {len(self.curves)} curves determine a surface of force_degree {len(self.curves) - 1}, "
-                f"not {force_degree}."
-            )
+    def interpolate(self) -> "BorzikovaExponential":
+        """Return the exponential surface through all curves; its degree in the force is their number less one."""
+        force_degree = len(self.curves) - 1
         loads = np.array([c.force for c in self.curves])
         degree = max(len(c.coefficients) for c in self.curves) - 1
         rows = np.array([(*c.coefficients, *(0.0,) * (degree + 1 - len(c.coefficients))) for c in self.curves])

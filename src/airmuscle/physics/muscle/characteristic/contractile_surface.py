@@ -8,7 +8,7 @@ from typing import ClassVar
 from ....core import ParameterError, Reference, Value, model, ops, parameter, published
 from ..geometry.base import check_degree
 from .base import Characteristic, ForceLaw
-from .validity_range import DataScales, MeasuredPoints, ValidityRange
+from .validity_range import DataScales, Limits, MeasuredPoints, ValidityRange
 
 HOSOVSKY_HILL = published("hosovsky-hill")
 
@@ -80,15 +80,12 @@ class ContractileSurface(ForceLaw):
     def variants(cls, data: MeasuredPoints, surface: Callable[[int], ForceLaw]) -> dict[str, Characteristic]:
         return {f"surface of degree {n}": cls.guess(data, n) for n in range(1, 7)}
 
-    def with_validity_range(
-        self, pressure: tuple[float, float], contraction: tuple[float, float]
-    ) -> "ContractileSurface":
+    def with_validity_range(self, pressure: Limits, contraction: Limits) -> "ContractileSurface":
         """Return the surface with the same coefficients on another validity range; `fit` calls it before it solves."""
-        return ContractileSurface(
-            self.coefficients, *pressure, *contraction, self.min_force, self.max_force, self.degree
-        )
+        limits = (*pressure, *contraction, self.min_force, self.max_force)
+        return ContractileSurface(self.coefficients, *limits, self.degree)
 
-    def rescaled(self, pressure: tuple[float, float], contraction: tuple[float, float]) -> "ContractileSurface":
+    def rescaled(self, pressure: Limits, contraction: Limits) -> "ContractileSurface":
         """Return the same polynomial on another validity range, outside which it is extrapolated linearly."""
         new = self.with_validity_range(pressure, contraction)
         (x0, q0), (new_x0, new_q0) = self._scale(0.0, 0.0), new._scale(0.0, 0.0)

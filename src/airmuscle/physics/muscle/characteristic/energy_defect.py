@@ -13,6 +13,8 @@ from .validity_range import ValidityRange
 
 _POINTS = 41
 """Points of the grid along each side of a validity range."""
+Sides = Callable[[Array, Array], tuple[Array, Array]]
+"""Two quantities that should be equal, at gauge pressures [Pa] and contractions [1]."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -77,9 +79,7 @@ def virtual_work_defect(
     return _largest(characteristic, sides, validity_range, "N")
 
 
-def _largest(
-    law: Characteristic, sides: Callable[[Array, Array], tuple[Array, Array]], validity_range: ValidityRange, unit: str
-) -> EnergyDefect:
+def _largest(law: Characteristic, sides: Sides, validity_range: ValidityRange, unit: str) -> EnergyDefect:
     edges = (np.linspace(*limits, _POINTS) for limits in (validity_range.pressure, validity_range.contraction))
     p, c = (side.reshape(-1) for side in np.meshgrid(*edges))
     taut = np.asarray(law.force(p, c)) > 0

@@ -102,11 +102,9 @@ class ExactMeridian(RubberLaw, PressureLaw):
         check_numbers(pressure, force)
         self.check_threshold(pressure, force)
         radii = (tube.end_radius * (1 + 1e-9), float(tube.segment(tube.free_contraction).max_radius))
-        radius = find_first_root(
-            residual, radii, (pressure, force), lambda p, f, *_: self._no_contraction_message(p, f)
-        )
-        contraction = 1.0 - self._evaluate_shape(radius, pressure, force).lengths[1] / tube.fibre_length
-        return float(contraction) if np.ndim(radius) == 0 else contraction
+        r = find_first_root(residual, radii, (pressure, force), lambda p, f, *_: self._no_contraction_message(p, f))
+        contraction = 1.0 - self._evaluate_shape(r, pressure, force).lengths[1] / tube.fibre_length
+        return float(contraction) if np.ndim(r) == 0 else contraction
 
     def slopes(self, pressure: Value, contraction: Value) -> Slopes:
         """Partial derivatives by the implicit function theorem from the derivatives of the two lengths."""

@@ -16,10 +16,9 @@ _MIN_SPAN = 1e-6
 class Hunt2017(PressureLaw):
     """Hunt's model: p = p_0 + p_1 tan(c_1 (eps/(eps_max - b F) - c_2)) + a F + h S.
 
-    eps: contraction; eps_max: contraction of the specimen at 620 kPa without load; F: tension; S: direction of motion,
-    +1 for shortening, -1 for lengthening, 0 for isometric. 2 h: pressure difference between the two branches. The
-    tangent is limited below its pole, at 2.9 MPa with the printed parameters.
-    Reference: Hunt, Graber-Tilton and Quinn (2017).
+    eps: contraction; F: tension; S: direction of motion, +1 for shortening, -1 for lengthening, 0 for isometric. The
+    tangent is limited below its pole, at 2.9 MPa with the printed parameters. Reference: Hunt, Graber-Tilton and Quinn
+    (2017).
     """
 
     references: ClassVar[tuple[Reference, ...]] = (published("hunt-2017"),)
@@ -64,7 +63,6 @@ class Hunt2017(PressureLaw):
 
     def pressure(self, contraction: Value, force: Value) -> Value:
         span = ops.maximum(self.max_contraction - self.span_by_force * force, _MIN_SPAN)
-        argument = ops.clip(
-            self.steepness * (contraction / span - self.centre), -_MAX_TANGENT_ARGUMENT, _MAX_TANGENT_ARGUMENT
-        )
-        return self.offset + self.scale * ops.tan(argument) + self.by_force * force + self.half_gap * self.direction
+        argument = self.steepness * (contraction / span - self.centre)
+        tangent = ops.tan(ops.clip(argument, -_MAX_TANGENT_ARGUMENT, _MAX_TANGENT_ARGUMENT))
+        return self.offset + self.scale * tangent + self.by_force * force + self.half_gap * self.direction

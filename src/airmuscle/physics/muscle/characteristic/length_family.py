@@ -6,6 +6,7 @@ from collections.abc import Callable
 from typing import Any, ClassVar, Self
 
 from ....core import ParameterError, Value, model, ops, parameter, suggestion
+from ....core.declaration import forwarded
 from ..geometry.base import LENGTHS, RESTING_LENGTH
 from .base import Characteristic, ForceLaw
 from .validity_range import DataScales, MeasuredPoints
@@ -58,10 +59,9 @@ class LengthLaw(ForceLaw):
 class EffectiveLength(LengthLaw):
     """Force law of the active length: F = F_inner(p, (eps L_0 + d)/(L_0 - l_d)).
 
-    eps: contraction of the whole muscle; L_0: length between the fittings; l_d: length of the ends, which do not
-    contract; d: elongation of the ends under pressure, or zero error of the length measurement. Short muscles therefore
-    contract less. `with_resting_length` returns the model of another muscle of the same type. Developed for airmuscle;
-    the effect of the ends is from Tondu and Lopez (2000), whose end correction is L_0/(L_0 - l_d).
+    eps: contraction of the whole muscle; l_d: length of the ends, which do not contract, so that short muscles contract
+    less; d: their elongation under pressure, or zero error of the length measurement. Developed for airmuscle; the
+    effect of the ends is from Tondu and Lopez (2000), whose end correction is L_0/(L_0 - l_d).
     """
 
     inner: ForceLaw
@@ -73,11 +73,8 @@ class EffectiveLength(LengthLaw):
 
     @classmethod
     def variants(cls, data: MeasuredPoints, surface: Callable[[int], ForceLaw]) -> dict[str, Characteristic]:
-        scales = DataScales.of(data).check_lengths()
-        return {
-            f"effective length, degree {n}": cls(surface(n), scales.resting_length, dead_length=0.005)
-            for n in range(2, 6)
-        }
+        length = DataScales.of(data).check_lengths().resting_length
+        return {f"effective length, degree {n}": cls(surface(n), length, dead_length=0.005) for n in range(2, 6)}
 
     def check(self) -> None:
         if not self.dead_length < self.resting_length:
@@ -137,9 +134,7 @@ class LengthFamily(LengthLaw):
             for k in range(1, min(n, 3) + 1)
         }
 
-    @property
-    def contraction_range(self) -> tuple[float, float]:
-        return self.inner.contraction_range
+    contraction_range = forwarded("inner.contraction_range")
 
     def force(self, pressure: Value, contraction: Value) -> Value:
         return ops.maximum(self.unclamped_force(pressure, contraction), 0.0)
@@ -157,9 +152,8 @@ class LengthFamily(LengthLaw):
 class InverseLength(LengthFamily):
     """Length factor in 1/L_0: F = max(0, F_inner(p, eps) + (L_ref/L_0 - 1) F_change(p, eps)).
 
-    L_0: length between the fittings; L_ref: reference length. Force limits of the inner models are not applied. If both
-    models are surfaces, every coefficient has a term in 1/L_0, the effect of ends of constant size.
-    `with_resting_length` returns the model of another muscle of the same type. Developed for airmuscle.
+    Force limits of the inner models are not applied. If both models are surfaces, every coefficient has a term in
+    1/L_0, the effect of ends of constant size. Developed for airmuscle.
     """
 
     term: ClassVar[str] = "1/L0"
@@ -172,10 +166,9 @@ class InverseLength(LengthFamily):
 class LogarithmicLength(LengthFamily):
     """Logarithmic length factor: F = max(0, F_inner(p, eps) + ln(L_0/L_ref) F_change(p, eps)).
 
-    L_0: length between the fittings; L_ref: reference length. Force limits of the inner models are not applied. The
-    logarithm lies between a term in 1/L_0, which is negligible for long muscles, and a term in L_0, which is unbounded.
-    `with_resting_length` returns the model of another muscle of the same type. Developed for airmuscle from measured
-    muscles of 83 to 382 mm, whose force increased about equally with the first and the second doubling of length.
+    Force limits of the inner models are not applied. The logarithm lies between a term in 1/L_0, which is negligible
+    for long muscles, and a term in L_0, which is unbounded. Developed for airmuscle from measured muscles of 83 to 382
+    mm, whose force increased about equally with the first and the second doubling of length.
     """
 
     term: ClassVar[str] = "ln L0"
@@ -234,9 +227,7 @@ class PooledLengthLaw(ForceLaw):
         length: float | None = getattr(self.population, "resting_length", None)
         return length
 
-    @property
-    def contraction_range(self) -> tuple[float, float]:
-        return self.population.contraction_range
+    contraction_range = forwarded("population.contraction_range")
 
     def with_resting_length(self, resting_length: float) -> "PooledLengthLaw":
         """Return the law of a new muscle of the same type with this resting length [m]: its effect is zero."""

@@ -19,7 +19,6 @@ _BISECTIONS = 12
 _REFINEMENTS = 4
 """Local grids around each start, each three times finer than the one before, chosen: 1/81 of the step."""
 _OFFSETS = np.linspace(-1.0, 1.0, 7)
-
 _Error = Callable[[Array, Array], Array]
 _NO_CLAMP = 1e6
 """Force limit [N] of the surface, above that of any muscle, so that negative forces are approximated as well."""
@@ -83,12 +82,10 @@ def as_force_law(law: Characteristic, validity_range: ValidityRange, *, degree: 
     return _with_errors(law, ContractileSurface(tuple(coefficients.tolist()), *limits, degree), validity_range)
 
 
-def _with_errors(
-    law: Characteristic, surface: ContractileSurface, validity_range: ValidityRange
-) -> PolynomialSurrogate:
+def _with_errors(law: Characteristic, surface: ContractileSurface, limits: ValidityRange) -> PolynomialSurrogate:
     """Return the surrogate of a fitted surface with its errors."""
     nodes = np.linspace(-1.0, 1.0, 4 * surface.degree + 3)
-    pressure, contraction = _grid(validity_range, nodes)
+    pressure, contraction = _grid(limits, nodes)
     force = values_or_nan(law.force, pressure, contraction)
     if (unbounded := np.abs(force) > _NO_CLAMP).any():
         at = int(np.argmax(unbounded))
@@ -108,7 +105,7 @@ def _with_errors(
         )
 
     def magnitude(x: Array, q: Array) -> Array:
-        at = _physical(validity_range, x, q)
+        at = _physical(limits, x, q)
         return np.asarray(np.abs(surface.force(*at) - values_or_nan(law.force, *at)))
 
     largest = _MARGIN * estimate_maximum(magnitude, np.abs(error).reshape(nodes.size, nodes.size), nodes)

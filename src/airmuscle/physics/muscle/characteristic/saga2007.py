@@ -146,20 +146,18 @@ class Saga2007(RubberLaw, PressureLaw):
 
     def validity_warnings(self, pressure: float, contraction: float) -> tuple[str, ...]:
         """Warnings at this point: extrapolated rubber line, unstable equilibrium, or beyond the maximum volume."""
-        warnings = []
+        texts = []
         if (strain := float(self.middle_strain(contraction))) > RUBBER_TEST_STRAIN:
             end = self.contraction_at_strain(RUBBER_TEST_STRAIN)
-            warnings.append(
+            texts.append(
                 f"the rubber strain of {strain:.3g} exceeds the tested maximum of 3, reached at a contraction of "
                 f"{100 * end:.3g} %"
             )
         if contraction > 0 and float(self.slopes(pressure, contraction).by_contraction) > 0:
-            warnings.append("the equilibrium is unstable: the pressure decreases with contraction (snap-through)")
+            texts.append("the equilibrium is unstable: the pressure decreases with contraction (snap-through)")
         if contraction > 0 and float(self.geometry.volume_derivative(contraction)) < 0:
-            warnings.append(
-                "the volume decreases with contraction but the tension is positive: energy is not conserved"
-            )
-        return tuple(warnings)
+            texts.append("the volume decreases with contraction but the tension is positive: energy is not conserved")
+        return tuple(texts)
 
     def _check_contraction(self, contraction: Value) -> None:
         """Raise GeometryLimitError if a contraction is out of range, unless the model is being traced."""

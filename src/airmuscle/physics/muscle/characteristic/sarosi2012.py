@@ -30,10 +30,8 @@ class Sarosi2012(ForceLaw):
     def guess(cls, data: MeasuredPoints) -> Self:
         scales = DataScales.of(data)
         factor = scales.force / 1500.0  # relative to a DMSP-20, whose measured map these values fit
-        by_pressure = factor * 6e5 / scales.pressure
-        return cls(
-            1.2e-4 * by_pressure, 420 * factor, -57.0, -8.7e-3 * by_pressure, 2.7e-3 * by_pressure, -310 * factor
-        )
+        slope = factor * 6e5 / scales.pressure
+        return cls(1.2e-4 * slope, 420 * factor, -57.0, -8.7e-3 * slope, 2.7e-3 * slope, -310 * factor)
 
     def force(self, pressure: Value, contraction: Value) -> Value:
         decaying = (self.a1 * pressure + self.a2) * ops.exp(self.a3 * contraction)

@@ -1,10 +1,9 @@
 """Root search for the directions of a characteristic that are not in closed form."""
 
-import contextlib
 import contextvars
 import sys
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -13,29 +12,22 @@ from ....core import AirmuscleWarning, Array, PhysicsError, SolveError, TraceErr
 
 INTERVALS = 256
 """Intervals of the search grid; a pair of roots within 1/256 of the search range is not resolved."""
-
 _TOLERANCES = {"xatol": 0.0, "xrtol": 4 * float(np.finfo(float).eps), "fatol": 0.0, "frtol": 0.0}
 _UNSOLVED_AS_NAN = contextvars.ContextVar("unsolved_as_nan", default=False)
-
-
-@contextlib.contextmanager
-def unsolved_as_nan() -> Iterator[None]:
-    """Within this context, points without a solution are NaN in the results of the functions below, not an error."""
-    token = _UNSOLVED_AS_NAN.set(True)
-    try:
-        yield
-    finally:
-        _UNSOLVED_AS_NAN.reset(token)
+"""Whether points without a solution are NaN in the results of the functions below, not an error."""
 
 
 def values_or_nan(law: Callable[..., Any], *points: Array) -> Array:
     """Values of a law at points (N,), NaN where it has no solution; halves of the points isolate those."""
+    token = _UNSOLVED_AS_NAN.set(True)
     try:
-        with unsolved_as_nan(), np.errstate(all="ignore"):  # a law may be singular at the end of its range
+        with np.errstate(all="ignore"):  # a law may be singular at the end of its range
             return np.broadcast_to(np.asarray(law(*points), dtype=float), points[0].shape)
     except PhysicsError:
         if points[0].size == 1:
             return np.array([np.nan])
+    finally:
+        _UNSOLVED_AS_NAN.reset(token)
     half = points[0].size // 2
     halves = ([each[part] for each in points] for part in (slice(None, half), slice(half, None)))
     return np.concatenate([values_or_nan(law, *each) for each in halves])
@@ -95,7 +87,7 @@ def find_first_root(
     This is the branch reached from rest as x increases. `args` are the two other quantities a and b, scalars or arrays
     that broadcast; the result has their shape. Raises SolveError for the first pair without a root, with the text of
     `message(a, b, minimum, maximum)`, where minimum and maximum are the extreme values of `function` within `bounds`;
-    within `unsolved_as_nan()` such a pair gives NaN. Raises TraceError for traced values, which have no numbers.
+    in `values_or_nan` such a pair gives NaN. Raises TraceError for traced values, which have no numbers.
     """
     from scipy.optimize import elementwise
 
@@ -125,9 +117,8 @@ def find_first_root(
         if selected.any():
             bracket = (grid[index[selected]], grid[index[selected] + 1])
             with np.errstate(over="ignore", invalid="ignore"):
-                root = elementwise.find_root(
-                    target, bracket, args=(a[selected], b[selected]), tolerances=_TOLERANCES, maxiter=200
-                )
+                given = (a[selected], b[selected])
+                root = elementwise.find_root(target, bracket, args=given, tolerances=_TOLERANCES, maxiter=200)
             roots[selected] = root.x
     return float(roots[0]) if first.ndim == 0 else roots.reshape(first.shape)
 
@@ -163,8 +154,8 @@ def check_solution(
 ) -> Any:
     """Return `solution`, the result of a closed form; raises SolveError(message(a, b)) if it is not within `bounds`.
 
-    `args` are the two other quantities a and b. Symbols and JAX arrays have no values and are not checked. Within
-    `unsolved_as_nan()` a solution outside is NaN.
+    `args` are the two other quantities a and b. Symbols and JAX arrays have no values and are not checked. In
+    `values_or_nan` a solution outside is NaN.
     """
     if type(solution).__module__.partition(".")[0] in ("casadi", "jax", "jaxlib"):
         return solution

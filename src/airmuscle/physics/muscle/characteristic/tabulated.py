@@ -119,8 +119,14 @@ class _IsobarTable:
         start, end = self.contraction_limits(p)
         outside = ~((c >= start) & (c <= end))
         if outside.any():
-            first = int(np.argmax(outside.reshape(-1)))
-            raise SolveError(self._outside_message(p.flat[first], c.flat[first], start.flat[first], end.flat[first]))
+            at = np.unravel_index(int(np.argmax(outside)), outside.shape)
+            point = f"{p[at] / 1e3:.4g} kPa"
+            if not np.isnan(c[at]):
+                point += f" and a contraction of {100 * c[at]:.4g} %"
+            limits = f"{describe_range(100 * start[at], 100 * end[at], '%')} at this pressure"
+            if np.isnan(start[at]):
+                limits = describe_range(self.levels[0] / 1e3, self.levels[-1] / 1e3, "kPa")
+            raise SolveError(f"Tabulated: {point} is outside the table, which covers {limits}.")
         j, fraction = self._bracketing_isobars(p)
         forces = self.forces(c)
         by_pressure = np.diff(forces, axis=0) / np.diff(self.levels).reshape(-1, *(1,) * c.ndim)
@@ -145,16 +151,6 @@ class _IsobarTable:
         """Index of the isobar below each pressure, and the fraction of the interval to the next isobar."""
         j = np.clip(np.searchsorted(self.levels, pressure, side="right") - 1, 0, self.levels.size - 2)
         return j, (pressure - self.levels[j]) / (self.levels[j + 1] - self.levels[j])
-
-    def _outside_message(self, pressure: float, contraction: float, start: float, end: float) -> str:
-        point = f"{pressure / 1e3:.4g} kPa"
-        if not np.isnan(contraction):
-            point += f" and a contraction of {100 * contraction:.4g} %"
-        if np.isnan(start):
-            limits = describe_range(self.levels[0] / 1e3, self.levels[-1] / 1e3, "kPa")
-            return f"Tabulated: {point} is outside the table, which covers {limits}."
-        limits = describe_range(100 * start, 100 * end, "%")
-        return f"Tabulated: {point} is outside the table, which covers {limits} at this pressure."
 
 
 def _curve(pressure: float, contractions: Array, forces: Array) -> Any:

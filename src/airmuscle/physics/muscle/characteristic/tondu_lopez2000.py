@@ -15,10 +15,9 @@ TONDU_LOPEZ_2000 = published("tondu-lopez-2000")
 class TonduLopez2000(AreaLaw):
     """Braided muscle with end correction: F = pi r_0^2 p (a (1 - k eps)^2 - b).
 
-    a = 3/tan(alpha_0)^2, b = 1/sin(alpha_0)^2; r_0, alpha_0: radius and angle of the braid at rest; p: gauge pressure;
-    eps: contraction. The end correction k is greater than 1 because the tapered ends do not contract and the middle
-    contracts by k eps. k = 1 gives the model of Chou and Hannaford. The equation is solved in closed form for each
-    quantity. Reference: Tondu and Lopez (2000).
+    a = 3/tan(alpha_0)^2, b = 1/sin(alpha_0)^2; r_0, alpha_0: radius and angle of the braid at rest. The middle
+    contracts by k eps, with an end correction k > 1, because the tapered ends do not contract; k = 1 gives the model of
+    Chou and Hannaford. All quantities are solved in closed form. Reference: Tondu and Lopez (2000).
     """
 
     references: ClassVar[tuple[Reference, ...]] = (TONDU_LOPEZ_2000,)

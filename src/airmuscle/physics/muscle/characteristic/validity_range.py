@@ -11,6 +11,8 @@ from ....core import IdentificationError, Value, model, parameter
 from ....recording import Recording
 from ..geometry.braid import Braid
 
+Limits = tuple[float, float]
+"""Lower and upper limit."""
 PRESSURE_BOUNDS = (-101_325.0, 1e8)
 CONTRACTION_BOUNDS = (-0.5, 1.0)
 """Physical bounds: pressure not below absolute vacuum, contraction not above the whole length."""

@@ -4,6 +4,7 @@ import functools
 from typing import ClassVar
 
 from ....core import ParameterError, Reference, TraceError, Value, model, ops, parameter
+from ....core.declaration import forwarded
 from ..geometry.base import Geometry, check_contraction_range
 from ..geometry.braid import CHOU_HANNAFORD_1996
 from ..geometry.meridian import FERRARESI_2001, SAGA_2007, CircularArc
@@ -27,9 +28,7 @@ class VirtualWork(AreaLaw):
 
     geometry: Geometry
 
-    @property
-    def contraction_range(self) -> tuple[float, float]:
-        return self.geometry.contraction_range
+    contraction_range = forwarded("geometry.contraction_range")
 
     def effective_area(self, contraction: Value) -> Value:
         return self.geometry.volume_derivative(contraction) / self.geometry.resting_length
@@ -53,12 +52,11 @@ class CircleVirtualWork(RubberLaw, ForceLaw):
 
         F = (p dV/deps - dU/deps)/l_0,   U = 2 pi t [alpha Q/(2 r_0) + beta G],   sin(psi)/psi = 1 - eps
 
-    Per segment of fibre length l_0: V volume, G = Int (r - r_0) ds, Q = Int (r - r_0)^2 ds of the circular arc with
-    half angle psi, all in closed form; alpha, beta: slope and intercept of the rubber line; t: wall thickness; r_0: end
-    radius. Volume and force follow from one potential, so that a simulation conserves energy. Compared with the exact
-    meridian, the pressure differs by less than 0.7 % from 100 N up to 30 % contraction, and by -1 % to 6.3 % without
-    load. The meridian is from Ferraresi et al. 2001, the rubber from Saga et al. 2007; the force balance is from
-    neither.
+    Per segment of fibre length l_0 and end radius r_0: V volume, G = Int (r - r_0) ds, Q = Int (r - r_0)^2 ds of the
+    circular arc with half angle psi, all in closed form. Volume and force follow from one potential, so that a
+    simulation conserves energy. Compared with the exact meridian, the pressure differs by less than 0.7 % from 100 N up
+    to 30 % contraction, and by -1 % to 6.3 % without load. The meridian is from Ferraresi et al. 2001, the rubber from
+    Saga et al. 2007; the force balance is from neither.
     """
 
     references: ClassVar[tuple[Reference, ...]] = (FERRARESI_2001, SAGA_2007)

@@ -42,9 +42,8 @@ class BristleFriction(Friction):
 class Dahl(BristleFriction):
     """Dahl model: dz/dt = v - sigma_0 |v| z/F_C,  F = sigma_0 z.
 
-    z: deflection of the bristle [m]; v: speed [m/s]; sigma_0: stiffness of the bristle; F_C: Coulomb force. From the
-    relaxed state, F = F_C (1 - exp(-sigma_0 x/F_C)). Rate-independent; small inner loops do not close but drift.
-    Reference: Dahl (1968), with exponent 1.
+    z: deflection of the bristle [m]; v: speed [m/s]. From the relaxed state, F = F_C (1 - exp(-sigma_0 x/F_C)).
+    Rate-independent; small inner loops do not close but drift. Reference: Dahl (1968), with exponent 1.
     """
 
     references: ClassVar[tuple[Reference, ...]] = (published("dahl-1968"),)
@@ -66,11 +65,9 @@ class LuGre(BristleFriction):
 
     g(v) = F_C + (F_S - F_C) exp(-(v/v_S)^2).
 
-    z: mean deflection of the bristles [m]; v: speed [m/s]; g(v): force in steady sliding (Stribeck curve); F_C: Coulomb
-    force; F_S: static friction force; v_S: Stribeck speed; sigma_1, sigma_2: damping of the bristles and viscous
-    damping. Steady sliding gives F = g(v) sgn v + sigma_2 v. The map from speed to force is passive if
-    sigma_2 > sigma_1 (F_S - F_C)/F_C. For quasi-static motion the model reduces to the Dahl model with F_S.
-    Reference: Canudas de Wit et al. (1995).
+    z: mean deflection of the bristles [m]; v: speed [m/s]; g(v): force in steady sliding (Stribeck curve), which gives
+    F = g(v) sgn v + sigma_2 v. The map from speed to force is passive if sigma_2 > sigma_1 (F_S - F_C)/F_C. For
+    quasi-static motion the model reduces to the Dahl model with F_S. Reference: Canudas de Wit et al. (1995).
     """
 
     references: ClassVar[tuple[Reference, ...]] = (published("canudas-de-wit-1995"),)

@@ -17,8 +17,6 @@ from ....core import Array, IdentificationError
 
 CURVE_NODES, CURVE_END = 4801, 24.0
 """Nodes of the loading curve of `relative_deflection`, and its end -ln((1 - w)/2), where 1 - w is 8e-11 (chosen)."""
-
-
 MIN_FRICTION = 1e-3
 """Least initial amplitude of a friction [N] (chosen)."""
 

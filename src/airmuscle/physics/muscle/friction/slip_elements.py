@@ -102,11 +102,10 @@ class MaxwellSlip(SlipElements):
 class PrandtlIshlinskii(SlipElements):
     """Modified Prandtl-Ishlinskii model: F = S(Sum k_i E_ri[x]),  S(u) = u + Sum w_j S_dj(u).
 
-    E_r: stop operator, which follows x within the limits -r..r. S_d: dead zone, max(u - d, 0) for d > 0 and
-    min(u - d, 0) for d < 0. x: displacement [m]; k_i, r_i: stiffness and limit of each stop; d_j [N], w_j [1]:
-    threshold and weight of each dead zone. S must be increasing, otherwise friction would supply energy: on either
-    side, one plus the sum of the active weights must not be negative. Without dead zones the model is the Maxwell-slip
-    model. `force_along` is exact; in a plant a stop begins to slide over the last fraction eta of its deflection, as in
+    E_r: stop operator, which follows the displacement x within the limits -r..r. S_d: dead zone, max(u - d, 0) for
+    d > 0 and min(u - d, 0) for d < 0. S must be increasing, otherwise friction would supply energy: on either side, one
+    plus the sum of the active weights must not be negative. Without dead zones the model is the Maxwell-slip model.
+    `force_along` is exact; in a plant a stop begins to slide over the last fraction eta of its deflection, as in
     MaxwellSlip. Stop operators instead of Kuhnen's play operators give a force that saturates; the remainder
     x - E_r[x] belongs to the parallel spring of the muscle. Reference: Kuhnen (2003); Al Janaideh et al. (2011).
     """

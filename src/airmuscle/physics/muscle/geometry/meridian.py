@@ -13,28 +13,27 @@ SAGA_2007, FERRARESI_2001 = published("saga-2007"), published("ferraresi-2001")
 
 
 class Segment(NamedTuple):
-    """One segment of the muscle at a contraction. x: axial position; r: radius; s: arc length; r_0: end radius."""
+    """One segment of the muscle at a contraction. x: axial position; r: radius; s: arc length; r_0: end radius.
+
+    length               chord l [m]
+    arc                  Int ds [m]; equal to the fibre length except for approximate meridians
+    max_radius           radius in the middle [m]
+    end_sine, end_cosine of the end slope angle phi_0; the cosine is negative beyond a right angle
+    excess               Int (r - r_0) dx [m2]
+    arc_excess, arc_excess_squared    G = Int (r - r_0) ds [m2], Q = Int (r - r_0)^2 ds [m3]
+    volume               enclosed volume [m3]
+    """
 
     end_radius: Value
-    """r_0 [m]."""
     length: Value
-    """Chord l [m]."""
     arc: Value
-    """Int ds [m]; equal to the fibre length except for approximate meridians."""
     max_radius: Value
-    """Maximum radius, in the middle [m]."""
     end_sine: Value
-    """Sine of the end slope angle phi_0."""
     end_cosine: Value
-    """Cosine of the end slope angle; negative beyond a right angle."""
     excess: Value
-    """Int (r - r_0) dx [m2]."""
     arc_excess: Value
-    """G = Int (r - r_0) ds [m2]."""
     arc_excess_squared: Value
-    """Q = Int (r - r_0)^2 ds [m3]."""
     volume: Value
-    """Enclosed volume [m3]."""
 
     @property
     def half_section(self) -> Value:
@@ -70,7 +69,6 @@ def segment_volume(end_radius: Value, length: Value, excess: Value, excess_squar
 
 TERMS = 18
 """Number of terms; the first omitted term is below 1e-18 of the sum for |w| <= 45, the range of the meridians."""
-
 _COEFFICIENTS = tuple(tuple(1.0 / math.factorial(m + 2 * n) for n in range(TERMS)) for m in range(6))
 
 
@@ -224,14 +222,11 @@ class Catenary(Meridian):
 
 
 class SegmentDerivatives(NamedTuple):
-    """Derivatives of the integrals of one segment with respect to contraction."""
+    """Derivatives of the integrals of one segment by contraction: dV/deps [m3], dG/deps [m2] and dQ/deps [m3]."""
 
     volume: Value
-    """dV/deps [m3]."""
     arc_excess: Value
-    """dG/deps [m2]."""
     arc_excess_squared: Value
-    """dQ/deps [m3]."""
 
 
 @model

@@ -14,6 +14,8 @@ DAERDEN_LEFEBER_2001 = published("daerden-lefeber-2001")
 _ROOT_MU_BRACKET = (1e-6, 0.9)
 """Search interval of sqrt(mu)."""
 _ROOT_TOLERANCES = {"xatol": 0.0, "xrtol": 4 * float(np.finfo(float).eps), "fatol": 0.0, "frtol": 0.0}
+_SEARCH: dict[str, Any] = {"tolerances": _ROOT_TOLERANCES, "maxiter": 300}
+"""Options of the root searches, which end at rounding."""
 
 
 class FibreSum(abc.ABC):
@@ -189,9 +191,7 @@ class PleatedTube(FibreTube):
             return _contraction(root_mu * root_mu, self._slenderness) - c
 
         # searched in sqrt(mu), which is proportional to contraction^(1/4) near zero and keeps the accuracy there
-        root = elementwise.find_root(
-            residual, _ROOT_MU_BRACKET, args=(target,), tolerances=_ROOT_TOLERANCES, maxiter=300
-        )
+        root = elementwise.find_root(residual, _ROOT_MU_BRACKET, args=(target,), **_SEARCH)
         mu = np.where(target > 0, root.x, np.nan) ** 2
         angle = _angle(mu, self._slenderness)
         return EllipticOutline(mu, angle, *_integrals(mu, angle))
@@ -266,9 +266,7 @@ def _angle(mu: Any, slenderness: float) -> Any:
     def residual(angle: Any, mu: Any) -> Any:
         return ellipkinc(angle, mu) - slenderness * np.sqrt(mu) * np.cos(angle)
 
-    return elementwise.find_root(
-        residual, (0.0, np.pi / 2), args=(np.asarray(mu),), tolerances=_ROOT_TOLERANCES, maxiter=300
-    ).x
+    return elementwise.find_root(residual, (0.0, np.pi / 2), args=(np.asarray(mu),), **_SEARCH).x
 
 
 def _contraction(mu: Any, slenderness: float) -> Any:
