@@ -41,11 +41,9 @@ class ModelApproximation(Reported):
     @property
     def summary(self) -> str:
         """The errors in one phrase."""
-        worst = self.max_error
-        return (
-            f"{type(self.model).__name__}: rms error {self.rmse:.4g} N, maximum error {worst.error:.4g} N at "
-            f"{worst.pressure / 1e3:.4g} kPa and {100 * worst.contraction:.2f} %"
-        )
+        worst, errors = self.max_error, f"{type(self.model).__name__}: rms error {self.rmse:.4g} N"
+        at = f"{worst.pressure / 1e3:.4g} kPa and {100 * worst.contraction:.2f} %"
+        return f"{errors}, maximum error {worst.error:.4g} N at {at}"
 
     def chapter(self) -> Chapter:
         """The description of the approximation: its errors, also in intervals of pressure, and its parameters."""

@@ -133,8 +133,7 @@ def find_length_errors(law: Characteristic, recordings: Sequence[Recording]) -> 
     length explains an error in one of three lengths by an error in either of the others. Empty unless there are three
     specimens with resting lengths or more.
     """
-    names = list(dict.fromkeys(specimen_name(run) for run in recordings))
-    model = population_of(law)
+    names, model = list(dict.fromkeys(specimen_name(run) for run in recordings)), population_of(law)
     complete = all("resting_length" in run.constants for run in recordings)
     if len(names) < 3 or not complete or not hasattr(model, "with_resting_length"):
         return ()

@@ -9,7 +9,7 @@ Fedorov, V. V., Theory of Optimal Experiments, Academic Press, 1972.
 
 import dataclasses
 import functools
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -77,7 +77,7 @@ class RecursiveFit(ShortRepr):
         """The fit with one more sample [Pa, 1, N]. A sample outside the limits is counted and left out."""
         if not self.limits.validity_range.contains(pressure, contraction):
             return dataclasses.replace(self, outside=self.outside + 1)
-        terms, kept, squared = self._terms(pressure, contraction)[0], 1.0, self.squared_factor
+        terms, kept, squared = self._terms(np.array([pressure]), np.array([contraction]))[0], 1.0, self.squared_factor
         if self.forgetting < 1.0:
             kept, squared = np.sqrt(self.forgetting), _with_row(self.forgetting * squared, terms)
         factor = _with_row(kept * self.factor, np.append(terms, force))
@@ -91,9 +91,7 @@ class RecursiveFit(ShortRepr):
     @functools.cached_property
     def _inverse(self) -> Array:
         """Inverse of the triangular factor, shape (P, P)."""
-        from scipy.linalg.lapack import dtrtri
-
-        return np.asarray(dtrtri(self.factor[:-1, :-1])[0])
+        return np.asarray(_lapack().dtrtri(self.factor[:-1, :-1])[0])
 
     @property
     def rmse(self) -> float:
@@ -140,7 +138,7 @@ class RecursiveFit(ShortRepr):
 
     def force(self, pressure: float, contraction: float) -> tuple[float, float]:
         """Predicted force and its standard error [N], without the limits of the force."""
-        terms = self._terms(pressure, contraction)
+        terms = self._terms(np.array([pressure]), np.array([contraction]))
         return float((terms @ self.coefficients)[0]), float(self.noise * np.sqrt(self._variance(terms)[0]))
 
     def next_point(self) -> NextPoint:
@@ -169,16 +167,21 @@ class RecursiveFit(ShortRepr):
             shares = shares @ self._inverse.T @ self.squared_factor.T
         return np.asarray(np.sum(shares**2, axis=1))
 
-    def _terms(self, pressure: float | Array, contraction: float | Array) -> Array:
-        point = np.atleast_1d(pressure), np.atleast_1d(contraction)
-        return _terms(*point, self.limits.validity_range, self.degree)
+    def _terms(self, pressure: Array, contraction: Array) -> Array:
+        return _terms(pressure, contraction, self.limits.validity_range, self.degree)
+
+
+@functools.cache
+def _lapack() -> Any:
+    """The LAPACK routines of SciPy, whose call costs less than that of their NumPy counterparts."""
+    from scipy.linalg import lapack
+
+    return lapack
 
 
 def _with_row(factor: Array, row: Array) -> Array:
     """Triangular factor of R^T R + r r^T for a triangular factor R, shape (P, P), and a row r, shape (P,)."""
-    from scipy.linalg.lapack import dgeqrf  # whose call costs less than that of its NumPy counterpart
-
-    return np.asarray(np.triu(dgeqrf(np.vstack([factor, row]), overwrite_a=True)[0][: len(factor)]))
+    return np.asarray(np.triu(_lapack().dgeqrf(np.vstack([factor, row]), overwrite_a=True)[0][: len(factor)]))
 
 
 def _terms(pressure: Array, contraction: Array, span: ValidityRange, degree: int) -> Array:
@@ -187,8 +190,13 @@ def _terms(pressure: Array, contraction: Array, span: ValidityRange, degree: int
     x = (2 * contraction - sum(contractions)) / (contractions[1] - contractions[0])
     q = (2 * pressure - sum(pressures)) / (pressures[1] - pressures[0])
     x_powers, q_powers = (np.vander(v, degree + 1, increasing=True) for v in (x, q))
-    i, j = np.transpose(exponents(degree))
+    i, j = _powers(degree)
     return np.asarray(x_powers[:, i] * q_powers[:, j])
+
+
+@functools.cache
+def _powers(degree: int) -> Array:
+    return np.transpose(exponents(degree))
 
 
 @functools.lru_cache(maxsize=8)

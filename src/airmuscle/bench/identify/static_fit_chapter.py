@@ -113,13 +113,14 @@ def equation_section(fit: Fit) -> tuple[tuple[DisplayedEquation, ...], tuple[Tab
         note = f"{text} The law has no closed form of a length that can be shown. Source: {sources}."
         return (DisplayedEquation("equation-1", "Definition", (), note, {}),), ()
     scales = {"pressure": (1e-3, " kPa"), "contraction": (1.0, ""), "force": (1.0, " N")}
-    ranges = []
+    parts = []
     for name in quantity.arguments:
         (factor, unit), ends = scales[name], fit.data_ranges[name]
         low, high = (format_number(end * factor) for end in ends)
-        ranges.append(f"{name} {low} to {high}{unit}")
-    span = " and ".join(ranges)
-    validity = f"Valid for {span}, the range of the data; outside it the law may be continued differently."
+        parts.append(f"{name} {low} to {high}{unit}")
+    validity = (
+        f"Valid for {' and '.join(parts)}, the range of the data; outside it the law may be continued differently."
+    )
     shown = tuple(_displayed(equation, f"equation-{i}", validity) for i, equation in enumerate(equations, 1))
     effects, tables = _specimen_effects(fit, validity)
     parameters = equations[0].parameters
