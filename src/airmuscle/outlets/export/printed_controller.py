@@ -11,7 +11,7 @@ from ...engine import ControlLaw, ControlLoop, Problem
 from ...engine.compile.functions import Printer
 from ...engine.compile.ir import emission
 from ...engine.compile.ir.emission import TargetLanguage
-from ...engine.compile.ir.instructions import Code, instructions
+from ...engine.compile.ir.instructions import instructions
 from ...engine.compile.ir.interpreter import InterpretedBody
 from ...engine.compile.text.languages import CLanguage
 from ...engine.run.compiled_law import trace_sample
@@ -38,11 +38,6 @@ class PrintedController:
     """Type of all numbers in C, double or float."""
     tolerance: float = 0.0
     """Part of its range by which a command of the replay may differ; 0: no bit differs."""
-
-    @property
-    def code(self) -> Code:
-        """The instructions of a sample."""
-        return instructions(list(self.inputs.values()), list(self.outputs.values()))
 
     @property
     def initial_memory(self) -> Array:
@@ -91,7 +86,8 @@ class PrintedController:
         of_law = [(leaf.path, leaf.declared.unit, leaf.declared.meaning) for leaf in self.tunable]
         labels = make_labels({**rows, "parameters": of_law})
         printer = Printer(dataclasses.replace(language, labels=labels))  # type: ignore[type-var]
-        printer.add_code("sample", list(self.inputs), self.code, list(self.outputs))
+        code = instructions(list(self.inputs.values()), list(self.outputs.values()))
+        printer.add_code("sample", list(self.inputs), code, list(self.outputs))
         return printer.text[-1]
 
     def files(self, measured: Array, setpoints: Array, commands: Array) -> dict[str, str]:
@@ -151,7 +147,8 @@ class PrintedController:
         single  every number is rounded to single precision
         """
         memory, parameters = self.initial_memory.tolist(), self.defaults.tolist()
-        rows, names, code = [], list(self.inputs), self.code
+        code = instructions(list(self.inputs.values()), list(self.outputs.values()))
+        rows, names = [], list(self.inputs)
         for measurement, setpoint in zip(measured.tolist(), setpoints.tolist(), strict=True):
             given = {"measurement": measurement, "setpoint": setpoint, "memory": memory, "parameters": parameters}
             body = InterpretedBody(given, single)

@@ -50,10 +50,9 @@ MAX_TARGET = 2048
 
 def is_loopback(host: str) -> bool:
     """Whether a host name or address is this machine itself."""
-    try:
+    with contextlib.suppress(ValueError):
         return ipaddress.ip_address(host.strip("[]")).is_loopback
-    except ValueError:
-        return host.lower().removesuffix(".") == "localhost"
+    return host.lower().removesuffix(".") == "localhost"
 
 
 @dataclasses.dataclass(frozen=True)
