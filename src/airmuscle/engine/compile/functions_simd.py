@@ -143,8 +143,13 @@ class _Step:
     def _rates(self, stage: int, row: Sequence[float], slopes: Sequence[Sequence[str]]) -> list[str]:
         """The rates of one stage."""
         given: dict[Operand, str] = {("in", 0, i): self._moved(i, row, slopes) for i in range(self.states)}
+        node, combined = sum(row), self.block.arithmetic
         for i in range(self.inputs):
-            given["in", 1, i] = self._input(i, sum(row))
+            u = self._load("u", i)
+            if node:  # u + node h w
+                way = combined("*", self.block.constant(node), self._load("h", 0))
+                u = combined("+", u, combined("*", way, self._load("w", i)))
+            given["in", 1, i] = u
         for operand, place in self.held.items():
             given[operand] = self._load(f"c{stage}", place)
         at = emission.Emission(self.block, (), {}, given)
@@ -163,11 +168,3 @@ class _Step:
                 term = combined("*", self.block.constant(weight), k[i])
                 total = combined("+", total, term) if total else term
         return combined("+", x, combined("*", self._load("h", 0), total)) if total else x
-
-    def _input(self, i: int, node: float) -> str:
-        """u + c h w."""
-        u, combined = self._load("u", i), self.block.arithmetic
-        if not node:
-            return u
-        way = combined("*", self.block.constant(node), self._load("h", 0))
-        return combined("+", u, combined("*", way, self._load("w", i)))

@@ -71,12 +71,6 @@ def _after(
     return advanced
 
 
-def _input_rows(t: TangentSystem, block: FunctionBody, h: LlvmValue, node: float) -> list[LlvmValue]:
-    """The rows of V at a stage."""
-    slopes = zip(t.input_rows(block), t.input_rows(block, "w"), strict=True)
-    return [v + w * _times(h, node) for v, w in slopes]
-
-
 def _times(h: LlvmValue, weight: float) -> LlvmValue:
     return h * LlvmValue(h.block, h.block.constant(weight))
 
@@ -95,7 +89,8 @@ def explicit_module(t: TangentSystem, a: Sequence[Sequence[float]], b: Sequence[
         for i in range(t.inner.u.numel()):
             u = loaded(block, "u", i) + loaded(block, "w", i) * _times(h, sum(row))
             given["in", POINT.index("u"), i] = u.name
-        stage = _Stage(rates, along, printer, block, given, _input_rows(t, block, h, sum(row)))
+        moving = zip(t.input_rows(block), t.input_rows(block, "w"), strict=True)
+        stage = _Stage(rates, along, printer, block, given, [v + w * _times(h, sum(row)) for v, w in moving])
         stage.print_rates(before)
         slopes.append(stage.slopes())
         if before is not None:

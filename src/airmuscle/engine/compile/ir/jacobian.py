@@ -39,10 +39,6 @@ class Tape:
         if line.operation in _CONDITIONS or product:
             self._masks.add(line.result)
 
-    def take(self, longer: "Tape") -> None:
-        """Replace the content by that of a continued copy of this tape."""
-        self.body, self._known, self._masks = longer.body, longer._known, longer._masks
-
     def put(self, operation: Operation, *arguments: Operand) -> Operand:
         """The result of an operation; the instruction is appended unless it exists already."""
         if operation in _COMMUTE and (operation, arguments[::-1]) in self._known:
@@ -141,7 +137,7 @@ def derivatives(tape: Tape, results: Sequence[Operand], inputs: Sequence[Operand
     tries = [Tape(tape.body), Tape(tape.body)]
     candidates = [_eliminated(one, results, inputs, sign) for one, sign in zip(tries, (1, -1), strict=True)]
     best = min((0, 1), key=lambda i: len(tries[i].body))
-    tape.take(tries[best])
+    vars(tape).update(vars(tries[best]))
     return candidates[best]
 
 
@@ -169,7 +165,15 @@ def _eliminated(tape: Tape, results: Sequence[Operand], inputs: Sequence[Operand
         current = heapq.heappop(queue)
         vertex = current[2]
         if vertex in into and current == entry(vertex):
-            for changed in _eliminate(tape, into, out, vertex):
+            row, targets = into.pop(vertex), sorted(out.pop(vertex, ()), key=str)
+            for source in row:
+                out[source].discard(vertex)
+            for target in targets:
+                factor = into[target].pop(vertex)
+                for source, partial in row.items():
+                    into[target][source] = tape.add(into[target].get(source, ZERO), tape.times(factor, partial))
+                    out[source].add(target)
+            for changed in {*row, *targets}:
                 if changed in order and changed in into:
                     heapq.heappush(queue, entry(changed))
     return [into.get(end, {}) for end in ends]
@@ -204,16 +208,3 @@ def _graph(
             for argument in row:
                 out.setdefault(argument, set()).add(line.result)
     return into, out
-
-
-def _eliminate(tape: Tape, into: dict[Operand, Row], out: dict[Operand, set[Operand]], vertex: Operand) -> set[Operand]:
-    """Eliminate a vertex and return the vertices whose edges have changed."""
-    row, targets = into.pop(vertex), sorted(out.pop(vertex, ()), key=str)
-    for source in row:
-        out[source].discard(vertex)
-    for target in targets:
-        factor = into[target].pop(vertex)
-        for source, partial in row.items():
-            into[target][source] = tape.add(into[target].get(source, ZERO), tape.times(factor, partial))
-            out[source].add(target)
-    return {*row, *targets}

@@ -109,10 +109,20 @@ class _Pieces:
     def items(self) -> list[Item]:
         """All instructions and blocks, in an executable order."""
         items: list[Item] = []
-        straight, pieces = self._sorted()
+        straight: list[Instruction] = []
+        pieces: dict[_Piece, list[Instruction]] = {}
+        for line in self._code.body:  # of the same gates, separately for early instructions
+            gates = self._apart.gates.get(line.result)
+            (straight if gates is None else pieces.setdefault((gates, line.result in self._early), [])).append(line)
         while straight or pieces:
-            straight = self._straight(straight, items)
-            ready = self._ready(pieces)
+            waiting = []
+            for line in straight:
+                if self._pending.isdisjoint(line.arguments):
+                    items.append(line)
+                    self._pending.discard(line.result)
+                else:
+                    waiting.append(line)
+            straight, ready = waiting, self._ready(pieces)
             if not ready and (straight or pieces):
                 raise TraceError(
                     "the instructions have a cyclic dependence; this is an error in airmuscle, please report it."
@@ -123,29 +133,6 @@ class _Pieces:
                 pieces[piece] = [line for line in pieces[piece] if line.result in self._pending]
             pieces = {piece: lines for piece, lines in pieces.items() if lines}
         return items
-
-    def _sorted(self) -> tuple[list[Instruction], dict[_Piece, list[Instruction]]]:
-        """The unconditional instructions, and those of each piece: the same gates, separately for early ones."""
-        straight: list[Instruction] = []
-        pieces: dict[_Piece, list[Instruction]] = {}
-        for line in self._code.body:
-            gates = self._apart.gates.get(line.result)
-            if gates is None:
-                straight.append(line)
-            else:
-                pieces.setdefault((gates, line.result in self._early), []).append(line)
-        return straight, pieces
-
-    def _straight(self, left: Sequence[Instruction], items: list[Item]) -> list[Instruction]:
-        """Append the unconditional instructions whose operands are available; return the remaining ones."""
-        waiting = []
-        for line in left:
-            if self._pending.isdisjoint(line.arguments):
-                items.append(line)
-                self._pending.discard(line.result)
-            else:
-                waiting.append(line)
-        return waiting
 
     def _ready(self, pieces: dict[_Piece, list[Instruction]]) -> list[tuple[_Piece, list[Instruction]]]:
         """The pieces that are executable completely; if there are none, the executable part of the first one."""

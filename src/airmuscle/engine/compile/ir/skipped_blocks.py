@@ -86,23 +86,12 @@ class _Comparisons:
         self._not_above = {line.arguments: line.result for line in body if line.operation == Operation.LESS_EQUAL}
         self._below = {line.arguments: line.result for line in body if line.operation == Operation.LESS}
 
-    def _of(self, gates: Gates, ordered: Iterable[tuple[Operand, Operand]], facts: dict[Operand, Operand]) -> _Case:
-        """The case in which the gates are zero and therefore low <= high for each ordered pair.
-
-        high <= low remains undetermined, because both may be equal: such a comparison becomes a further gate.
-        """
-        further: dict[Operand, Operand] = {}
-        for low, high in ordered:
-            if (low, high) in self._not_above:
-                facts[self._not_above[low, high]] = ONE
-            if (high, low) in self._below:
-                facts[self._below[high, low]] = ZERO
-            if (high, low) in self._not_above:
-                further[self._not_above[high, low]] = ZERO
-        return _Case((*gates, *further), facts | further)
-
     def inside(self, difference: Instruction) -> list[_Case]:
-        """The case of a value within its clamping interval, if `difference` is a value minus its clamped value."""
+        """The case of a value within its clamping interval, if `difference` is a value minus its clamped value.
+
+        Then low <= high for each of some pairs; high <= low remains undetermined, because both may be equal: such a
+        comparison becomes a further gate.
+        """
         for number, clamped in (difference.arguments, difference.arguments[::-1]):
             facts: dict[Operand, Operand] = {}
             ordered: list[tuple[Operand, Operand]] = []
@@ -118,7 +107,15 @@ class _Comparisons:
                 ordered.append((bound, inner) if line.operation == Operation.MAXIMUM else (inner, bound))
                 facts[clamped], clamped = number, inner
             if facts and clamped == number:
-                return [self._of((difference.result,), ordered, facts)]
+                further: dict[Operand, Operand] = {}
+                for low, high in ordered:
+                    if (low, high) in self._not_above:
+                        facts[self._not_above[low, high]] = ONE
+                    if (high, low) in self._below:
+                        facts[self._below[high, low]] = ZERO
+                    if (high, low) in self._not_above:
+                        further[self._not_above[high, low]] = ZERO
+                return [_Case((difference.result, *further), facts | further)]
         return []
 
 

@@ -79,11 +79,6 @@ def invoked(call: ast.expr) -> tuple[str, list[ast.expr], int] | None:
     return None
 
 
-def typed(source: KernelSource, calls: Mapping[str, TypedKernel]) -> TypedKernel:
-    """The types of a function; `calls` are the functions that it calls."""
-    return _Inference(source, calls).result()
-
-
 def returns_of(source: KernelSource) -> list[ast.Return]:
     """The return statements of a function."""
     return [node for node in ast.walk(source.node) if isinstance(node, ast.Return)]
@@ -115,7 +110,7 @@ class _Inference:
         names = {n.id for n in ast.walk(source.node) if isinstance(n, ast.Name) and isinstance(n.ctx, ast.Store)}
         self.locals = dict.fromkeys(names - {*source.arguments}, ElementType.FLAG)
 
-    def result(self) -> TypedKernel:
+    def typed(self) -> TypedKernel:
         """The function with its types."""
         known = -1
         while known != len(self.integers):
@@ -257,3 +252,8 @@ def stored_names(nodes: list[ast.stmt]) -> Iterator[str]:
             yield node.id
         elif isinstance(node, ast.Subscript) and isinstance(node.ctx, ast.Store) and isinstance(node.value, ast.Name):
             yield node.value.id
+
+
+def typed(source: KernelSource, calls: Mapping[str, TypedKernel]) -> TypedKernel:
+    """The types of a function; `calls` are the functions that it calls."""
+    return _Inference(source, calls).typed()

@@ -6,27 +6,10 @@ By enumeration with bounds, the search of predictive control with a finite contr
 import numba
 
 from ....core import Status
-from .calls import PART, invoke, pointer
+from .calls import invoke, pointer
 from .matrices import exponential_step
 
 DONE, NOT_FINITE = Status.DONE.value, Status.NOT_FINITE.value
-
-
-@PART
-def tracking_cost(y, wanted, weights):
-    """The weighted sum of the squared errors."""
-    cost = 0.0
-    for i in range(y.shape[0]):
-        cost += weights[i] * (y[i] - wanted[i]) ** 2
-    return cost
-
-
-@PART
-def keep_best(cost, sequence, best):
-    """Keep a complete sequence and its cost."""
-    best[0] = cost
-    for k in range(1, best.shape[0]):
-        best[k] = sequence[k]
 
 
 @numba.njit(error_model="numpy", fastmath={"contract", "reassoc"}, nogil=True)
@@ -68,14 +51,19 @@ def choose_mode(
         for i in range(total):
             later[i] = x[i] + sizes[i] * e[i, total] if i < n else x[i]
         invoke(measured, (pointer(later), pointer(u), pointer(c), pointer(y), pointer(slopes)))
-        cost += tracking_cost(y, wanted, weights)
+        error = 0.0
+        for i in range(y.shape[0]):
+            error += weights[i] * (y[i] - wanted[i]) ** 2
+        cost += error
         if not cost < best[0]:
             continue
         depth += 1
         costs[depth] = cost
         if depth == horizon:
             count[1] += 1
-            keep_best(cost, sequence, best)
+            best[0] = cost
+            for k in range(1, best.shape[0]):
+                best[k] = sequence[k]
             depth -= 1
         else:
             sequence[depth + 1] = -1

@@ -85,15 +85,6 @@ def _find_range(table, column, lower, upper, place):
 
 
 @PART
-def _is_finite(table):
-    """Whether all values of a table are finite; read as one vector, because rows are short."""
-    values, defects = as_vector(table), 0
-    for i in range(values.size):
-        defects += not abs(values[i]) <= 1.7976931348623157e308
-    return defects == 0
-
-
-@PART
 def _rows_before(times, row, end):
     """The first row from `row` on that is not before `end`, found in growing and then in shrinking strides."""
     count, stride = times.shape[0], 1
@@ -160,7 +151,10 @@ def record(function, c, states, times, begin, ends, values, slopes, inputs, outp
             _find_range(states, column, lower, upper, place)
         else:
             _find_range(outputs, column - n, lower, upper, place)
-    if _is_finite(outputs):
+    all_outputs, defects = as_vector(outputs), 0  # one vector, because rows are short
+    for i in range(all_outputs.size):
+        defects += not abs(all_outputs[i]) <= 1.7976931348623157e308
+    if defects == 0:
         return count
     for row in range(count):
         for i in range(k):

@@ -43,21 +43,6 @@ def predict_extended(rates, c, sizes, h, noise, x, u, covariance, transition, f,
 
 
 @PART
-def update_covariance(rest, product, gain, noise, covariance):
-    """The covariance after a measurement in Joseph's form: rest P rest^T + gain R gain^T; product = rest P."""
-    total, p = gain.shape
-    for i in range(total):
-        for j in range(i + 1):
-            value = 0.0
-            for k in range(total):
-                value += product[i, k] * rest[j, k]
-            for k in range(p):
-                value += gain[i, k] * noise[k] * gain[j, k]
-            covariance[i, j] = value
-            covariance[j, i] = value
-
-
-@PART
 def apply_gain(gain, difference, x):
     """Add gain (N, p) times the innovation to the states."""
     for i in range(x.shape[0]):
@@ -95,7 +80,15 @@ def correct_extended(
                 value -= gain[i, k] * c[k, j]
             rest[i, j] = value
     multiply(rest, covariance, product)
-    update_covariance(rest, product, gain, noise, covariance)
+    for i in range(total):  # in Joseph's form: rest P rest^T + gain R gain^T
+        for j in range(i + 1):
+            value = 0.0
+            for k in range(total):
+                value += product[i, k] * rest[j, k]
+            for k in range(p):
+                value += gain[i, k] * noise[k] * gain[j, k]
+            covariance[i, j] = value
+            covariance[j, i] = value
     apply_gain(gain, difference, x)
     return DONE
 
@@ -134,24 +127,6 @@ def weighted_mean(points, weights, mean):
         for q in range(1, points.shape[0]):
             value += weights[2] * points[q, i]
         mean[i] = value
-
-
-@PART
-def covariances_of_measurement(points, y, x, mean, weights, noise, s, cross):
-    """Covariance `s` (p, p) of the measurement, and `cross` (N, p) of states and measurement."""
-    for j in range(mean.shape[0]):
-        for i in range(mean.shape[0]):
-            value = noise[i] if i == j else 0.0
-            for q in range(points.shape[0]):
-                weight = weights[2] if q else weights[1]
-                value += weight * (y[q, i] - mean[i]) * (y[q, j] - mean[j])
-            s[i, j] = value
-        for i in range(x.shape[0]):
-            value = 0.0
-            for q in range(points.shape[0]):
-                weight = weights[2] if q else weights[1]
-                value += weight * (points[q, i] - x[i]) * (y[q, j] - mean[j])
-            cross[i, j] = value
 
 
 @numba.njit(error_model="numpy", fastmath={"contract", "reassoc"}, nogil=True)
@@ -198,10 +173,19 @@ def correct_unscented(
     for q in range(points.shape[0]):
         invoke(measured, (pointer(points[q]), pointer(u), pointer(constants), pointer(y[q]), pointer(c)))
     weighted_mean(y, weights, difference)
-    covariances_of_measurement(points, y, x, difference, weights, noise, s, cross)
-    for i in range(total):
-        for j in range(p):
-            gain[i, j] = cross[i, j]
+    for j in range(p):
+        for i in range(p):
+            value = noise[i] if i == j else 0.0
+            for q in range(points.shape[0]):
+                weight = weights[2] if q else weights[1]
+                value += weight * (y[q, i] - difference[i]) * (y[q, j] - difference[j])
+            s[i, j] = value
+        for i in range(total):  # covariance of states and measurement
+            value = 0.0
+            for q in range(points.shape[0]):
+                weight = weights[2] if q else weights[1]
+                value += weight * (points[q, i] - x[i]) * (y[q, j] - difference[j])
+            cross[i, j] = gain[i, j] = value
     if cholesky(s, factor) != DONE:
         return SINGULAR
     for i in range(total):

@@ -187,18 +187,6 @@ def write_columns(chosen, row, states, o, u, rows):
                 rows[j, lane, row] = u[i - n - k, lane]
 
 
-@PART
-def finish(y, final, status):
-    """The final states and the status of each lane."""
-    n, width = y.shape
-    for lane in range(width):
-        size = 0.0
-        for i in range(n):
-            final[lane, i] = y[i, lane]
-            size += abs(y[i, lane])
-        status[lane] = DONE if size < 1e300 else NOT_FINITE
-
-
 @numba.njit(error_model="numpy", nogil=True)
 def lanes(
     prepare, step, outputs, p, c, y, other, u, base, w, h, o, ends, values, slopes, first, last, begin, length, times,
@@ -249,7 +237,12 @@ def lanes(
             write_columns(chosen, row, other, o, u, rows)
         else:
             write_columns(chosen, row, y, o, u, rows)
-    finish(y, final, status)
+    for lane in range(width):
+        size = 0.0
+        for i in range(n):
+            final[lane, i] = y[i, lane]
+            size += abs(y[i, lane])
+        status[lane] = DONE if size < 1e300 else NOT_FINITE
     return DONE
 
 

@@ -17,20 +17,6 @@ LARGEST = 1.7976931348623157e308
 
 
 @PART
-def measure_lanes(y, o, measured_at, measured, k, samples, status):
-    """Write the measured columns of all lanes, also among the samples; a lane without a number fails."""
-    n = y.shape[0]
-    for i in range(measured_at.shape[0]):
-        at = measured_at[i]
-        for lane in range(y.shape[1]):
-            x = y[at, lane] if at < n else o[at - n, lane]
-            if not abs(x) <= LARGEST:
-                status[lane] = NOT_FINITE
-            measured[i, lane] = x
-            samples[k, i, lane] = x
-
-
-@PART
 def copy_table(source, target):
     """Copy a table of its size; an assignment of slices would need numba at run time."""
     for i in range(target.shape[0]):
@@ -141,9 +127,10 @@ def loop_lanes(
     samples, commands       (K, .., W) measurements and commands of every interval
     bounds, status, stop    (n,); (W,) DONE, or NOT_FINITE for a lane whose run failed somehow; as in `lanes`
     """
+    n, width = y.shape
     needs_outputs = False
     for i in range(measured_at.shape[0]):
-        needs_outputs = needs_outputs or measured_at[i] >= y.shape[0]
+        needs_outputs = needs_outputs or measured_at[i] >= n
     status[:] = DONE
     invoke(prepare, (pointer(p), pointer(c)))
     row = 0
@@ -152,7 +139,13 @@ def loop_lanes(
             return INTERRUPTED
         if needs_outputs:
             invoke(outputs, (pointer(y), pointer(u), pointer(c), pointer(o)))
-        measure_lanes(y, o, measured_at, measured, k, samples, status)
+        for i in range(measured_at.shape[0]):
+            at = measured_at[i]
+            for lane in range(width):
+                x = y[at, lane] if at < n else o[at - n, lane]
+                if not abs(x) <= LARGEST:
+                    status[lane] = NOT_FINITE
+                measured[i, lane] = samples[k, i, lane] = x
         copy_table(setpoints[k], setpoint)
         invoke(sample, (
             pointer(measured), pointer(setpoint), pointer(memory), pointer(low), pointer(high), pointer(period),

@@ -179,21 +179,6 @@ def is_solution(q, k, lane, values, other_values):
     return balanced and values[4, lane] > 0.0 and other_values[4, lane] > 0.0
 
 
-@PART
-def store_new(n, x, y, span, solutions, stored):
-    """Store a solution unless it is known; the number of solutions."""
-    known = False
-    for k in range(min(stored, solutions.shape[1])):
-        distance = max(abs(solutions[n, k, 0] - x), abs(solutions[n, k, 1] - y))
-        known = known or distance <= 1e-7 * span
-    if not known:
-        if stored < solutions.shape[1]:
-            solutions[n, stored, 0] = x
-            solutions[n, stored, 1] = y
-        stored += 1
-    return stored
-
-
 @numba.njit(error_model="numpy", nogil=True)
 def pair_solutions(
     first, second, low, high, point, wanted_q, wanted_k, levels, solutions, counts, arguments, values, other_values,
@@ -233,5 +218,12 @@ def pair_solutions(
                 done = largest <= 1e-15 * span or (iteration > 3 and largest <= 1e-13 * span)
             for lane in range(used):
                 if is_solution(q, k, lane, values, other_values):
-                    stored = store_new(n, x[lane], y[lane], span, solutions, stored)
+                    known = False
+                    for each in range(min(stored, solutions.shape[1])):
+                        near = max(abs(solutions[n, each, 0] - x[lane]), abs(solutions[n, each, 1] - y[lane]))
+                        known = known or near <= 1e-7 * span
+                    if not known:
+                        if stored < solutions.shape[1]:
+                            solutions[n, stored, 0], solutions[n, stored, 1] = x[lane], y[lane]
+                        stored += 1
         counts[n] = stored

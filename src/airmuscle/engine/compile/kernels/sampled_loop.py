@@ -37,23 +37,6 @@ def measure(outputs, y, applied, c, o, measured_at, measured):
 
 
 @PART
-def limit_commands(command, low, high):
-    """Limit each command to the range of its input; DONE, or NON_FINITE_COMMAND."""
-    status = DONE
-    for i in range(command.shape[0]):
-        x = 0.0 + command[i]
-        if low[i] > x:
-            x = low[i]
-        if high[i] < x:
-            x = high[i]
-        if not abs(x) <= LARGEST:
-            status = NON_FINITE_COMMAND
-            break
-        command[i] = x
-    return status
-
-
-@PART
 def take_sample(
     outputs, y, applied, c, o, measured_at, sample, setpoint, low, high, period, parameters, controlled, memory,
     measured, command, progress,
@@ -75,11 +58,19 @@ def take_sample(
             ))  # fmt: skip
     progress[WAITING] = NOTHING
     if status == DONE and controlled:
-        if sample != 0 or waited:
-            status = limit_commands(command, low, high)
-        else:
-            status = PAUSED
+        if sample == 0 and not waited:
             progress[WAITING] = COMMANDS
+            return PAUSED
+        for i in range(command.shape[0]):
+            x = 0.0 + command[i]
+            if low[i] > x:
+                x = low[i]
+            if high[i] < x:
+                x = high[i]
+            if not abs(x) <= LARGEST:
+                status = NON_FINITE_COMMAND
+                break
+            command[i] = x
     return status
 
 

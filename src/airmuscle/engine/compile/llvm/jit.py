@@ -101,22 +101,8 @@ def build(kernel: Any, kinds: Sequence[str]) -> bytes:
         return b""  # arrays are passed in another way, or it raises
     if not returned <= {numba.int64, numba.none}:
         return b""
-    return _emit(f"{text}\n{entry_point(functions[0].name, kinds)}", functions[0].name)
-
-
-def _numba_type(kind: str) -> Any:
-    import numba
-
-    item = {"q": numba.int64, "d": numba.float64, "f": numba.float32}[kind[0]]
-    return numba.types.Array(item, int(kind[1:]), "C") if len(kind) > 1 else item
-
-
-def _emit(text: str, inner: str) -> bytes:
-    """Machine code of `entry` and of the functions that it calls; empty if the module does not contain all of them."""
-    import llvmlite.binding as llvm
-
-    module, machine = llvm.parse_assembly(text), native(3)
-    module.get_function(inner).linkage = "internal"
+    module, machine = llvm.parse_assembly(f"{text}\n{entry_point(functions[0].name, kinds)}"), native(3)
+    module.get_function(functions[0].name).linkage = "internal"
     passes = llvm.create_new_module_pass_manager()
     passes.add_global_dead_code_eliminate_pass()
     passes.run(module, llvm.create_pass_builder(machine, llvm.create_pipeline_tuning_options()))
@@ -125,6 +111,13 @@ def _emit(text: str, inner: str) -> bytes:
         return b""
     code: bytes = machine.emit_object(module)
     return code
+
+
+def _numba_type(kind: str) -> Any:
+    import numba
+
+    item = {"q": numba.int64, "d": numba.float64, "f": numba.float32}[kind[0]]
+    return numba.types.Array(item, int(kind[1:]), "C") if len(kind) > 1 else item
 
 
 @contextlib.contextmanager
@@ -189,7 +182,15 @@ def entry_point(function: str, kinds: Sequence[str]) -> str:
         else:
             dimensions = int(kind[1:])
             item = _ITEM_SIZES[kind[0]]
-            lines += _load_array(x, dimensions, item, slot)
+            lines += _load(f"{x}.data", "ptr", slot)
+            for k in range(dimensions):
+                lines += _load(f"{x}.shape{k}", "i64", slot + 1 + k)
+            stride = str(item)
+            for k in reversed(range(dimensions)):
+                lines.append(f"{x}.stride{k} = add i64 {stride}, 0")
+                lines.append(f"{x}.size{k} = mul i64 {stride}, {x}.shape{k}")
+                stride = f"{x}.size{k}"
+            lines.append(f"{x}.items = sdiv i64 {stride}, {item}")
             passed.append(f"ptr null, ptr null, i64 {x}.items, i64 {item}, ptr {x}.data")
             passed += [f"i64 {x}.shape{k}" for k in range(dimensions)]
             passed += [f"i64 {x}.stride{k}" for k in range(dimensions)]
@@ -200,16 +201,3 @@ def entry_point(function: str, kinds: Sequence[str]) -> str:
 
 def _load(name: str, kind: str, slot: int) -> list[str]:
     return [f"{name}.at = getelementptr i8, ptr %slots, i64 {8 * slot}", f"{name} = load {kind}, ptr {name}.at"]
-
-
-def _load_array(x: str, dimensions: int, item: int, slot: int) -> list[str]:
-    """Data, shape, and from these the strides and the number of items."""
-    lines = _load(f"{x}.data", "ptr", slot)
-    for k in range(dimensions):
-        lines += _load(f"{x}.shape{k}", "i64", slot + 1 + k)
-    stride = str(item)
-    for k in reversed(range(dimensions)):
-        lines.append(f"{x}.stride{k} = add i64 {stride}, 0")
-        lines.append(f"{x}.size{k} = mul i64 {stride}, {x}.shape{k}")
-        stride = f"{x}.size{k}"
-    return [*lines, f"{x}.items = sdiv i64 {stride}, {item}"]
