@@ -70,12 +70,8 @@ def _evaluate_traced(obj: Any, method: str, arguments: tuple[Any, ...]) -> tuple
 def _call_traced(
     function: Any, parameters: Sequence[Any], arguments: Sequence[Any]
 ) -> tuple[list[Any], tuple[int, ...]]:
-    """Return the outputs of a traced function at numbers or arrays, all numbers of one point after the other, and the
-    shape of the points.
-
-    Parameters may be arrays as well, for example one value per plant. The outputs are rows without structural zeros;
-    with buffers a call takes half the time that it takes with matrices.
-    """
+    """The outputs of a traced function at numbers or arrays, without structural zeros, point by point, and the shape of
+    the points. Parameters may be arrays, too. With buffers a call takes half the time that it takes with matrices."""
     many = any(isinstance(value, np.ndarray) and value.size > 1 for value in parameters)
     broadcast = np.broadcast_arrays(*(np.asarray(x, dtype=float) for x in (*arguments, *(parameters if many else ()))))
     shape, size, count = broadcast[0].shape, broadcast[0].size, len(arguments)

@@ -150,11 +150,8 @@ def _is_list(value: Any) -> bool:
 
 
 def _check_value(owner: str, declared: Parameter, value: Any) -> Any:
-    """Return the value as float or tuple of floats; a text with a unit is converted to SI units.
-
-    An AbsolutePressure remains one. Raises ParameterError if it is not finite or out of bounds, UnitError if the unit
-    has another dimension.
-    """
+    """The value as float, AbsolutePressure or tuple of these, a text with a unit in SI units. Raises ParameterError if
+    it is not finite or out of bounds, UnitError if the unit has another dimension."""
     low, high = declared.bounds
     if type(value) is float and low <= value <= high and (value == 0.0 or declared.plausible <= abs(value) < math.inf):
         return value

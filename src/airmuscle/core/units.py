@@ -155,10 +155,8 @@ def _convert_with_pint(unit: str, target: str, where: str) -> UnitConversion:
 
 
 def _angle_factor(given: Any, wanted: Any, unit: str, target: str, where: str) -> float:
-    """1 for units that count angles and bits alike, which are ratios to pint; 2 pi between frequency and angular speed.
-
-    A torque per angle may be written without the angle, N m s. Raises UnitError for an angle in place of a ratio.
-    """
+    """1 for units that count angles and bits alike, which are ratios to pint, and for a torque per angle without the
+    angle, N m s; 2 pi between frequency and angular speed. Raises UnitError for an angle in place of a ratio."""
     counted, expected = _counted(given), _counted(wanted)
     if counted == expected or (not counted and expected == {"radian": -1}):
         return 1.0

@@ -174,10 +174,7 @@ def _print_along(
     printer: Printer, name: str, values: Values, arguments: Sequence[str], target: str, last: Values | None = None,
     moving: Values | None = None,
 ) -> None:  # fmt: skip
-    """A function that writes values, their derivatives by every column, and the final values.
-
-    To the derivatives, those of `moving` along the slopes in time of V are added.
-    """
+    """A function that writes values, their derivatives along columns plus those of `moving` by W, and final values."""
     t, block, along = values.t, FunctionBody(), values.along(values.results)
     computed = values.compute(printer, block, [*values.results, *along.parts], arguments)
     columns = along.rows(computed, t.rows(block, "x"), t.input_rows(block))

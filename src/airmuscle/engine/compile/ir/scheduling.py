@@ -70,10 +70,8 @@ def _needs(item: Item) -> Iterable[Operand]:
 
 
 def _turns(code: Code, items: Sequence[Item]) -> list[float]:
-    """Priority of each item: the original position of an instruction, the position before the first use of a block.
-
-    Calls of the C library are executed as early as possible, because values in registers do not survive a call.
-    """
+    """Priority of each item: the original position of an instruction, the position before the first use of a block;
+    calls of the C library come first, because values in registers do not survive them."""
     place = {line.result: k for k, line in enumerate(code.body)}
     first: dict[Operand, int] = {}
     for k, line in enumerate(code.body):

@@ -164,10 +164,7 @@ class _Search:
     def _superfluous(
         self, known: Mapping[Operand, Operand], kept: set[Operand]
     ) -> tuple[set[Operand], dict[Operand, Operand]]:
-        """Redundant results, given the known ones; and the known values of those that remaining instructions use.
-
-        The results in `kept` are always computed.
-        """
+        """Redundant results, none of `kept`, given the known ones; the known values of those that others use."""
         times: dict[Operand, int] = {}
 
         def asked(operand: Operand, more: int = 0) -> int:

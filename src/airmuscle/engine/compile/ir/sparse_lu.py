@@ -76,11 +76,8 @@ def _factorise(a: dict[Place, Any], order: Sequence[int]) -> None:
 
 
 def _order(places: Iterable[Place], size: int) -> tuple[int, ...]:
-    """The order of elimination: always the state with the smallest possible fill-in (Markowitz criterion).
-
-    Of several, the one with the shortest chain of preceding eliminations, so that independent eliminations run in
-    parallel.
-    """
+    """The order of elimination: the state with the smallest possible fill-in (Markowitz criterion), then with the
+    shortest chain of eliminations before it, so that independent ones run in parallel."""
     rows = [{j for i, j in places if i == k and j != k} for k in range(size)]
     columns = [{i for i, j in places if j == k and i != k} for k in range(size)]
     depth, left, order = [0] * size, set(range(size)), []
