@@ -60,10 +60,10 @@ def test_files_have_300_lines_at_most():
     assert {name for name, n in lengths.items() if n > 300} == set()
 
 
-def test_the_package_has_530_files_and_90_500_lines_at_most():
+def test_the_package_has_510_files_and_86_000_lines_at_most():
     """The limits fall with the package; what adds a file joins another one to the file that uses it."""
-    assert len(FILES) <= 530
-    assert sum(len(path.read_text(encoding="utf-8").splitlines()) for path in FILES) <= 90_500
+    assert len(FILES) <= 510
+    assert sum(len(path.read_text(encoding="utf-8").splitlines()) for path in FILES) <= 86_000
 
 
 def body_length(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:

@@ -205,8 +205,12 @@ def test_a_polynomial_volume_has_a_range_without_infinite_slopes_and_without_zer
         ChebyshevGeometry((1e-4,), 0.0, 0.2, 0.2)
 
 
-def test_the_fibre_tension_of_straight_fibres_is_unbounded():
-    assert law_of("saga2007").shell_tension(1e5, 0.0) > 1e100
+def test_equilibria_and_fibre_tensions_at_the_ends():
+    law = law_of("saga2007")
+    for point in ((np.nan, 100.0), (1e5, np.inf)):
+        with pytest.raises(ParameterError, match=r"Saga2007.equilibria: .* must be finite"):
+            law.equilibria(*point)
+    assert law.shell_tension(1e5, 0.0) > 1e100
 
 
 def test_the_range_of_a_short_pleated_tube_ends_where_the_search_for_its_outline_ends():

@@ -1,9 +1,11 @@
 """Saga, Nakamura and Yaegashi 2007: straight-fibre rubber muscle in closed form, in all interpretations."""
 
 import functools
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
-from ....core import ParameterError, Reference, Value, model, ops, parameter
+import numpy as np  # noqa: TID251  (polynomial roots are never traced)
+
+from ....core import ParameterError, Reference, Value, as_finite_float, autodiff, model, ops, parameter
 from ..geometry.base import check_contraction_range
 from ..geometry.meridian import SAGA_2007, Parabola
 from ..geometry.straight_fibre import FibreSum, HalfShellFibreSum, StraightFibre
@@ -17,8 +19,18 @@ LINE_B = RubberLine(slope=0.3e6, intercept=0.1263e6)
 """Rubber with slope and intercept exchanged; 1.03 MPa at strain 3, the corner of the axes of Fig. 4."""
 RUBBER_TEST_STRAIN = 3.0
 """Maximum strain of the rubber test of Fig. 4; the line is extrapolated above it."""
+
+
 _MIN_SLOPE = 1e-200
 """Lower bound of the slope in a denominator, which avoids a division by zero for straight fibres."""
+
+
+class EquilibriumPoint(NamedTuple):
+    """Contraction in equilibrium with a pressure and a load."""
+
+    contraction: float
+    stable: bool
+    """Whether the equilibrium pressure increases with contraction; if it decreases, the muscle snaps through."""
 
 
 @model
@@ -159,6 +171,27 @@ class Saga2007(RubberLaw, PressureLaw):
             texts.append("the volume decreases with contraction but the tension is positive: energy is not conserved")
         return tuple(texts)
 
+    def equilibria(self, pressure: float, force: float) -> tuple[EquilibriumPoint, ...]:
+        """All contractions from 0 to 1 in equilibrium with a gauge pressure [Pa] and a load [N], in ascending order.
+
+        With the rubber integrated along the axis they are roots of one quintic, so that none is missed. Beyond
+        `contraction_range` they are mathematical solutions without physical meaning. Raises ParameterError for
+        another rubber integral, and for a pressure or a load that is not finite.
+        """
+        if not isinstance(self.rubber_integral, AxialIntegral):
+            raise ParameterError(
+                "Saga2007: the equilibria are roots of a polynomial only if the rubber is integrated along the axis; "
+                "use rubber_integral=AxialIntegral(), or the method `contraction`."
+            )
+        for name, value in (("pressure", pressure), ("force", force)):
+            as_finite_float(f"Saga2007.equilibria: {name}", value)
+        roots = sorted({c for c in _quintic_roots(self, pressure, force) if 0.0 <= c < 1.0})
+        return tuple(EquilibriumPoint(c, self._is_stable(c, force)) for c in roots)
+
+    def _is_stable(self, contraction: float, force: float) -> bool:
+        point = max(contraction, 1e-12)  # the slope is infinite at zero
+        return bool(autodiff.derivative(self, "equilibrium_pressure", point, force) > 0)
+
     def _check_contraction(self, contraction: Value) -> None:
         """Raise GeometryLimitError if a contraction is out of range, unless the model is being traced."""
         if not ops.is_symbol(self.wall_thickness):
@@ -166,7 +199,7 @@ class Saga2007(RubberLaw, PressureLaw):
             check_contraction_range(contraction, self.contraction_range, "Saga2007", remark)
 
     def _below_threshold_message(self, pressure: float, force: float) -> str:
-        from_rest = "Equilibria that are not reached from rest follow from `equilibrium_pressure(contraction, force)`."
+        from_rest = "Equilibria that are not reached from rest are returned by `equilibria(pressure, force)`."
         return f"{super()._below_threshold_message(pressure, force)} {from_rest}"
 
 
@@ -177,3 +210,32 @@ def _pole(law: Saga2007) -> float:
     while (middle := (low + high) / 2) not in (low, high):
         low, high = (middle, high) if law._terms(middle)[0] > 0 else (low, middle)
     return low
+
+
+def _quintic_roots(law: Saga2007, pressure: float, force: float) -> list[float]:
+    """Contractions with a B = A_2 l^2 + A_0, from (3) squared: 24 (l_0 - l)(A_2 l^2 + A_0)^2 = B^2 l^3."""
+    tube, m, w, q = law.geometry, law.fibres, law.projection_factor, law.slope_factor
+    d, t, m_sum = tube.end_diameter, law.wall_thickness, law.fibre_sum.sum_of_sines(law.fibres)
+    a2 = m * (w * pressure * d - 2 * t * law.rubber.slope) * tube.fibre_length**2
+    a0 = -3 * ops.pi * m_sum * d**3 / q * pressure - 12 * d * m_sum * force / q
+    b = 6 * m * d * (2 * t * law.rubber.intercept - w * pressure * d) * tube.fibre_length
+    # polynomial in x = l/l_0, coefficients in descending order
+    square = np.array([a2 * a2, 0.0, 2 * a2 * a0, 0.0, a0 * a0])
+    quintic = np.polysub(24 * np.polymul([-1.0, 1.0], square), [b * b, 0.0, 0.0, 0.0])
+    roots = np.roots(quintic)
+    real = roots.real[(abs(roots.imag) < 1e-7) & (roots.real > 0) & (roots.real <= 1)]
+    contractions = [1.0 - x for x in real if b * (a2 * x * x + a0) >= 0]
+    return [_refine_root(law, float(c), pressure, force) for c in contractions]
+
+
+def _refine_root(law: Saga2007, contraction: float, pressure: float, force: float) -> float:
+    """Return the root after up to two Newton steps on the model itself, as long as they reduce the residual."""
+    for _ in range(2):
+        if not 0.0 < contraction < 1.0:
+            break
+        residual = law.equilibrium_pressure(contraction, force) - pressure
+        refined = contraction - residual / autodiff.derivative(law, "equilibrium_pressure", contraction, force)
+        if not 0.0 < refined < 1.0 or abs(law.equilibrium_pressure(refined, force) - pressure) >= abs(residual):
+            break
+        contraction = float(refined)
+    return contraction
