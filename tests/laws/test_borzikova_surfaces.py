@@ -105,6 +105,11 @@ def test_solutions_are_searched_within_the_validity_range():
         EXPONENTIAL.pressure(0.25, 260.0)
 
 
+def test_points_outside_the_validity_range_are_flagged():
+    pressure, force = np.array([-1.0, 0.0, 2e5, 3.5e5, 3.6e5, 2e5]), np.array([100, 45, 44, 260, 100, 261.0])
+    assert EXPONENTIAL.inside_validity_range(pressure, force).tolist() == [False, True, False, True, False, False]
+
+
 def test_outside_the_validity_range_the_exponent_is_extrapolated_linearly():
     at_edge = EXPONENTIAL.polynomial(3.5e5, 150.0)
     slope = autodiff.derivative(EXPONENTIAL, "polynomial", 3.5e5 - 1e-6, 150.0, wrt=0)

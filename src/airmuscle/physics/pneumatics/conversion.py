@@ -1,6 +1,6 @@
-"""Sonic conductance C from other flow figures of data sheets; combined valves.
+"""Conversion between the sonic conductance C and other flow figures of data sheets; combined valves.
 
-The flow laws use C [m3/(s Pa)]. All figures are proportional to it, except that the diameter is so to its root.
+The flow laws use C [m3/(s Pa)]. The functions of each pair are inverse to each other.
 
     nominal flow    volume flow at the reference atmosphere of ISO 8778 from 6 to 5 bar gauge, ambient pressure 1 bar:
                     Q = C p1 phi(p2/p1), p1 = 7 bar, p2 = 6 bar absolute; reproduces SMC's tables of C, b and Q exactly
@@ -40,34 +40,47 @@ _KV_AREA: float = 1.0 / 3600.0 / ops.sqrt(2.0 * 1e5 / 1000.0)
 """Area [m2] of Kv = 1: 1 m3/h of water, 1000 kg/m3, at 1 bar."""
 
 
+def nominal_flow(conductance: float, critical_ratio: float) -> float:
+    """Nominal volume flow [m3/s] at the reference atmosphere, from 6 to 5 bar gauge. Raises ParameterError."""
+    return flow_at_reference(conductance, critical_ratio, NOMINAL_UPSTREAM, NOMINAL_DOWNSTREAM)
+
+
 def conductance_from_nominal_flow(volume_flow: float, critical_ratio: float) -> float:
     """C [m3/(s Pa)] from the nominal flow [m3/s] at the reference atmosphere. Raises ParameterError."""
     return conductance_from_flow(volume_flow, critical_ratio, NOMINAL_UPSTREAM, NOMINAL_DOWNSTREAM)
 
 
+def flow_at_reference(conductance: float, critical_ratio: float, upstream: float, downstream: float) -> float:
+    """Volume flow [m3/s] at the reference atmosphere between two absolute pressures [Pa], for air at 293.15 K.
+
+    Raises ParameterError for a value that is not positive and finite, or if `downstream` is not less than `upstream`.
+    """
+    return _positive("conductance", conductance) * _unit_flow(critical_ratio, upstream, downstream)
+
+
 def conductance_from_flow(volume_flow: float, critical_ratio: float, upstream: float, downstream: float) -> float:
     """C [m3/(s Pa)] from a volume flow [m3/s] at the reference atmosphere between two absolute pressures [Pa].
 
-    The air has 293.15 K. Raises ParameterError for a value that is not positive and finite, or if `downstream` is not
-    less than `upstream`.
+    Raises ParameterError as `flow_at_reference`.
     """
-    _positive("volume_flow", volume_flow)
-    _positive("upstream pressure", upstream)
-    _positive("downstream pressure", downstream)
-    if not downstream < upstream:
-        raise ParameterError(
-            f"the downstream pressure is {downstream:g} Pa; it must be less than the upstream pressure of {upstream:g} "
-            "Pa (both absolute)."
-        )
-    mass_flow = Valve(1e-8, critical_ratio).mass_flow(upstream, downstream, 1.0, REFERENCE_TEMPERATURE)
-    return volume_flow / float(mass_flow / (REFERENCE_DENSITY * 1e-8))
+    return _positive("volume_flow", volume_flow) / _unit_flow(critical_ratio, upstream, downstream)
+
+
+def kv(conductance: float, critical_ratio: float) -> float:
+    """Kv [m3/h] from the sonic conductance. Raises ParameterError."""
+    mass_flow = _positive("conductance", conductance) * REFERENCE_DENSITY * _REFERENCE_SPEED
+    return mass_flow / (_KV_AREA * _near_equal_factor(critical_ratio))
 
 
 def conductance_from_kv(kv: float, critical_ratio: float) -> float:
     """C [m3/(s Pa)] from Kv [m3/h]. Raises ParameterError."""
-    _positive("Kv", kv)
-    ratio = Valve(1e-8, critical_ratio).critical_ratio  # Valve declares the bounds
-    return kv * _KV_AREA * float(ops.sqrt(1.0 - ratio)) / (REFERENCE_DENSITY * _REFERENCE_SPEED)
+    area = _positive("Kv", kv) * _KV_AREA
+    return area * _near_equal_factor(critical_ratio) / (REFERENCE_DENSITY * _REFERENCE_SPEED)
+
+
+def cv(conductance: float, critical_ratio: float) -> float:
+    """Cv [US gallons per minute] from the sonic conductance. Raises ParameterError."""
+    return kv(conductance, critical_ratio) / KV_PER_CV
 
 
 def conductance_from_cv(cv: float, critical_ratio: float) -> float:
@@ -75,19 +88,26 @@ def conductance_from_cv(cv: float, critical_ratio: float) -> float:
     return conductance_from_kv(KV_PER_CV * _positive("Cv", cv), critical_ratio)
 
 
+def effective_area(conductance: float) -> float:
+    """Effective area S [m2] from the sonic conductance. Raises ParameterError."""
+    return _positive("conductance", conductance) * REFERENCE_DENSITY * _REFERENCE_SPEED / _NOZZLE_FACTOR
+
+
 def conductance_from_area(area: float) -> float:
     """C [m3/(s Pa)] from the effective area S [m2]. Raises ParameterError."""
     return _positive("area", area) * _NOZZLE_FACTOR / (REFERENCE_DENSITY * _REFERENCE_SPEED)
 
 
+def diameter(conductance: float, discharge_coefficient: float) -> float:
+    """Diameter [m] of the round hole with the same choked flow. Raises ParameterError."""
+    _check_discharge_coefficient(discharge_coefficient)
+    return float(ops.sqrt(effective_area(conductance) / discharge_coefficient * 4.0 / ops.pi))
+
+
 def conductance_from_diameter(diameter: float, discharge_coefficient: float) -> float:
     """C [m3/(s Pa)] of a round hole from its diameter [m] and discharge coefficient. Raises ParameterError."""
     _positive("diameter", diameter)
-    if _positive("discharge coefficient", discharge_coefficient) > 1.0:
-        raise ParameterError(
-            f"discharge coefficient is {discharge_coefficient:g}; it must be at most 1 (about 0.6 for a sharp-edged "
-            "hole)."
-        )
+    _check_discharge_coefficient(discharge_coefficient)
     return conductance_from_area(discharge_coefficient * ops.pi / 4.0 * diameter**2)
 
 
@@ -105,11 +125,35 @@ def leak_valve(
     return Valve(conductance, critical_ratio)
 
 
+def _unit_flow(critical_ratio: float, upstream: float, downstream: float) -> float:
+    """Volume flow [m3/s] at the reference atmosphere for C = 1, by the law of `Valve` including its laminar chord."""
+    _positive("upstream pressure", upstream)
+    _positive("downstream pressure", downstream)
+    if not downstream < upstream:
+        raise ParameterError(
+            f"the downstream pressure is {downstream:g} Pa; it must be less than the upstream pressure of {upstream:g} "
+            "Pa (both absolute)."
+        )
+    law = Valve(1e-8, critical_ratio)
+    return float(law.mass_flow(upstream, downstream, 1.0, REFERENCE_TEMPERATURE) / (REFERENCE_DENSITY * 1e-8))
+
+
 def _positive(what: str, value: float) -> float:
     """The value. Raises ParameterError unless it is a finite number greater than zero."""
     if isinstance(value, bool) or not isinstance(value, float | int) or not 0.0 < value < float("inf"):
         raise ParameterError(f"{what} is {value!r}; it must be a finite number greater than zero.")
     return value
+
+
+def _check_discharge_coefficient(value: float) -> None:
+    if _positive("discharge coefficient", value) > 1.0:
+        raise ParameterError(
+            f"discharge coefficient is {value:g}; it must be at most 1 (about 0.6 for a sharp-edged hole)."
+        )
+
+
+def _near_equal_factor(critical_ratio: float) -> float:
+    return float(ops.sqrt(1.0 - Valve(1e-8, critical_ratio).critical_ratio))  # Valve declares the bounds
 
 
 def in_series(*valves: Valve) -> Valve:

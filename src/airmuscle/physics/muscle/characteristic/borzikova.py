@@ -125,6 +125,11 @@ class _PolynomialSurface(ContractionLaw):
         """Validity range in force [N]; solutions are searched within it."""
         return (self.min_force, self.max_force)
 
+    def inside_validity_range(self, pressure: Value, force: Value) -> Value:
+        """Return whether gauge pressure [Pa] and force [N] are within the validity range."""
+        in_pressure = ops.both(pressure >= self.min_pressure, pressure <= self.max_pressure)
+        return ops.both(in_pressure, ops.both(force >= self.min_force, force <= self.max_force))
+
     def polynomial(self, pressure: Value, force: Value) -> Value:
         """Sum_ij a_ij p^i F^j at gauge pressure [Pa] and force [N]; linear extrapolation outside the validity range."""
         inner_p = ops.clip(pressure, self.min_pressure, self.max_pressure)
@@ -147,8 +152,9 @@ class BorzikovaDirect(_PolynomialSurface):
     """Polynomial contraction surface: k = Sum_{i=0..m} Sum_{j=0..n} a_ij p^i F^j.
 
     k: contraction in per cent; p: gauge pressure in bar; F: load in N; m = 4 and n = 2 give the 15 coefficients of the
-    printed matrix. Outside the validity range the surface is extrapolated linearly. Reference: Borzíková et al., the
-    printed matrix, which belongs to this polynomial and not to the exponent of equation (1).
+    printed matrix. Outside the validity range the surface is extrapolated linearly; `inside_validity_range` tests for
+    it. Reference: Borzíková et al., the printed matrix, which belongs to this polynomial and not to the exponent of
+    equation (1).
     """
 
     def contraction(self, pressure: Value, force: Value) -> Value:
