@@ -10,7 +10,7 @@ import numpy as np
 from ...core import Array, ParameterError, Reference, check_whole, published
 from ...engine.compile.cache.kernel import Kernel
 from ...recording.recording import Recording
-from .state_estimator import StateEstimate, StateEstimator
+from .state_estimator import UNDEFINED, StateEstimate, StateEstimator
 
 _predict_extended = Kernel("predict_extended", "kalman_filter")
 _correct_extended = Kernel("correct_extended", "kalman_filter")
@@ -36,17 +36,17 @@ class ExtendedKalmanFilter(StateEstimator):
 
     def transition(self, state: Array, inputs: Sequence[float]) -> tuple[Array, Array]:
         """The state (n,) one sample later, and its derivative by the state now (n, n)."""
-        known = StateEstimate(state, np.zeros((len(state), len(state))))
-        later, (matrix,) = self._computed("predict", known, inputs, ("transition",))
-        return later.mean, matrix
+        bound = self._filled(StateEstimate(state, np.zeros((len(state), len(state)))), inputs)
+        status, matrix = bound.predict(), bound.transition.copy()
+        return self._taken(bound, status).mean, matrix
 
     def observation(self, state: Array, inputs: Sequence[float]) -> tuple[Array, Array]:
         """The measured columns (p,) at a state (n,), and their derivative by it (p, n)."""
-        known, zero = StateEstimate(state, np.zeros((len(state), len(state)))), np.zeros(len(self.measured))
-        _, (missing, slopes) = self._computed(
-            "correct", known, inputs, ("difference", "slopes"), (zero, self.variances)
-        )
-        return -missing, slopes
+        bound = self._filled(StateEstimate(state, np.zeros((len(state), len(state)))), inputs)
+        bound.values[:], bound.variances[:] = 0.0, self.variances
+        status, columns, slopes = bound.correct(), -bound.difference, bound.slopes.copy()
+        self._taken(bound, status, UNDEFINED)
+        return columns, slopes
 
     def smooth(self, recording: Recording, first: StateEstimate) -> dict[str, Array]:
         """The columns of `estimate`, where each row also knows all later measurements: for records, not for control.

@@ -18,6 +18,8 @@ from .lqg_and_adrc import DISTURBANCE, check_numbers
 
 UNKNOWN = 1e30
 """Factor of the variance of a missing measurement."""
+UNDEFINED = "the covariance is not positive definite"
+"""Why a correction fails."""
 
 
 class StateEstimate(NamedTuple):
@@ -186,7 +188,8 @@ class StateEstimator(ShortRepr, abc.ABC):
 
         Raises SolveError where the rates are not finite.
         """
-        return self._computed("predict", estimate, inputs)[0]
+        bound = self._filled(estimate, inputs)
+        return self._taken(bound, bound.predict())
 
     def correct(
         self, estimate: StateEstimate, values: Sequence[float], inputs: Sequence[float]
@@ -205,10 +208,11 @@ class StateEstimator(ShortRepr, abc.ABC):
             )
         here = ~np.isnan(given)
         # a missing value counts with a variance beside which nothing is known
-        measured = np.where(here, given, 0.0), np.where(here, 1.0, UNKNOWN) * self.variances
-        names = ("difference", "difference_covariance")
-        corrected, (difference, covariance) = self._computed("correct", estimate, inputs, names, measured)
-        innovation = Innovation(difference[here], covariance[np.ix_(here, here)])
+        bound = self._filled(estimate, inputs)
+        bound.values[:], bound.variances[:] = np.where(here, given, 0.0), np.where(here, 1.0, UNKNOWN) * self.variances
+        status = bound.correct()
+        innovation = Innovation(bound.difference[here], bound.difference_covariance[np.ix_(here, here)])
+        corrected = self._taken(bound, status, UNDEFINED)
         if self.gate < 1.0 and here.any():
             from scipy.special import chdtri
 
@@ -273,23 +277,19 @@ class StateEstimator(ShortRepr, abc.ABC):
     def _parameter_values(self) -> dict[str, float]:
         return {leaf.path: float(leaf.value) for leaf in tree.leaves(self.plant) if leaf.path in self.parameters}
 
-    def _computed(
-        self, step: str, estimate: StateEstimate, inputs: Sequence[float], names: Sequence[str] = (),
-        measured: tuple[Array, Array] | None = None,
-    ) -> tuple[StateEstimate, list[Array]]:  # fmt: skip
-        """The estimate after the step "predict", or "correct" by values and variances (p,), and arrays by name."""
+    def _filled(self, estimate: StateEstimate, inputs: Sequence[float]) -> SimpleNamespace:
+        """A bound filter that no other thread uses, at an estimate."""
         bound = self._idle.pop() if self._idle else self._bind()
         bound.mean[:], bound.covariance[:], bound.inputs[:] = estimate.mean, estimate.covariance, inputs
-        if measured is not None:
-            bound.values[:], bound.variances[:] = measured
-        status = getattr(bound, step)()
-        later = StateEstimate(bound.mean.copy(), bound.covariance.copy())
-        arrays = [getattr(bound, name).copy() for name in names]
+        return bound
+
+    def _taken(self, bound: SimpleNamespace, status: int, reason: str = "") -> StateEstimate:
+        """The estimate that a bound filter has computed; it is free again. Raises SolveError with a reason."""
+        estimate = StateEstimate(bound.mean.copy(), bound.covariance.copy())
         self._idle.append(bound)
         if status != Status.DONE:
-            reason = Status(status).message if step == "predict" else "the covariance is not positive definite"
             raise SolveError(
-                f"{type(self).__name__}: the step failed, because {reason}. Check the measured values, the first "
-                "estimate and the noise."
+                f"{type(self).__name__}: the step failed, because {reason or Status(status).message}. Check the "
+                "measured values, the first estimate and the noise."
             )
-        return later, arrays
+        return estimate

@@ -232,6 +232,10 @@ class Solution(NotebookDisplay):
             return self
         raise SimulationError(self.diagnostics[-1].message, self, interrupted=self.status == Status.INTERRUPTED)
 
+    def to_pandas(self) -> Any:
+        """The recording as a data frame of pandas."""
+        return self.recording.to_pandas()
+
     def plot(self, *names: str, ax: Any = None) -> Any:
         """Plot the named columns, or all, over time, as `Recording.plot`, with the units of the system."""
         units = column_units(self.problem.system, [])
