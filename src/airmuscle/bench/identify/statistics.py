@@ -118,16 +118,17 @@ def fit_statistics(problem: FitProblem, solution: LeastSquaresSolution, loss: Lo
     """Estimates and their covariance, rank and condition of a solution, as fields of a `Fit`. Raises
     IdentificationError where the design matrix is rank-deficient."""
     design, active = check_determined(problem, solution), problem.active_rows(solution.modelled)
-    low, high = problem.bounds_reached(solution.values)
-    on_bound = low | high
+    on_bound, counted = ~design.columns, design
     residuals = problem.residuals(solution.modelled)[active]
     sigma, influences = _residual_std(residuals, design.norms.size, loss)
-    complete = _Design.of(problem, solution, np.ones(on_bound.size, dtype=bool)) if on_bound.any() else design
-    counted = design if complete.null.any() else complete
+    if on_bound.any():
+        complete = _Design.of(problem, solution, np.ones(on_bound.size, dtype=bool))
+        counted = design if complete.null.any() else complete
     covariance = estimate_covariance(
         counted.basis, counted.matrix, influences, sigma, runs.rows(active), counted.columns
     )
     if counted is not design:
+        low, high = problem.bounds_reached(solution.values)
         covariance = covariance.within_bounds(low, high, -counted.matrix.T @ influences)
     standard_errors, correlations = covariance.of_parameters()
     standard_errors[on_bound], correlations[on_bound], correlations[:, on_bound] = np.nan, np.nan, np.nan
