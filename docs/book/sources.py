@@ -53,7 +53,8 @@ def site_text(text: str, depth: int = 0) -> str:
     pieces = FENCED.split(text)
     for i in range(0, len(pieces), 2):
         pieces[i] = typeset_symbols(INDENTED.sub(_formula_block, pieces[i]))
-    return _links("".join(pieces), depth)
+    up = "../" * depth
+    return _links("".join(pieces), up).replace("](../docs/images/", f"]({up}images/")
 
 
 def typeset_symbols(prose: str) -> str:
@@ -78,9 +79,8 @@ def _formula_block(match: re.Match[str]) -> str:
     return displayed(joined_lines("\n".join(lines)))
 
 
-def _links(text: str, depth: int) -> str:
-    """Links of the repository as links of the site; what is not part of it is shown without link."""
-    up = "../" * depth
+def _links(text: str, up: str = "") -> str:
+    """Links of the repository as links of the site, from below `up`; what is not part of it is shown without link."""
 
     def replaced(match: re.Match[str]) -> str:
         label, target = match[1], match[2]
@@ -122,7 +122,7 @@ def index(contents: tuple[Part, ...]) -> str:
         lists.append("\n".join(items) + "\n")
         pages = "\n".join([*(_document(item.target) for item in part.items), *extra])
         trees.append(f"```{{toctree}}\n:hidden:\n:caption: {part.title}\n\n{pages}\n```\n")
-    return "\n".join([head.replace("@repository@", _repository()), *(_links(text, 0) for text in lists), *trees])
+    return "\n".join([head.replace("@repository@", _repository()), *(_links(text) for text in lists), *trees])
 
 
 def _repository() -> str:

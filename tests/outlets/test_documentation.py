@@ -6,6 +6,7 @@ The generators of the site run here; Sphinx itself only in the slow test, if it 
 from __future__ import annotations
 
 import dataclasses
+import itertools
 import json
 import re
 import subprocess
@@ -66,8 +67,17 @@ def test_a_link_without_a_target_is_found(tmp_path: Path):
 def test_the_table_of_contents_of_the_site_has_all_pages():
     text = index(parts())
     trees = "\n".join(re.findall(r"```\{toctree\}(.*?)```", text, re.DOTALL)).splitlines()
-    assert {path.stem for path in documents()} <= set(trees)
+    assert {path.stem for path in documents()} | {name.removesuffix(".md") for name in COPIED} <= set(trees)
     assert {"models/index", "commands/index", "functions/index"} <= set(trees)
+
+
+@pytest.mark.parametrize("name", COPIED)
+def test_a_page_from_outside_docs_has_its_images_and_skips_no_level_of_headings(name: str):
+    text = site_text((ROOT / name).read_text("utf-8"), depth=name.count("/"))
+    levels = [len(marks) for marks in re.findall(r"^(#+) ", re.sub(r"^```.*?^```", "", text, flags=re.M | re.S), re.M)]
+    assert all(after <= before + 1 for before, after in itertools.pairwise(levels))
+    images = re.findall(r"!\[[^\]]*\]\(([^)]+)\)", text)
+    assert [image for image in images if not (DOCS / image.removeprefix("../" * name.count("/"))).exists()] == []
 
 
 # Reference
