@@ -80,7 +80,7 @@ def entry_tables(name_or_path: str | Path, kind: type[Any] | None = None) -> tup
 
 def _tables_of_name(name: str, kind: type[Any] | None) -> tuple[dict[str, Any], Location]:
     """The tables of the entry of this kind, or of any, with a name or a unique beginning of it, and their location."""
-    if kind is Entry:
+    if kind is Entry and name not in list_names(FOLDERS[NOUNS[Entry]]):
         noun = next((noun for noun, folder in FOLDERS.items() if name in list_names(folder)), NOUNS[Entry])
         if noun == NOUNS[ProductEntry]:
             laws = ", ".join(entries_of_product(name))
