@@ -4,6 +4,7 @@ too, is solved there."""
 from __future__ import annotations
 
 import json
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from airmuscle import Recording, load, load_data
 from airmuscle.bench import write
 from airmuscle.design import dask_cluster
 from airmuscle.engine import solve
+from airmuscle.errors import InputError
 from airmuscle.files import load_scenario
 
 COMMANDS = {
@@ -84,6 +86,15 @@ def test_no_command_computes_without_the_cluster_that_it_was_given(folder: Path,
     result = airmuscle(*COMMANDS[name], "--out", folder / "there", "--dask", "nowhere://host")
     assert result.exit_code == 1, result.stdout
     assert "no response from a Dask scheduler at 'nowhere://host'" in result.stderr
+
+
+@pytest.mark.parametrize("address", ["nowhere://host", "host:port", "tls://127.0.0.1:9"])
+def test_an_address_that_cannot_be_used_leaves_no_client(address: str):
+    pytest.importorskip("distributed")
+    before = threading.active_count()
+    with pytest.raises(InputError, match="no response from a Dask scheduler"), dask_cluster(address):
+        raise AssertionError("the block is not entered")
+    assert threading.active_count() == before
 
 
 def test_a_worker_of_dask_solves_a_problem_that_was_sent_to_it(folder: Path, cluster: str):

@@ -3,6 +3,7 @@
 An executor has the interface of `concurrent.futures`; local processes are those of `engine.processes`.
 """
 
+import asyncio
 import contextlib
 import contextvars
 import hashlib
@@ -42,13 +43,25 @@ def dask_cluster(address: str) -> Iterator[Executor]:
         raise InputError(
             "a Dask cluster requires the packages dask and distributed. Install them: pip install airmuscle[cluster]"
         ) from None
+
+    async def connect() -> None:
+        client = distributed.Client(address, timeout=CONNECT_TIMEOUT, set_as_default=False, asynchronous=True)
+        try:
+            await client
+        finally:
+            await client.close()
+
+    # A client that fails to connect is closed only where it is asynchronous. The thread is for notebooks, whose own has
+    # a running loop.
     try:
-        client = distributed.Client(address, timeout=CONNECT_TIMEOUT, set_as_default=False)
-    except (OSError, ValueError, TimeoutError) as error:
+        with ThreadPoolExecutor(1) as thread:
+            thread.submit(asyncio.run, connect()).result()
+    except (OSError, ValueError, TypeError, ImportError) as error:
         raise InputError(
-            f"no response from a Dask scheduler at '{address}' ({type(error).__name__}). Start one with "
+            f"no response from a Dask scheduler at '{address}' ({type(error).__name__}: {error}). Start one with "
             "`dask scheduler` and specify the address that it prints, such as tcp://host:8786."
         ) from None
+    client = distributed.Client(address, timeout=CONNECT_TIMEOUT, set_as_default=False)
     with client, client.get_executor(pure=False) as executor:
         if not client.scheduler_info()["workers"]:
             raise InputError(f"the Dask cluster at '{address}' has no workers. Start one: dask worker {address}")
