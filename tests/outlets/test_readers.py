@@ -222,6 +222,22 @@ def test_the_struct_array_of_a_file_of_version_7_3_is_a_run_each(tmp_path: Path)
     assert (first.origin, second.origin, len(second)) == ("bench.mat, runs(1)", "bench.mat, runs(2)", 9)
 
 
+def test_a_file_of_version_7_3_that_another_program_wrote_is_read(tmp_path: Path):
+    """Classes as texts, a stored type and an array without values, none of which MATLAB writes, do not stop a reader."""
+    h5py = pytest.importorskip("h5py")
+    path = save_v73(tmp_path / "run.mat", mat_content())
+    with h5py.File(path, "r+") as file:
+        for item in file.values():
+            item.attrs["MATLAB_class"] = "double"
+        file["kind"] = np.dtype("f8")
+        file["none"] = np.zeros((0, TIME.size))
+        file["none"].attrs["MATLAB_class"] = "double"
+    (recording,) = read(path, ColumnMapping(units={"time": "s"}), downsampling=Decimation(TIME.size - 1))
+    assert len(recording) == -(-TIME.size // 2)
+    assert recording.constants["resting_length"] == pytest.approx(0.31)
+    assert "Not read: kind, which contains no real numbers." in recording.notes
+
+
 @pytest.mark.parametrize("shape", [(1, -1), (-1, 1)])
 def test_a_vector_that_matlab_writes_to_hdf5_has_one_row(tmp_path: Path, shape):
     h5py = pytest.importorskip("h5py")

@@ -146,8 +146,8 @@ class _Hdf5Reader:
 
     def _value(self, item: Any, place: str, in_cell: bool) -> Any:
         """A variable, a field or an element of a cell array; None if it is empty or not read."""
-        kind, is_dataset = _class_of(item), isinstance(item, self._h5py.Dataset)
-        if not is_dataset and "MATLAB_sparse" not in item.attrs:
+        kind, is_group = _class_of(item), isinstance(item, self._h5py.Group)
+        if is_group and "MATLAB_sparse" not in item.attrs:
             return self.fields(item, place, in_cell=in_cell)
         if _is_absent(item):
             return None
@@ -156,19 +156,21 @@ class _Hdf5Reader:
         if self._is_array(item):
             whole = np.asarray(item[()].T)
             return whole.reshape(-1) if whole.size == max(whole.shape, default=0) else whole
+        is_dataset = isinstance(item, self._h5py.Dataset)
         if is_dataset and item.dtype.kind in "biuf" and kind not in ("", "function_handle"):
             return float(item[()].item())
         if is_dataset and self._h5py.check_ref_dtype(item.dtype) is not None and item.size <= MAX_CELLS:
             return [self._value(self._file[each], place, True) for each in item[()].ravel()]
         kinds = {"cell": "a cell array", "function_handle": "a function"}
-        what = kinds.get(kind, "which contains no real numbers") if is_dataset else "a sparse matrix"
+        what = "a sparse matrix" if is_group else kinds.get(kind, "which contains no real numbers")
         self.notes.append(f"Not read: {place}, {what}.")
         return None
 
 
 def _is_absent(item: Any) -> bool:
     """Whether an item is empty, or an object, which is named elsewhere."""
-    return "MATLAB_empty" in item.attrs or item.attrs.get("MATLAB_object_decode", 0) == 3
+    without_values = "MATLAB_empty" in item.attrs or not getattr(item, "size", 1)
+    return without_values or item.attrs.get("MATLAB_object_decode", 0) == 3
 
 
 def _class_of(item: Any) -> str:
@@ -260,10 +262,9 @@ def _hdf5_objects(path: Path) -> Iterator[MatlabObject]:
     """The opaque variables of a file of version 7.3, whose reader states a missing package or a damage."""
     with contextlib.suppress(OSError, FileError), import_lab_package("h5py", path).File(path, "r") as file:
         for name, item in file.items():
-            class_name = item.attrs.get("MATLAB_class", b"").decode()
             is_opaque = item.attrs.get("MATLAB_object_decode", 0) == 3
-            if not name.startswith("#") and is_opaque and class_name not in _NUMERIC:
-                yield MatlabObject(name, class_name)
+            if not name.startswith("#") and is_opaque and _class_of(item) not in _NUMERIC:
+                yield MatlabObject(name, _class_of(item))
 
 
 def read_objects(path: Path, objects: Sequence[MatlabObject]) -> dict[str, Mapping[str, Any]]:

@@ -31,10 +31,10 @@ def read_mat_tables(
     If the vectors of a struct differ in length, those of the length of the mapped `columns` are read, or without any
     those of the length of the known quantities. A long variable is reduced while it is read.
     """
-    if is_plain_hdf5(path):
-        plain: tuple[RawTable, ...] = inspect.unwrap(read_hdf5_tables)(path, group, downsampling)
-        return plain
     with reading(path, "MATLAB"):
+        if is_plain_hdf5(path):
+            plain: tuple[RawTable, ...] = inspect.unwrap(read_hdf5_tables)(path, group, downsampling)
+            return plain
         contents, objects = read_contents(path, downsampling), find_objects(path)
         tables = read_objects(path, objects)
     unread = [each for each in objects if each.name not in tables]
