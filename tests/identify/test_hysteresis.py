@@ -33,6 +33,7 @@ from airmuscle.physics import (
     LoopScales,
     LuGre,
     MaxwellSlip,
+    NoFriction,
     PrandtlIshlinskii,
     VirtualWork,
 )
@@ -146,6 +147,13 @@ def test_without_friction_none_is_claimed():
     assert "do not justify" in fit_hysteresis(start_of(SLIP), isobaric(None, 1.0), static_curve=CURVE).verdict
 
 
+def test_a_law_without_a_parameter_is_compared_like_the_others():
+    fit = fit_hysteresis(NoFriction(), isobaric(SLIP), static_curve=CURVE)
+    assert fit.friction == NoFriction()
+    assert fit.rmse == pytest.approx(fit.rmse_without_friction, rel=1e-12)
+    assert not fit.justified
+
+
 def test_drifting_errors_count_as_few_rows():
     rng = np.random.default_rng(3)
     white, steps = rng.standard_normal(4000), rng.standard_normal(4000)
@@ -251,6 +259,11 @@ def test_runs_that_cannot_tell_are_refused():
         fit_hysteresis(SLIP, run, static_curve=CURVE, fitted_rows=np.arange(len(run)) < 4)
     with pytest.raises(IdentificationError, match="friction against shortening needs the resting length"):
         fit_hysteresis(SLIP, Recording(run.columns, "loop"), static_curve=CURVE)
+    with pytest.raises(IdentificationError, match="0 fitted rows along a path of 0 m"):
+        fit_hysteresis(SLIP, run.rows(slice(0, 0)), static_curve=CURVE)
+    gap = run.with_columns(contraction=np.where(np.arange(len(run)) == 60, np.nan, run["contraction"]))
+    with pytest.raises(IdentificationError, match="loop, row 61: the displacement is missing"):
+        fit_hysteresis(SLIP, gap, static_curve=CURVE)
     with pytest.raises(
         IdentificationError, match="the displacement of the friction is constant, so it cannot be identified"
     ):

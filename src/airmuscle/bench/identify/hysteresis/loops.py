@@ -243,12 +243,13 @@ def fit_hysteresis(
 
 def fit_series(friction: Friction, run: LoopSeries, second_run: LoopSeries | None) -> HysteresisFit:
     """The fit of `fit_hysteresis` to the series of a run, and of a second run of the same loop."""
-    free = free_parameters(friction)
-    if run.fitted_rows.sum() <= free + run.design_matrix.shape[1] + 2 or not np.ptp(run.path) > 0:
+    free, rows = free_parameters(friction), int(run.fitted_rows.sum())
+    length = float(np.ptp(run.path)) if run.path.size else 0.0
+    if rows <= free + run.design_matrix.shape[1] + 2 or not length > 0:
         raise IdentificationError(
-            f"{run.origin}: {int(run.fitted_rows.sum())} fitted rows along a path of {np.ptp(run.path):.3g} m "
-            f"cannot determine {free} parameters of {type(friction).__name__} and {run.design_matrix.shape[1]} of "
-            "the static curve. Give a run with a rising and a falling branch, or include more rows."
+            f"{run.origin}: {rows} fitted rows along a path of {length:.3g} m cannot determine {free} parameters of "
+            f"{type(friction).__name__} and {run.design_matrix.shape[1]} of the static curve. Give a run with a rising "
+            "and a falling branch, or include more rows."
         )
     fitted, undetermined = search_parameters(friction, (run,))
     return assess_fit(fitted, undetermined, run, second_run)
@@ -258,12 +259,15 @@ def make_loop_series(
     recording: Recording, static_curve: data.StaticCurve, friction_path: data.FrictionPath,
     fitted_rows: segment.Mask | None,
 ) -> LoopSeries:  # fmt: skip
-    """The arrays of a run for a fit of friction."""
-    target = recording["force"] - static_curve.known_force(recording)
-    finite = np.isfinite(target)
+    """The arrays of a run for a fit of friction. Raises IdentificationError where a displacement is missing."""
+    target, matrix = recording["force"] - static_curve.known_force(recording), static_curve.design_matrix(recording)
+    finite = np.isfinite(target) & np.isfinite(matrix).all(axis=1)
     rows = finite if fitted_rows is None else np.asarray(fitted_rows, dtype=bool) & finite
     path, time = friction_path.displacement(recording), recording.columns.get("time")
-    matrix, limits = static_curve.design_matrix(recording), data.data_limits(recording["force"], path, time, rows)
+    if (gaps := np.flatnonzero(~np.isfinite(path))).size:
+        where = f"{recording.origin}, row {gaps[0] + 1}"
+        raise IdentificationError(f"{where}: the displacement is missing, along which friction acts. Remove such rows.")
+    limits = data.data_limits(recording["force"], path, time, rows)
     series = LoopSeries(
         recording.origin, path, time, target, matrix, rows, segment.motion_direction(path, time), limits,
         recording.columns.get("pressure"), friction_path.axis,

@@ -197,7 +197,8 @@ def _fit_iteratively(
     limits = combine_limits(tuple(run.limits for run in runs))
     all_leaves = list(tree.leaves(friction))
     free = [i for i, leaf in enumerate(all_leaves) if leaf.declared.fitted]
-    start, low, high, sizes = zip(*(_search_coordinate(all_leaves[i], limits) for i in free), strict=True)
+    coordinates = [_search_coordinate(all_leaves[i], limits) for i in free]
+    start, low, high, sizes = np.reshape(coordinates, (-1, 4)).T.tolist()  # four empty lists where none is free
 
     def law(x: Sequence[float]) -> Friction:
         values = [leaf.value for leaf in all_leaves]
