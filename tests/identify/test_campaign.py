@@ -140,15 +140,28 @@ def test_records_that_cannot_be_used_state_the_reason():
     columns = MUSCLE.isobaric(3.0, RANDOM)
     without_length = {name: values for name, values in columns.items() if name != "length"}
     without_pressure = {name: values for name, values in columns.items() if name != "pressure"}
-    short = {name: values[:5] for name, values in columns.items()}
+    short, empty = ({name: values[:rows] for name, values in columns.items()} for rows in (5, 0))
+    gap = recording(columns, "e")
+    gap = gap.with_columns(contraction=np.where(np.arange(len(gap)) == 60, np.nan, gap["contraction"]))
     records = classify_records(
-        [recording(without_length, "a"), recording(without_pressure, "b"), recording(short, "c")]
-    )
+        [recording(without_length, "a"), recording(without_pressure, "b"), recording(short, "c"),
+         recording(empty, "d"), gap]
+    )  # fmt: skip
     assert all(record.kind is RecordKind.UNUSED for record in records)
     reasons = [record.reason for record in records]
     assert "contraction is not known" in reasons[0]
     assert reasons[1] == "no pressure column"
     assert "at least 8" in reasons[2]
+    assert "0 rows" in reasons[3]
+    assert reasons[4] == "values of the contraction are missing"
+
+
+def test_slow_runs_without_tension_give_no_static_law():
+    runs = [recording(MUSCLE.isobaric(bar, RANDOM, rows=100), f"{bar} bar") for bar in (1.0, 3.0)]
+    slack = [run.with_columns(force=np.zeros(len(run))) for run in runs]
+    campaign = identify_campaign(slack)
+    assert isinstance(campaign.static, LeftOutStage)
+    assert campaign.static.reason == "no slow run has a row with tension"
 
 
 def test_a_release_without_a_resting_length_is_not_used():

@@ -109,7 +109,7 @@ def static_levels(record: CampaignRecord) -> list[CampaignRecord]:
 def _cut_at_levels(record: CampaignRecord, sensors: Mapping[str, Sensor]) -> list[CampaignRecord]:
     """The steps of a held muscle to the supply and to ambient pressure, if it has more levels, and its other rows."""
     recording, levels = record.recording, list[tuple[float, int, int]]()
-    usable = all(name in recording for name in ("time", "pressure", "contraction"))
+    usable = len(recording) >= MIN_ROWS and all(name in recording for name in ("time", "pressure", "contraction"))
     if record.kind.is_static or not usable or not np.isfinite(recording["pressure"]).all():
         return [record]
     if _span(recording["contraction"]) > CONTRACTION_BAND:
@@ -143,6 +143,9 @@ def _classify(inspection: Inspection) -> CampaignRecord:
         return CampaignRecord(recording, RecordKind.UNUSED, unusable, inspection)
     if inspection.static_points is not None and "force" in recording:
         return CampaignRecord(recording, RecordKind.STATIC, inspection.static_points.description, inspection)
+    for name in ("time", "contraction"):  # along which friction and creep act
+        if name in recording and not np.isfinite(recording[name]).all():
+            return CampaignRecord(recording, RecordKind.UNUSED, f"values of the {name} are missing", inspection)
     if "time" in recording:
         steps = find_pressure_steps(recording, inspection.sensors)
         if steps and _span(recording["contraction"]) <= CONTRACTION_BAND:

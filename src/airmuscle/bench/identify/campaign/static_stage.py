@@ -191,11 +191,12 @@ def fit_static_stage(
     """Select and fit the static characteristic to the quasi-static rows of all records. The friction and creep forces
     along the motion of each record are added to the measured force, so that the law is that of the muscle without
     them."""
-    used = [record for record in records if record.kind.is_static]
-    if not used:
+    slow = [record for record in records if record.kind.is_static]
+    cleaned = {record: rows for record in slow if len(rows := freed_rows(record, friction, creep))}
+    if not cleaned:
         remedy = "record the force while the length changes slowly at constant pressure, at three pressures or more"
-        return LeftOutStage(NAME, "no record is a slow run with force and length", remedy)
-    cleaned = {record: rows for record in used if len(rows := freed_rows(record, friction, creep))}
+        reason = "no slow run has a row with tension" if slow else "no record is a slow run with force and length"
+        return LeftOutStage(NAME, reason, remedy)
     used, parts = list(cleaned), dict[CampaignRecord, Recording]()
     try:
         points = tuple(thin(rows, max(FIT_ROWS // len(used), MIN_FIT_ROWS)) for rows in cleaned.values())
