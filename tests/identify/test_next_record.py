@@ -55,7 +55,9 @@ def fill():
 def test_the_pair_of_valve_and_wall_with_the_greatest_correlation_is_separated(fill):
     ranking = rank_records(fill)
     assert ranking.pair == (VALVE, WALL)
-    assert abs(ranking.now.correlation) > 0.7
+    standard_errors, correlation = ranking.now
+    assert abs(correlation) > 0.7
+    assert ranking.now.worst == max(standard_errors)
     best = ranking.ranking[0]
     assert "whose valve is closed" in best.description
     assert abs(best.precision.correlation) < 0.5

@@ -29,11 +29,15 @@ MIN_GAIN = 1.5
 
 
 class PairPrecision(NamedTuple):
-    """Relative standard errors of two parameters, the `worst` of them, and their correlation."""
+    """Relative standard errors of two parameters and their correlation."""
 
     standard_errors: tuple[float, float]
-    worst: float
     correlation: float
+
+    @property
+    def worst(self) -> float:
+        """The greater of the two relative standard errors."""
+        return max(self.standard_errors)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -183,9 +187,10 @@ def _candidate_sensitivities(fit: DynamicFit, candidate: CandidateRecord, unknow
 
 
 def _precision(information: Array, names: Sequence[str], pair: tuple[str, str]) -> PairPrecision:
-    covariance, (i, k) = np.linalg.inv(information), [names.index(name) for name in pair]
+    covariance = np.linalg.inv(information)
+    i, k = (names.index(name) for name in pair)
     first, second = float(np.sqrt(covariance[i, i])), float(np.sqrt(covariance[k, k]))
-    return PairPrecision((first, second), max(first, second), float(covariance[i, k] / (first * second)))
+    return PairPrecision((first, second), float(covariance[i, k] / (first * second)))
 
 
 def _most_correlated(information: Array, names: Sequence[str]) -> tuple[str, str]:
