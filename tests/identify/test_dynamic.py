@@ -22,7 +22,7 @@ from airmuscle.bench import (
     locate_pressure_sensor,
 )
 from airmuscle.bench.identify.dynamic import DynamicProfile
-from airmuscle.core import tree
+from airmuscle.core import StateVariable, System, model, parameter, tree
 from airmuscle.engine import Schedule, simulate
 from airmuscle.engine.run import BoundIntegrator
 from airmuscle.errors import IdentificationError, ParameterError
@@ -44,6 +44,7 @@ from airmuscle.physics import (
     WithTubes,
     find_equilibrium,
 )
+from airmuscle.recording import Recording
 
 FILL = Schedule({"fill": ((0.1, 1.0), (1.0, 0.0)), "discharge": ((1.3, 1.0),)})
 SENSORS = {"pressure": 500.0, "position": 5e-5}
@@ -405,6 +406,35 @@ def test_friction_is_found_from_the_way_up_and_down():
     for estimate in fit.estimates:
         assert abs(estimate.value - truth(plant, estimate.name)) < 3.5 * estimate.stderr, estimate.name
     assert fit["muscle.friction.coulomb_force"].stderr < 1.0
+
+
+@model
+class Cooling(System):
+    """A body that takes the temperature of its surroundings."""
+
+    ambient: float = parameter("K", "T_a", "temperature of the surroundings", bounds=(1.0, 1e4))
+    time_constant: float = parameter("s", "tau", "time constant", bounds=(1e-3, 1e3))
+    states = (StateVariable("temperature", "K", 300.0),)
+    inputs = ()
+
+    def rates(self, state, inputs):
+        return {"temperature": (self.ambient - state["temperature"]) / self.time_constant}
+
+    def outputs(self, state, inputs):
+        return {}
+
+
+def test_a_system_of_any_kind_is_fitted_whatever_its_surroundings_are():
+    """The notes on ambient air are for plants with air."""
+    time = np.linspace(0.0, 5.0, 101)
+    record = Recording({"time": time, "temperature": 290.0 + 60.0 * np.exp(-time / 2.0)}, "cooling")
+    start = InitialConditions({"temperature": 350.0}, {"temperature": 350.0})
+    fit = fit_dynamic(
+        Cooling(290.0, 1.0), [Experiment(record, Schedule({}), start)], free=("time_constant",),
+        observed={"temperature": 0.1},
+    )  # fmt: skip
+    assert fit["time_constant"].value == pytest.approx(2.0, rel=1e-4)
+    assert not any("ambient" in note for note in fit.notes)
 
 
 # Bad input

@@ -176,7 +176,7 @@ def _build_result(problem: DynamicFitProblem, searches: Array, costs: Array) -> 
         *describe_bounds(estimates, jacobian, inverse, on_bound, problem.scales, problem.origins),
         *describe_optima(optima, estimates, costs, problem.margins),
         *_describe_model_error(problem, residuals, estimates, inner.size),
-        *describe_ambient([record for record, air in airs if air and air.pressure == Ambient().pressure]),
+        *describe_ambient([record for record, air in airs if getattr(air, "pressure", None) == Ambient().pressure]),
     ]
     return DynamicFit(problem, estimates, correlations, analysis, residual_std, costs, optima, tuple(notes))
 
