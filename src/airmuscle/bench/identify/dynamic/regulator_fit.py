@@ -148,9 +148,9 @@ def _refined(best: RegulatorFit, paths: tuple[str, ...], fitted: Fitted, rng: np
     failed, deviations = 0, np.zeros(len(paths))
     while failed < PATIENCE:
         attempt, failed = best, failed + 1
-        means = [float(np.mean(best.fit.residuals(i)["pressure"])) for i in range(len(best.zeros))]
-        zeros = tuple(zero - mean for zero, mean in zip(best.zeros, means, strict=True))
         with contextlib.suppress(IdentificationError):
+            means = [float(np.nanmean(best.fit.residuals(i)["pressure"])) for i in range(len(best.zeros))]
+            zeros = tuple(zero - mean for zero, mean in zip(best.zeros, means, strict=True))
             attempt = fitted(_perturbed(best.plant, paths, deviations), zeros)
         if attempt.fit.costs[0] < best.fit.costs[0]:
             failed = 0 if attempt.fit.costs[0] < GAINED * best.fit.costs[0] else failed
@@ -176,11 +176,13 @@ def _check_excitation(recording: Recording, noise: float) -> None:
                 f"{recording.origin}: no column '{name}'; a regulator is identified from time, setpoint and pressure. "
                 f"It has {', '.join(recording.columns)}. Rename one with a mapping file."
             )
-        if np.ptp(recording[name]) < MIN_RANGE * noise:
+        known = recording[name][np.isfinite(recording[name])]
+        change = float(np.ptp(known)) if known.size else 0.0
+        if change < MIN_RANGE * noise:
             raise IdentificationError(
-                f"{recording.origin}: {name} varies by {np.ptp(recording[name]) / 1e3:.3g} kPa only, less than "
-                f"{MIN_RANGE:g} standard deviations of the noise ({noise / 1e3:g} kPa). Record steps up and down over "
-                "the range of use, some of them reversed after 50 to 200 ms."
+                f"{recording.origin}: {name} varies by {change / 1e3:.3g} kPa only, less than {MIN_RANGE:g} standard "
+                f"deviations of the noise ({noise / 1e3:g} kPa). Record steps up and down over the range of use, some "
+                "of them reversed after 50 to 200 ms."
             )
 
 
@@ -196,15 +198,16 @@ def _settled_difference(recording: Recording) -> float:
     time = recording["time"] - recording["time"][0]
     at, _ = _changes(recording)
     since = time - at[np.searchsorted(at, time, side="right") - 1]
-    rows = (since >= SETTLED_AFTER) & (recording["setpoint"] > 0.0)
-    return float(np.median((recording["pressure"] - recording["setpoint"])[rows])) if rows.any() else 0.0
+    difference = recording["pressure"] - recording["setpoint"]
+    rows = (since >= SETTLED_AFTER) & (recording["setpoint"] > 0.0) & np.isfinite(difference)
+    return float(np.median(difference[rows])) if rows.any() else 0.0
 
 
 def _initial_regulator(recordings: Sequence[Recording], supply_pressure: float, volume: float) -> PressureRegulator:
     """A regulator whose orifices give about the greatest slopes of the records; the rest is chosen."""
     slopes = np.concatenate([np.gradient(r["pressure"], r["time"]) for r in recordings])
-    rise, fall = float(np.percentile(slopes, 99.5)), -float(np.percentile(slopes, 0.5))
-    top = max(float(r["pressure"].max()) for r in recordings) + 1e5
+    rise, fall = float(np.nanpercentile(slopes, 99.5)), -float(np.nanpercentile(slopes, 0.5))
+    top = max(float(np.nanmax(r["pressure"])) for r in recordings) + 1e5
     fill = Valve(max(2.0 * volume * rise / (1e5 * (supply_pressure + 1e5)), 1e-12), 0.2)
     discharge = Valve(max(2.0 * volume * fall / (1e5 * top), 1e-12), 0.2)
     supply, band = Supply(supply_pressure), 2.0 * rise / GAIN
