@@ -27,7 +27,7 @@ from airmuscle.bench import (
 )
 from airmuscle.core import leaves, with_parameters
 from airmuscle.engine import Rodas4
-from airmuscle.errors import ColumnError, ParameterError
+from airmuscle.errors import ColumnError, IdentificationError, ParameterError
 from airmuscle.files import load_scenario
 from airmuscle.files.library import StatedBand, predict_with_entry
 from airmuscle.physics import Dahl
@@ -237,6 +237,9 @@ def test_the_start_time_of_a_prediction_is_estimated_where_it_is_unknown(study):
     late = predict_dynamic(scenario.plant, experiment, {"pressure": 500.0})
     found = predict_dynamic(scenario.plant, experiment, {"pressure": 500.0}, own=(StartTime(0.05),))
     assert found.quantities[0].rms < 0.5 * late.quantities[0].rms
+    empty = dataclasses.replace(experiment, recording=run.rows(slice(0, 0)))
+    with pytest.raises(IdentificationError, match="the record has no rows"):
+        predict_dynamic(scenario.plant, empty, {"pressure": 0.0}, own=(StartTime(0.05),))
 
 
 @pytest.mark.parametrize(

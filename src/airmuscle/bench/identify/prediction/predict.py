@@ -268,8 +268,8 @@ def predict_dynamic(
 def _deviation(name: str, experiment: dynamic.Experiment, uncertainty: PlantUncertainty) -> float:
     if name in uncertainty.deviations:
         return float(uncertainty.deviations[name])
-    values = experiment.recording[name]
-    return ASSUMED_DEVIATION * float(np.nanmax(values) - np.nanmin(values)) or 1.0
+    values = [value for value in experiment.recording[name].tolist() if np.isfinite(value)]
+    return ASSUMED_DEVIATION * float(np.ptp(values or [0.0])) or 1.0
 
 
 def _with_estimates(fit: dynamic.DynamicFit, experiment: dynamic.Experiment) -> dynamic.Experiment:
