@@ -72,8 +72,8 @@ def solve_constrained_least_squares(matrix: Array, right: Array, rows: Array, mi
 
 
 _ROUNDING, MIN_SLOPE = 1e-9, 1e-9
-"""Slopes below this fraction of the maximum slope are rounding errors, and minimum slope of v on the validity range
-scaled to -1..1, so that rounding cannot change the sign; chosen."""
+"""Slopes below this fraction of the maximum slope are rounding errors, and minimum slope of v, and of a force surface
+by its maximum force, on the validity range scaled to -1..1, so that rounding cannot change the sign; chosen."""
 
 
 @dataclasses.dataclass(frozen=True)
