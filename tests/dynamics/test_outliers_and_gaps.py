@@ -186,6 +186,30 @@ def test_smoothed_estimates_of_a_lift_are_closer_than_filtered_ones():
     assert smoothed["force"][-1] == filtered["force"][-1]
 
 
+class Lag(System):
+    """y' = eps - y."""
+
+    states, inputs = (StateVariable("y", "1", 1.0),), ("contraction",)
+
+    def rates(self, state, inputs):
+        return {"y": inputs.get("contraction", 0.0) - state["y"]}
+
+    def outputs(self, state, inputs):
+        return {"double": 2.0 * state["y"]}
+
+
+class Decay(Lag):
+    inputs = ()
+
+
+@pytest.mark.parametrize(("plant", "end"), [(Lag(), 0.25), (Decay(), 0.0)], ids=["converted input", "no input"])
+def test_inputs_are_the_columns_of_a_recording_also_converted_ones_and_a_plant_may_have_none(plant, end):
+    judged = ExtendedKalmanFilter(plant, ("double",), 0.5, {}, {"double": 1.0})
+    columns = {"time": 0.5 * np.arange(40), "double": np.full(40, np.nan), "length": np.full(40, 0.15)}
+    record = am.Recording(columns, "test", {"resting_length": 0.2})
+    assert judged.estimate(record, judged.start({"y": 0.0}, {}))["y"][-1] == pytest.approx(end, abs=1e-6)
+
+
 # Moving horizon
 
 

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ...core import Array, ParameterError, ShortRepr, SolveError, Status, System, check_field_types, check_known, tree
-from ...core.system import check_system, select_prefix, state_vector
+from ...core.system import check_system, state_vector
 from ...engine.compile import AugmentedRates, CompiledSystem, augmented_rates, compile_system, states_and_outputs
 from ...engine.loop import COMMAND
 from ...recording.recording import Recording
@@ -246,9 +246,11 @@ class StateEstimator(ShortRepr, abc.ABC):
                 f"{type(self).__name__}.estimate: the rows must be {self.sample_time:g} s apart, or whole multiples of "
                 "it; simulate or resample with this interval."
             )
-        given = {**recording.columns, **select_prefix(COMMAND, recording.columns)}
-        names, none = self._compiled.description.input_names, np.zeros(time.size)
-        inputs = np.column_stack([np.asarray(given.get(name, none), dtype=float) for name in names])
+        inputs = np.zeros((time.size, self._compiled.sizes.inputs))
+        for i, name in enumerate(self._compiled.description.input_names):
+            known = [column for column in (f"{COMMAND}{name}", name) if column in recording]
+            if known:
+                inputs[:, i] = recording[known[0]]
         measured = np.column_stack([recording[name] for name in self.measured])
         return MeasuredRows(time, measured, np.vstack([inputs[:1], inputs[:-1]]), counts.astype(int))
 
