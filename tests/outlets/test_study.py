@@ -14,6 +14,7 @@ import ctypes
 import dataclasses
 import functools
 import importlib
+import io
 import multiprocessing
 import os
 import re
@@ -409,7 +410,12 @@ def test_a_damaged_chunk_is_computed_again(folder: Path, monkeypatch: pytest.Mon
     result = run(folder)
     file = folder / "out" / "chunks" / chunk.chunk_file_names(result.study)[2]
     whole = file.read_bytes()
-    for damaged in (whole[:-40], b"", whole[:200] + bytes(8) + whole[208:]):
+    with np.load(file) as arrays, io.BytesIO() as buffer:
+        np.savez(buffer, scalars=arrays["scalars"])
+        without_reasons = buffer.getvalue()
+    method = whole.index(b"PK\1\2") + 10
+    of_another_method = whole[:method] + b"c" + whole[method + 1 :]
+    for damaged in (whole[:-40], b"", whole[:200] + bytes(8) + whole[208:], without_reasons, of_another_method):
         file.write_bytes(damaged)
         assert computed_anew(folder, monkeypatch) == [2]
         assert file.read_bytes() == whole

@@ -6,7 +6,6 @@ computed.
 """
 
 import dataclasses
-import zipfile
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
 from pathlib import Path
@@ -64,6 +63,11 @@ failure_reasons  reason of each failed run (n,); empty for other runs
 series:NAME      each time series (n, T)
 """
 SERIES = "series:"
+
+
+def array_names(study: Study) -> list[str]:
+    """The names of the arrays of a chunk."""
+    return ["scalars", "failure_reasons", *with_prefix(SERIES, study.time_series)]
 
 
 def study_fingerprint(study: Study) -> str:
@@ -125,12 +129,12 @@ def write_chunk(chunk: Chunk, path: Path) -> None:
         np.savez(file, **chunk)  # type: ignore[arg-type]
 
 
-def read_chunk(path: Path) -> Chunk | None:
-    """The chunk in a file; None if the file is missing or damaged."""
+def read_chunk(study: Study, path: Path) -> Chunk | None:
+    """The chunk of a study in a file; None if the file is missing or damaged."""
     try:
         with np.load(path, allow_pickle=False) as file:
-            return dict(file)
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+            return {name: file[name] for name in array_names(study)}
+    except Exception:  # damage to any byte of an archive: it is computed again
         return None
 
 
@@ -155,7 +159,7 @@ def run_study(
     files = _chunk_files(study, Path(folder) / CHUNK_FOLDER) if folder is not None else []
     # before the workers start, so that kernels are compiled only once
     (nominal,) = simulate_all([study.template.scenario], study.metric_times)
-    chunks = {index: chunk for index, file in enumerate(files) if (chunk := read_chunk(file))}
+    chunks = {index: chunk for index, file in enumerate(files) if (chunk := read_chunk(study, file))}
     missing = [index for index in range(len(study.chunks)) if index not in chunks]
     done = len(study) - sum(len(study.chunks[index]) for index in missing)
     report = progress or (lambda done, total: None)
@@ -168,7 +172,7 @@ def run_study(
             write_chunk(chunk, files[index])
         done += len(study.chunks[index])
         report(done, len(study))
-    joined = {name: np.concatenate([chunks[i][name] for i in range(len(chunks))]) for name in chunks[0]}
+    joined = {name: np.concatenate([chunks[i][name] for i in range(len(chunks))]) for name in array_names(study)}
     return StudyResult(
         study,
         joined["scalars"],
@@ -194,4 +198,4 @@ def _chunk_files(study: Study, folder: Path) -> list[Path]:
 def count_finished_runs(study: Study, folder: Path | str) -> int:
     """The number of runs of a study that are saved in `folder`/chunks."""
     files = (Path(folder) / CHUNK_FOLDER / name for name in chunk_file_names(study))
-    return sum(len(runs) for runs, file in zip(study.chunks, files, strict=True) if read_chunk(file) is not None)
+    return sum(len(runs) for runs, file in zip(study.chunks, files, strict=True) if read_chunk(study, file))
