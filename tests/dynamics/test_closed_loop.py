@@ -570,6 +570,7 @@ def test_a_period_that_cannot_be_is_refused(period):
         ({"setpoint": Periodic(Schedule({"force": ()}), 1.0)}, "ControlLoop.setpoint names force"),
         ({"other_inputs": Schedule({"fill": ((0, 1),)})}, "'fill' is commanded by the controller and by other_inputs"),
         ({"drivers": {"fill": 3}}, "the driver of 'fill' is 3"),
+        ({"controller": PID("", "fill", 1.0), "setpoint": Schedule({})}, "ControlLoop.setpoint names nothing; the set"),
     ],
 )
 def test_a_loop_that_cannot_be_is_refused(changed, message):

@@ -105,7 +105,7 @@ class MotionFeedForward(OpenLoopLaw):
     position_gain: float = parameter("SI", "K_s", "command by the position", bounds=(-1e12, 1e12), default=0.0)
     position: str = ""
 
-    setpoints = named_in("speed", "acceleration", "position")
+    setpoints = named_in("speed", "acceleration", optional=("position",))
 
     def command(self, setpoints: Mapping[str, Value]) -> dict[str, Value]:
         motion = self.speed_gain * setpoints[self.speed] + self.acceleration_gain * setpoints[self.acceleration]
@@ -249,7 +249,7 @@ class StaticFeedForward(OpenLoopLaw):
     load_setpoint: str = ""
     acceleration_setpoint: str = ""
 
-    setpoints = named_in("position", "load_setpoint", "acceleration_setpoint")
+    setpoints = named_in("position", optional=("load_setpoint", "acceleration_setpoint"))
 
     @property
     def signal_units(self) -> dict[str, str]:

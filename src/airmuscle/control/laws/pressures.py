@@ -224,7 +224,7 @@ class AngleAndStiffness(ControlLaw):
         if self.speed_gain and not self.speed_column:
             raise ParameterError("AngleAndStiffness: speed_gain needs speed_column, such as 'angular_speed'.")
 
-    measured_columns = named_in("inverse.coordinate", "speed_column")
+    measured_columns = named_in("inverse.coordinate", optional=("speed_column",))
 
     @property
     def setpoints(self) -> tuple[str, ...]:

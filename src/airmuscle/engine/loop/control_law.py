@@ -64,12 +64,14 @@ class ControlLaw(Controller):
         return {name: ops.where(at_end, here[name], value) for name, value in measurement.setpoints.items()}
 
 
-def named_in(*fields: str) -> Any:
-    """A property: the names that these fields hold, without empty ones, `named_in("speed", "inverse.coordinate")`."""
-    return property(
-        lambda law: tuple(filter(None, (operator.attrgetter(field)(law) for field in fields))),
-        doc=f"The names in {', '.join(fields)}.",
-    )
+def named_in(*fields: str, optional: tuple[str, ...] = ()) -> Any:
+    """A property: the names that fields hold, as in `named_in("inverse.coordinate")`; an optional one may be empty."""
+
+    def names(law: Any) -> tuple[str, ...]:
+        further = (getattr(law, field) for field in optional)
+        return (*(operator.attrgetter(field)(law) for field in fields), *filter(None, further))
+
+    return property(names, doc=f"The names in {', '.join((*fields, *optional))}.")
 
 
 class EnclosingLaw(ControlLaw):
