@@ -24,6 +24,9 @@ from airmuscle.design import (
     MuscleChoice,
     SizingConditions,
     SizingResult,
+    by_air,
+    by_count,
+    by_diameter,
     by_length,
     by_reserve,
     catalogue,
@@ -438,6 +441,12 @@ def test_the_choices_are_ranked_by_air_then_length_and_by_other_criteria():
     assert lengths == sorted(lengths)
     reserves = [choice.design.reserve for choice in size_muscles(LIFT, SIX_BAR, entries, by_reserve).choices]
     assert reserves == sorted(reserves, reverse=True)
+
+
+@pytest.mark.parametrize("sort", [by_air, by_count, by_diameter, by_length, by_reserve])
+def test_a_criterion_is_a_function_of_a_choice_which_it_names_where_it_receives_something_else(sort):
+    with pytest.raises(ParameterError, match=f"{sort.__name__}: choice must be an instance of MuscleChoice; it is 'x'"):
+        sort("x")
 
 
 def test_every_entry_of_the_catalogue_is_a_choice_or_has_a_reason():

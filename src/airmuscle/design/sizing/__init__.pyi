@@ -6,7 +6,6 @@ from .requirement_and_choice import MuscleChoice as MuscleChoice
 from .requirement_and_choice import MuscleDesign as MuscleDesign
 from .requirement_and_choice import Requirement as Requirement
 from .requirement_and_choice import SizingConditions as SizingConditions
-from .requirement_and_choice import UnsuitableMuscle as UnsuitableMuscle
 from .requirement_and_choice import by_air as by_air
 from .requirement_and_choice import by_count as by_count
 from .requirement_and_choice import by_diameter as by_diameter
@@ -20,6 +19,7 @@ from .scenario import fill_valve as fill_valve
 from .scenario import scenario_text as scenario_text
 from .scenario import scenario_valves as scenario_valves
 from .search import SizingResult as SizingResult
+from .search import UnsuitableMuscle as UnsuitableMuscle
 from .search import catalogue as catalogue
 from .search import choose as choose
 from .search import size_muscles as size_muscles

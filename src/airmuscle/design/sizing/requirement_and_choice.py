@@ -2,7 +2,6 @@
 
 import dataclasses
 import math
-import operator
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from types import MappingProxyType
@@ -250,27 +249,28 @@ class MuscleChoice(ShortRepr):
         return self.muscle.diameter(self.design.contracted.contraction)
 
 
-@dataclasses.dataclass(frozen=True)
-class UnsuitableMuscle:
-    """A muscle that does not meet a requirement: the number that was tried, 0 for an unusable law, and the reason."""
-
-    name: str
-    count: int
-    reason: str
-
-
 SortKey = Callable[[MuscleChoice], float | None]
 """Criterion of a ranking: the smaller the better; a choice without a value is last."""
 
 
-by_air: SortKey = operator.attrgetter("air")
-"""Air of a cycle [kg]."""
-by_length: SortKey = operator.attrgetter("length")
-"""Nominal length [m]."""
-by_count: SortKey = operator.attrgetter("total_count")
-"""Number of all muscles."""
-by_diameter: SortKey = operator.attrgetter("diameter")
-"""Maximum outer diameter [m]."""
+def by_air(choice: MuscleChoice) -> float | None:
+    """Air of a cycle [kg]."""
+    return choice.air
+
+
+def by_length(choice: MuscleChoice) -> float:
+    """Nominal length [m]."""
+    return choice.length
+
+
+def by_count(choice: MuscleChoice) -> int:
+    """Number of all muscles."""
+    return choice.total_count
+
+
+def by_diameter(choice: MuscleChoice) -> float | None:
+    """Maximum outer diameter [m]."""
+    return choice.diameter
 
 
 def by_reserve(choice: MuscleChoice) -> float:

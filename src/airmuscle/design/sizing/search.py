@@ -13,7 +13,7 @@ from ...core import AirmuscleError, AirmuscleWarning, ParameterError, ShortRepr,
 from ...files.library import Entry, list_products, load_law, own_length, products_of_laws
 from ...physics.muscle import ElasticSeriesElement
 from ...physics.muscle.characteristic import validity_range_of
-from . import LiftRequirement, MuscleChoice, Requirement, SizingConditions, StaticMuscle, UnsuitableMuscle, by_air
+from . import LiftRequirement, MuscleChoice, Requirement, SizingConditions, StaticMuscle, by_air
 from .lengths import JointSearch, LiftSearch
 from .requirement_and_choice import SortKey, rank
 from .static_muscle import at_length, least_sufficient, length_range
@@ -23,6 +23,15 @@ LENGTHS = 49
 BISECTIONS = 7
 """Bisections of the fraction of a load or a stroke that can be reached, for a message (chosen)."""
 Search = LiftSearch | JointSearch
+
+
+@dataclasses.dataclass(frozen=True)
+class UnsuitableMuscle:
+    """A muscle that does not meet a requirement: the number that was tried, 0 for an unusable law, and the reason."""
+
+    name: str
+    count: int
+    reason: str
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
