@@ -377,7 +377,7 @@ def test_bad_bounds_are_refused(bounds, message):
         ({"objective": "robust"}, "give RobustObjective"),
         ({"objective": lambda metrics: 1.0}, r"the objective returned \(\); it must return \(16,\)"),
         ({"start": [{"gian": 1.0}]}, "start 0 names 'gian'"),
-        ({"start": [{"gain": 1.0}]}, "start 0 is outside the bounds"),
+        ({"start": [{"gain": 1.0}], "workers": 0}, "start 0 is outside the bounds"),  # before a process is started
         ({"start": [{"gain": 1e-5}] * 20}, "20 starts; at most"),
         ({"index": RootMeanSquareError(begin=0.5)}, "fewer than two samples follow begin"),
     ],

@@ -71,7 +71,7 @@ class PredictiveMemory(NamedTuple):
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class ObservedModel(ShortRepr):
-    """Model x_(k+1) = A x_k + B u_k of states and disturbances (n + d,), y = C x, with its observer and its rest.
+    """Model x_(k+1) = A x_k + B u_k of states and disturbances (n + d,), y = C x, with its observer and steady state.
 
     Deviations from an operating point, where the measured columns are `measured` (p,), the inputs `inputs` (m,) and the
     controlled columns `controlled` (q,); inputs in units of `input_sizes` (m,).

@@ -132,9 +132,10 @@ def tune(
     ranges = gain_ranges(family[0].controller, bounds)
     paths = tuple(each.path for each in ranges)
     evaluator = Evaluator(family, group_cases(family, index), paths, duration, index, integrator, start_time)
+    search = _Search(evaluator, ranges, objective, budget, progress or (lambda done, total: None))
+    given = search.given(start)
     with process_pool(workers) as executor:
-        search = _Search(evaluator, ranges, objective, budget, progress or (lambda done, total: None), executor)
-        interrupted = search.run(search.given(start), seed)
+        interrupted = search.run(given, seed, executor)
     if not search.values:
         raise KeyboardInterrupt
     gains, values = np.concatenate(search.gains), np.concatenate(search.values)
@@ -170,15 +171,13 @@ class _Search:
     """One search: it evaluates populations and records them."""
 
     def __init__(
-        self, evaluator: Evaluator, ranges: tuple[GainRange, ...], objective: Objective, budget: int,
-        progress: Progress, executor: Executor | None,
-    ) -> None:  # fmt: skip
+        self, evaluator: Evaluator, ranges: tuple[GainRange, ...], objective: Objective, budget: int, progress: Progress
+    ) -> None:
         self.evaluator, self.ranges, self.objective, self.progress = evaluator, ranges, objective, progress
         self.budget, self.sets = budget, budget // len(evaluator.cases)
         self.present_count, self.converged, self.reasons = 0, False, Counter[str]()
         self.gains, self.metrics, self.values = list[Array](), list[CaseMetrics](), list[Array]()
-        self._calls = DistributedCalls(executor, Evaluator.metrics, evaluator)
-        self._sets_of_a_task = self.sets if executor is None else SETS_OF_A_TASK
+        self._calls, self._sets_of_a_task = DistributedCalls(None, Evaluator.metrics, evaluator), self.sets
 
     @property
     def population(self) -> int:
@@ -204,10 +203,13 @@ class _Search:
             raise ParameterError(f"tune: {len(start)} starts; at most {self.population - 1} fit the first generation.")
         return points
 
-    def run(self, given: list[Array], seed: int) -> bool:
+    def run(self, given: list[Array], seed: int, executor: Executor | None) -> bool:
         """Search until two descents agree or the budget is used; whether the user interrupted."""
         from scipy.stats import qmc
 
+        if executor is not None:
+            self._calls = DistributedCalls(executor, Evaluator.metrics, self.evaluator)
+            self._sets_of_a_task = SETS_OF_A_TASK
         first = qmc.Sobol(d=len(self.ranges), scramble=True, seed=np.random.default_rng(seed)).random(self.population)
         first[: len(given)] = given if given else first[:0]
         random, ends, used = np.random.default_rng([seed, 1]), list[float](), list[Array]()
