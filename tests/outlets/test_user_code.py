@@ -1,15 +1,19 @@
-"""A controller of a user in a scenario file: its code runs with an explicit permission alone."""
+"""Code of a user, a controller in a scenario file or a law that is fitted: it runs with an explicit permission alone."""
 
 from __future__ import annotations
 
+import json
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from command_line import airmuscle
 
+from airmuscle.bench import write
 from airmuscle.errors import UnknownNameError
-from airmuscle.files import allow_code, load_scenario
+from airmuscle.files import allow_code, load, load_scenario
+from airmuscle.recording import Recording
 
 EXAMPLE_FILES = Path(__file__).parents[2] / "examples"
 LAW = '''"""A law of a user."""
@@ -76,7 +80,9 @@ def test_the_permission_ends_with_its_block(scenario):
 
 
 def test_tune_and_export_take_it(scenario):
+    """Also in worker processes, which import the module of the current folder."""
     options = ("--budget", "8", "--draws", "0", "--loads", "", "--supplies", "", "--leak", "0", "--delay", "0")
+    options = (*options, "--workers", "2")
     tuned = airmuscle("tune", scenario, "--allow-code", *options, "--bounds", "gain=0.1 1/bar:5 1/bar")
     assert tuned.exit_code == 0, tuned.output
     assert 'model = "user_laws:Zone"' in (scenario.parent / "loop-tuned.toml").read_text()
@@ -99,3 +105,81 @@ def test_what_is_no_model_is_refused(scenario, name, message):
     scenario.write_text(scenario.read_text().replace("user_laws:Zone", name))
     with allow_code(), pytest.raises(UnknownNameError, match=message):
         load_scenario(scenario)
+
+
+FITTED = '''"""Laws of a user that start themselves from data."""
+import airmuscle as am
+from airmuscle.core import model, parameter
+from airmuscle.physics import DataScales, ForceLaw
+
+
+@model
+class Linear(ForceLaw):
+    """F = p A (1 - eps/eps_max)."""
+
+    area: float = parameter("m2", "A", "effective area at rest", bounds=(0.0, 0.1))
+    max_contraction: float = parameter("1", "eps_max", "contraction without load", bounds=(0.01, 0.6))
+
+    @classmethod
+    def guess(cls, data):
+        scales = DataScales.of(data)
+        return cls(scales.force / scales.pressure, 1.5 * scales.contraction)
+
+    def force(self, pressure, contraction):
+        return pressure * self.area * (1.0 - contraction / self.max_contraction)
+
+
+@model
+class Bristle(am.friction.Dahl):
+    """Dahl's law under another name."""
+
+
+@model
+class Unstarted(am.friction.Dahl):
+    """A law that cannot be started."""
+
+    @classmethod
+    def guess(cls, scales):
+        return None
+'''
+
+
+@pytest.fixture
+def fitted_laws(tmp_path, monkeypatch):
+    """A folder with the module `fitted_laws`."""
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "fitted_laws.py").write_text(FITTED)
+    yield tmp_path
+    sys.modules.pop("fitted_laws", None)
+
+
+def test_a_law_of_a_user_takes_part_in_a_comparison_and_its_file_loads(fitted_laws):
+    pressure, contraction = (each.ravel() for each in np.meshgrid(np.linspace(1e5, 6e5, 6), np.linspace(0.0, 0.2, 7)))
+    force = 1.3e-3 * pressure * (1.0 - contraction / 0.31) + np.random.default_rng(1).normal(0.0, 0.5, pressure.size)
+    write(Recording({"pressure": pressure, "contraction": contraction, "force": force}, "linear"), "linear.csv")
+    given = ("fit", "linear.csv", "--characteristic", "fitted_laws:Linear", "--compare", "--workers", "1")
+    assert "use --allow-code" in airmuscle(*given).output
+    assert "fitted_laws" not in sys.modules
+    done = airmuscle(*given, "--allow-code", "--out", "out")
+    assert done.exit_code == 0, done.output
+    assert "fitted_laws:Linear (named) with 2 parameters" in done.stdout.replace("\n", " ")
+    with allow_code():
+        law = load("out/muscle.toml").characteristic
+    assert (type(law).__name__, law.area) == ("Linear", pytest.approx(1.3e-3, rel=2e-3))
+    assert airmuscle("show", "out/muscle.toml", "--allow-code").exit_code == 0
+
+
+def test_a_friction_law_of_a_user_is_fitted_beside_the_others(fitted_laws):
+    contraction = np.concatenate([np.linspace(0.02, 0.14, 60), np.linspace(0.14, 0.02, 60)])
+    sliding = np.where(np.arange(contraction.size) < 60, 1.0, -1.0)
+    columns = {"time": 0.2 * np.arange(contraction.size), "pressure": np.full(contraction.size, 3e5)}
+    columns |= {"contraction": contraction, "force": 900.0 - 4000.0 * contraction - 20.0 * sliding}
+    write(Recording(columns, "loop"), "loop.csv")
+    given = ("hysteresis", "loop.csv", "--resting-length", "300 mm", "--degree", "1", "--elements", "2")
+    done = airmuscle(*given, "--friction", "fitted_laws:Bristle", "--allow-code", "--json")
+    assert done.exit_code == 0, done.output
+    rms = {each["law"]: each["rms_error"] for each in json.loads(done.stdout)["friction"]["laws"]}
+    assert rms["Bristle"] == pytest.approx(rms["Dahl"])
+    refused = airmuscle(*given, "--friction", "fitted_laws:Unstarted", "--allow-code")
+    assert "Unstarted is not started from data; define its guess(scales)." in refused.output
+    assert "is no friction law" in airmuscle(*given, "--friction", "fitted_laws:Linear", "--allow-code").output

@@ -14,6 +14,7 @@ import sys
 import types
 import typing
 from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 from ...bench.readers import read_csv
@@ -83,11 +84,18 @@ def allow_code() -> Iterator[None]:
     The module is one of the current folder, or installed. Its class is declared with `@model`, as those of the package.
     Read only files of people whom you trust so: the module could do anything.
     """
-    token = _ALLOWED.set(True)
+    token, folders = _ALLOWED.set(True), {str(Path.cwd())}.difference(sys.path)
+    sys.path += folders  # which worker processes take over, as they import the module too
     try:
         yield
     finally:
+        sys.path[:] = (each for each in sys.path if each not in folders)
         _ALLOWED.reset(token)
+
+
+def model_name(cls: type[Any]) -> str:
+    """The name of a class in a file; that of a user has its module before it."""
+    return cls.__name__ if cls.__module__.startswith("airmuscle.") else f"{cls.__module__}:{cls.__qualname__}"
 
 
 def is_code_allowed() -> bool:

@@ -30,9 +30,11 @@ def find_initial_law(
     and the parameters to keep fixed because they only scale other parameters.
 
     Law and geometry of an entry are scaled to the resting length of the data. Raises ParameterError for a model whose
-    initial values cannot be estimated, and for an entry that cannot be scaled.
+    initial values cannot be estimated, and for an entry that cannot be scaled. A law of a user, `module:Class`, has the
+    initial values of its `guess`.
     """
-    if name not in model_names():
+    is_code = ":" in name and not is_path(name)
+    if not is_code and name not in model_names():
         try:
             entry, lengths = load_law(name), resting_lengths(recordings)
         except UnknownNameError as error:  # the message also lists the laws
@@ -46,6 +48,8 @@ def find_initial_law(
     if not issubclass(cls, Characteristic):
         known = ", ".join(model_names(Characteristic))
         raise ParameterError(f"{option}: {name} is not a characteristic; there are {known}.")
+    if is_code:
+        return Entry(cls.__name__, cls.__name__, "chosen", cls.guess(recordings)), cls.redundant
     if issubclass(cls, ContractileSurface):
         return Entry(name, name, "chosen", cls.guess(recordings, degree)), ()
     for candidate in standard_candidates(recordings):

@@ -9,6 +9,7 @@ from ...bench.identify import Fit
 from ...core import FileError, ParameterError, Reference, abridged, atomic_file, one_line
 from ...physics import Characteristic, Muscle, Plant, Ratings, ValidityRange
 from .entry import OPTIONAL_PARTS, Check, Entry
+from .fields import model_name
 from .fitted_entry import fitted_entry
 from .uncertainty import ParameterUncertainty, StatedBand
 
@@ -85,7 +86,7 @@ def write_text(path: Path, text: str) -> Path:
 def model_table(thing: Any) -> dict[str, Any]:
     """A model as the table that `build` reads; fields that are None have this default and are left out."""
     fields = {f.name: getattr(thing, f.name) for f in dataclasses.fields(thing) if f.init}
-    return {"model": type(thing).__name__, **{name: value for name, value in fields.items() if value is not None}}
+    return {"model": model_name(type(thing)), **{name: value for name, value in fields.items() if value is not None}}
 
 
 def _plain(value: Any) -> Any:

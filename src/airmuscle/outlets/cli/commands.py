@@ -15,7 +15,7 @@ from typer.core import TyperGroup
 from ...core import AirmuscleError, AirmuscleWarning, exclusive_folders, quotable, suggestion
 from .interruption import INTERRUPTED, check_interrupted, deferred_sigint
 from .options import install_completion_classes, print_completion_script
-from .terminal import echo, in_options, warned
+from .terminal import RUN_CODE, echo, in_options, warned
 
 SETTINGS: dict[str, Any] = {
     "add_completion": False,
@@ -65,8 +65,6 @@ COMMANDS = (
     CommandRow("schema", "simulate", "schema", "Print the JSON schema of scenario or muscle files."),
 )
 """All commands, in the order of use."""
-RUN_CODE = ("simulate", "study", "tune", "benchmark", "export", "schema")
-"""Commands with --allow-code."""
 _ROWS = {row.name: row for row in COMMANDS}
 _UsageError: Any = typer.BadParameter.__base__
 

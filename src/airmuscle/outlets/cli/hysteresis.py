@@ -12,13 +12,22 @@ from ...bench.identify.hysteresis import find_loops, fit_jointly, fit_loop, hyst
 from ...bench.identify.hysteresis.joint import select_friction
 from ...bench.identify.hysteresis.loops import CURVE_DEGREE
 from ...core import check_writable
-from ...files.library import Entry, load_law, part_toml, to_toml, without_parts
+from ...files.library import Entry, load_law, model_class, part_toml, to_toml, without_parts
+from ...physics import Friction
 from ...physics.muscle.characteristic.base import ForceLaw
-from ..requests import ReadingRequest, RequestError, Where, option, optional, request
+from ..requests import ReadingRequest, RequestError, Where, many, option, optional, request
 from .delivery import deliver
 from .measurements import Files, read_recordings, reading_chapters
 from .options import Folder, Json, with_requests
 from .terminal import echo
+
+
+def read_friction(name: str, where: str) -> type[Friction]:
+    """The class of a friction law, by its name. Raises UnknownNameError or RequestError."""
+    cls = model_class(name, where, kind=Friction)
+    if not issubclass(cls, Friction):
+        raise RequestError(f"{where}: {name} is no friction law.", "friction")
+    return cls
 
 
 @request
@@ -33,6 +42,10 @@ class HysteresisRequest:
     degree: int = option("Degree of the polynomial friction-free curve.", default=CURVE_DEGREE, bounds=(0, 9))
     all_rows: bool = option("Include rows in which pressure or length change quickly.", default=False)
     elements: int = option("Number of elements of MaxwellSlip and PrandtlIshlinskii.", default=8, bounds=(1, 30))
+    friction: tuple[Any, ...] = many(
+        "Law of yours that is fitted beside the others, 'module:Class'; needs --allow-code. Repeatable.",
+        metavar="NAME", read=read_friction,
+    )  # fmt: skip
     creep: bool = option("Fit creep to the longest hold of every file and write creep elements.", default=False)
 
     def check(self, where: Where) -> None:
@@ -71,7 +84,8 @@ def hysteresis(
     loops = find_loops(freed, law=curve, degree=request.degree, all_rows=request.all_rows)
     check_writable(out)
     progress = None if json else lambda name: echo(f"  {name}", err=True)
-    fits = [fit_loop(loop, elements=request.elements, progress=progress) for loop in loops]
+    elements, others = request.elements, request.friction
+    fits = [fit_loop(loop, elements=elements, others=others, progress=progress) for loop in loops]
     joint = fit_jointly(fits, progress=progress)
     selected = select_friction(fits, joint)
     chapters = hysteresis_chapters(fits, joint)

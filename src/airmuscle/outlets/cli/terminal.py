@@ -66,10 +66,18 @@ _RECORDS: Mapping[str, Instruction] = {
     "skip_rows": lambda hint: "write skip_rows = N in the mapping of the record",
     "missing": lambda hint: f'write missing = "{MISSING_NAMES[type(hint.value)]}" in the mapping of the record',
 }
+RUN_CODE = (
+    "show", "evaluate", "fit", "approximate", "hysteresis", "predict", "plan", "simulate", "study", "tune", "benchmark",
+    "export", "schema",
+)  # fmt: skip
+"""Commands with --allow-code."""
+_CODE: Mapping[str, Instruction] = {"files.allow_code": lambda hint: "use --allow-code"}
 INSTRUCTIONS: Mapping[str, Mapping[str, Instruction]] = {
+    **dict.fromkeys(RUN_CODE, _CODE),
     "inspect": _FILES,
     "fit": {
         **_FILES,
+        **_CODE,
         "fixed": _fix,
         "degree": lambda hint: f"use --degree {hint.value}",
         "censoring": lambda hint: "use --uncensored" if hint.constant == "UNCENSORED" else "omit --uncensored",
@@ -81,17 +89,14 @@ INSTRUCTIONS: Mapping[str, Mapping[str, Instruction]] = {
     },
     "hysteresis": {
         **_FILES,
+        **_CODE,
         "all_rows": lambda hint: "use --all-rows",
         "law": lambda hint: "use --muscle NAME with --use-characteristic",
     },
     "campaign": _FILES,
-    "predict": _FILES,
+    "predict": {**_FILES, **_CODE},
     "convert": _FILES,
-    "plan": {"fixed": _fix},
-    **{
-        name: {"files.allow_code": lambda hint: "use --allow-code"}
-        for name in ("simulate", "study", "tune", "benchmark", "export")
-    },
+    "plan": {"fixed": _fix, **_CODE},
     "fit-dynamic": {**_RECORDS, "free": lambda hint: f"write free = {json.dumps(list(hint.value))} under [fit]"},
 }
 """Instructions by command and argument; a hint without an argument is found by its function."""

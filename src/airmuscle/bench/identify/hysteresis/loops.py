@@ -1,7 +1,6 @@
 """Hysteresis loops in recordings: kind, fitted rows and repeated runs, and the fit of all friction laws to a loop."""
 
 import dataclasses
-import inspect
 import warnings
 from collections.abc import Callable, Mapping, Sequence
 from typing import TypeVar
@@ -111,8 +110,7 @@ def find_loops(
     sensors, loops, muscles = segment.estimate_sensors(recordings), list[HysteresisLoop](), list[Sequence[object]]()
     empty = [recording.origin for recording in recordings if not len(recording)]
     failed = [IdentificationError(f"{origin}: the recording has no rows. Give one with a loop.") for origin in empty]
-    each_run = [part for recording in recordings if len(recording) for part in _separate_runs(recording, sensors)]
-    for recording, run in each_run:
+    for recording, run in (each for given in recordings if len(given) for each in _separate_runs(given, sensors)):
         try:
             loop = _make_loop(recording, run, sensors, law, degree, all_rows)
         except IdentificationError as error:
@@ -206,17 +204,21 @@ def _is_same_level(one: segment.Run, other: segment.Run) -> bool:
     return abs(one.constant_value - other.constant_value) <= band
 
 
-def initial_friction_laws(path: Array, force: Array, elements: int = 8) -> tuple[Friction, ...]:
+def initial_friction_laws(
+    path: Array, force: Array, elements: int = 8, others: Sequence[type[Friction]] = ()
+) -> tuple[Friction, ...]:
     """Every law of `friction` with a `guess`, its initial parameters scaled by a path [m] and the forces [N] along it.
 
-    `elements` is the number of elements of MaxwellSlip and PrandtlIshlinskii. Raises IdentificationError for a constant
-    path.
+    `elements` is the number of elements of MaxwellSlip and PrandtlIshlinskii, `others` are classes of a user. Raises
+    IdentificationError for a constant path, and for one of the `others` without a `guess`.
     """
     check_whole("initial_friction_laws", "elements", elements, 1)
     scales = LoopScales.of(path, force, elements)
-    classes = (getattr(laws, name) for name in dir(laws))
-    started = (cls.guess(scales) for cls in classes if inspect.isclass(cls) and issubclass(cls, Friction))
-    return tuple(law for law in started if law is not None)
+    known = [cls for name in dir(laws) if isinstance(cls := getattr(laws, name), type) and issubclass(cls, Friction)]
+    started = {cls: cls.guess(scales) for cls in (*known, *others)}
+    for cls in (each for each in others if started[each] is None):
+        raise IdentificationError(f"{cls.__name__} is not started from data; define its guess(scales).")
+    return tuple(law for law in started.values() if law is not None)
 
 
 def fit_hysteresis(
@@ -276,16 +278,18 @@ def make_loop_series(
     return dataclasses.replace(series, limits=dataclasses.replace(series.limits, stiffness=stiffness))
 
 
-def fit_loop(loop: HysteresisLoop, *, elements: int = 8, progress: Callable[[str], None] | None = None) -> LoopFit:
+def fit_loop(
+    loop: HysteresisLoop, *, elements: int = 8, others: Sequence[type[Friction]] = (),
+    progress: Callable[[str], None] | None = None,
+) -> LoopFit:  # fmt: skip
     """Fit every friction law to a loop and sort the fits by AICc; laws with terms of speed need a speed that varies.
 
-    `elements` is the number of elements of MaxwellSlip and PrandtlIshlinskii; `progress` is called with the name of
-    each law.
+    `elements` and `others` are those of `initial_friction_laws`; `progress` is called with the name of each law.
     """
     run = dataclasses.replace(loop.series(loop.recording, loop.fitted_rows), transient_rows=loop.transient_rows)
     second_run = None if loop.repeat is None else loop.series(*loop.repeat)
     fits, failed = list[HysteresisFit](), dict[str, HintedText]()
-    for initial in initial_friction_laws(run.path[loop.fitted_rows], run.fitted_residuals(None), elements):
+    for initial in initial_friction_laws(run.path[loop.fitted_rows], run.fitted_residuals(None), elements, others):
         name = type(initial).__name__
         too_uniform = "" if initial.rate_independent else data.speed_reservation(run.limits, run.axis)
         if too_uniform:
