@@ -60,9 +60,9 @@ class MuscleShapes:
         self.length = max(g.resting_length for g in geometries)
         self.fitting_radii = [0.5 * float(muscle_outline(g, 0.0)[:, 0].max()) for g in geometries]
         pressures, contractions = ([recording[f"{p}{each}"] for p in prefixes] for each in ("pressure", "contraction"))
-        self.pressure = max(float(pressure.max()) for pressure in pressures)
-        """Maximum gauge pressure [Pa]."""
-        largest = zip(geometries, (max(float(c.max()), 0.0) for c in contractions), strict=True)
+        self.pressure = max(float(pressure.max(initial=0.0)) for pressure in pressures)
+        """Maximum gauge pressure [Pa], 0 or more."""
+        largest = zip(geometries, (float(c.max(initial=0.0)) for c in contractions), strict=True)
         widths = [float(muscle_outline(geometry, contraction)[:, 0].max()) for geometry, contraction in largest]
         self.spacing = 1.08 * max(widths)
         """Distance [m] of a muscle from the middle at which it does not touch another one."""
