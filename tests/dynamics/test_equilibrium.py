@@ -120,6 +120,18 @@ def test_so_it_does_where_wall_and_series_spring_give():
     assert find_equilibrium(plant, air_mass=state["air_mass"]) == pytest.approx(state, rel=1e-7, abs=1e-9)
 
 
+def test_a_position_without_room_for_air_is_no_rest():
+    shrinking = replace(chosen_muscle(), wall=ViscoelasticWall(2e-11, 0.05))
+    (rest,) = find_equilibria(Plant(shrinking, CIRCUIT, HangingMass(1e-4)), pressure=-5e4)
+    assert rest.stable
+    assert np.isfinite(list(rest.state.values())).all()
+    with pytest.raises(EquilibriumError, match=r"muscle pulls [.\d]+ N at -50 kPa and a contraction of -"):
+        find_equilibrium(Plant(shrinking, CIRCUIT, HangingMass(50.0)), pressure=-5e4)
+    for find in (find_equilibria, find_equilibrium):  # at some positions the air would have more than 1000 bar
+        with pytest.raises(EquilibriumError, match="PrescribedMotion is in equilibrium at every position"):
+            find(Plant(chosen_muscle(), CIRCUIT, PrescribedMotion()), air_mass=2e-4)
+
+
 def test_shut_in_air_takes_up_pressure_where_the_load_stretches_the_muscle():
     plant = PLANTS["hanging"]
     state = find_equilibrium(plant, pressure=3e5)

@@ -78,8 +78,8 @@ def find_equilibria(
     count = len(one.plants.mechanism.coordinates)
     if not rows.size and count < 2:
         everywhere = grid(one) if count else None
-        # in equilibrium everywhere, or without a permitted position
-        if everywhere is None or not one.accelerations(everywhere[:, np.isfinite(everywhere[0]), None]).any():
+        f = np.empty(0) if everywhere is None else one.accelerations(everywhere[:, np.isfinite(everywhere[0]), None])
+        if not f.size or (f == 0.0).any():  # without a permitted position, or in equilibrium everywhere
             raise no_equilibrium(one)
     states, stable = _judged(one, rows, x)
     named = (dict(zip(one.names, state.tolist(), strict=True)) for state in states)

@@ -235,7 +235,9 @@ class Statics:
         rates = np.empty_like(states)
         if states.size:
             evaluate_rates(self.compiled.address["rhs"], self.precomputed, self.inputs, states, rates)
-        return np.asarray(rates[..., [self.names.index(c.speed) for c in self.plants.mechanism.coordinates]])
+        accelerations = rates[..., [self.names.index(c.speed) for c in self.plants.mechanism.coordinates]]
+        accelerations[np.isnan(states).any(axis=-1)] = np.nan  # a limited force is finite also there
+        return accelerations
 
     def state(self, x: Array) -> dict[str, float]:
         """The state at rest of the first plant at coordinates (d,), as a mapping."""
