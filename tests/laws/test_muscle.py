@@ -97,8 +97,9 @@ def test_a_law_of_another_resting_length_than_that_of_the_geometry_is_named():
     surface = ContractileSurface((300.0, -200.0, 40.0), 0.0, 6e5, 0.0, 0.25, 0.0, 1200.0, 1)
     laws = (Reynolds2003(0.2), Clamped(Reynolds2003(0.2)), EffectiveLength(surface, 0.2, 0.01))
     for law in laws:
-        with pytest.warns(AirmuscleWarning, match="law of a muscle of 200 mm, but .* of Braid is 300 mm"):
+        with pytest.warns(AirmuscleWarning, match="law of a muscle of 200 mm, but .* of Braid is 300 mm") as found:
             Muscle(law, BRAID)
+        assert [each.filename for each in found] == [__file__]
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         for law in (ChouHannaford1996(Braid(0.01, 0.44, 0.2)), surface, Reynolds2003(0.3 + 1e-7)):

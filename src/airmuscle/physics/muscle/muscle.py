@@ -117,7 +117,7 @@ class Muscle(QuantityMethods, NotebookDisplay):
                 f"length of {type(self.geometry).__name__} is {1e3 * length:.6g} mm. The force would be that of "
                 "another length; give both the same resting length.",
                 AirmuscleWarning,
-                stacklevel=4,
+                stacklevel=5,
             )
 
     def _check_series_elements(self) -> None:
