@@ -25,6 +25,7 @@ from airmuscle.physics import (
     DirectionalDamper,
     EndStop,
     FillDischarge,
+    ForceLaw,
     HangingMass,
     HuntCrossley,
     Isometric,
@@ -41,6 +42,7 @@ from airmuscle.physics import (
     Serres2009,
     Serres2009Damper,
     Serres2009Spring,
+    Stop,
     Supply,
     SwellingWall,
     Valve,
@@ -314,6 +316,26 @@ def test_what_cannot_stand_beside_a_series_spring_is_refused():
         in_series(damper=Reynolds2003Damper())
     with pytest.raises(ParameterError, match="with a series spring, the friction must be rate-independent"):
         in_series(friction=LuGre(5e4, 20.0))
+
+
+def test_an_own_stop_without_its_force_at_rest_is_refused():
+    class Wedge(Stop):
+        def force(self, contraction, speed, resting_length):
+            return 1e4 * contraction
+
+    with pytest.raises(TypeError, match="static_force_and_damping"):
+        Wedge()
+
+
+def test_an_own_law_may_compute_its_greatest_contraction():
+    class Falling(ForceLaw):
+        def max_contraction(self, pressure):
+            return 0.3
+
+        def force(self, pressure, contraction):
+            return 1e-3 * pressure * (1.0 - contraction / self.max_contraction(pressure))
+
+    assert Plant(replace(chosen_muscle(), contractile=Falling()), ClosedChamber(), HangingMass(1.0)).states
 
 
 def test_unequal_lists_of_creep_are_refused():

@@ -143,21 +143,27 @@ class CreepElements:
         return {s.name: speed - state[s.name] / tau for s, tau in zip(self.states, self.relaxation_times, strict=True)}
 
 
-class Stop:
-    """Element that limits the contraction of a muscle by a pushing force (base class: no force)."""
+class Stop(abc.ABC):
+    """Element that limits the contraction of a muscle by a pushing force (interface)."""
 
+    @abc.abstractmethod
     def force(self, contraction: Value, speed: Value, resting_length: Value) -> Value:
         """Force [N] against contraction at a speed of shortening [m/s]."""
-        return 0.0
 
+    @abc.abstractmethod
     def static_force_and_damping(self, contraction: Value, resting_length: Value) -> tuple[Value, Value]:
         """Force [N] at zero speed, and the slope of the force over the speed of shortening [N s/m]."""
-        return 0.0, 0.0
 
 
 @model
 class NoStop(Stop):
     """No end stop: the contraction is limited by the force law alone."""
+
+    def force(self, contraction: Value, speed: Value, resting_length: Value) -> Value:
+        return 0.0
+
+    def static_force_and_damping(self, contraction: Value, resting_length: Value) -> tuple[Value, Value]:
+        return 0.0, 0.0
 
 
 @model

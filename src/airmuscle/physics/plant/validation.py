@@ -1,5 +1,6 @@
 """Validation of the parts of a plant: types, numbers, names, closed-form laws."""
 
+import itertools
 from collections.abc import Sequence
 from typing import Any
 
@@ -29,10 +30,10 @@ def check_parts(plant: Any) -> None:
                 f"{type(part).__name__} of {muscle.name} is not closed-form and cannot be part of a plant. Use "
                 "as_force_law(law, validity_range) for a characteristic, as_polynomial(geometry) for a geometry."
             )
-    for law, declared in ((m.contractile, declared) for m in plant.muscles for declared in parameters(ValidityRange)):
-        limit, (low, high) = getattr(law, declared.name, None), declared.bounds
-        if limit is None:
-            continue
+    limits = parameters(ValidityRange)
+    ranged = (m.contractile for m in plant.muscles if all(hasattr(m.contractile, each.name) for each in limits))
+    for law, declared in itertools.product(ranged, limits):
+        limit, (low, high) = getattr(law, declared.name), declared.bounds
         smallest, largest = float(np.min(limit)), float(np.max(limit))  # a limit may be a column (N,)
         if not low <= smallest <= largest <= high:
             unit = "" if declared.unit == "1" else f" {declared.unit}"
