@@ -8,6 +8,7 @@ import inspect
 from pathlib import Path
 
 import airmuscle
+from airmuscle import bench, control, design, engine, files, outlets, physics
 from airmuscle.core import parameters
 from airmuscle.files.library import model_class, model_names
 from airmuscle.recording import QUANTITIES
@@ -65,3 +66,19 @@ def test_every_parameter_has_unit_symbol_meaning_and_bounds():
             assert p.symbol, f"{name}.{p.name}"
             assert len(p.meaning) > 3, f"{name}.{p.name}"
             assert p.bounds[0] < p.bounds[1], f"{name}.{p.name}"
+
+
+MODELS = {"law", "friction", "plant", "arm", "fit", "elements"}
+MEASURED = {"recording", "recordings", "experiment", "experiments", "episodes", "loop_fits"}
+
+
+def test_the_model_stands_before_the_measurements():
+    """In every function of a room, as in `fit(law, recordings)`."""
+    wrong = set()
+    for room in (bench, control, design, engine, files, outlets, physics):
+        for function in filter(inspect.isfunction, (getattr(room, name) for name in room.__all__)):
+            names = [p.name for p in inspect.signature(function).parameters.values() if p.kind is not p.KEYWORD_ONLY]
+            kinds = [name in MEASURED for name in names if name in MODELS | MEASURED]
+            if kinds != sorted(kinds):
+                wrong.add(f"{function.__name__}({', '.join(names)})")
+    assert wrong == set()

@@ -60,7 +60,7 @@ def episodes():
 
 def test_the_numbers_of_the_plant_are_found_within_their_standard_errors(episodes):
     lines = []
-    fit = fit_known_joint(episodes, JOINT, progress=lines.append)
+    fit = fit_known_joint(JOINT, episodes, progress=lines.append)
     found = {each.path: each for each in fit.estimates}
     assert found.keys() == TRUTH.keys()
     for path, value in TRUTH.items():
@@ -76,21 +76,21 @@ def test_the_numbers_of_the_plant_are_found_within_their_standard_errors(episode
 
 def test_numbers_that_no_such_joint_has_are_named(episodes):
     """A sample time of 100 ms in place of 10 ms predicts well (skill 0.95), with a hundred times the inertia."""
-    assert not [r for r in fit_known_joint(episodes, JOINT).remarks if "wrong sample time" in r]
+    assert not [r for r in fit_known_joint(JOINT, episodes).remarks if "wrong sample time" in r]
     slow = replace(
         episodes, sample_time=10 * STEP, runs=tuple(replace(run, speed=run.speed / 10) for run in episodes.runs)
     )
-    (remark,) = [r for r in fit_known_joint(slow, JOINT).remarks if "wrong sample time" in r]
+    (remark,) = [r for r in fit_known_joint(JOINT, slow).remarks if "wrong sample time" in r]
     assert re.match(r"mechanism.inertia is 3.\d+, 6\d.\d times its first value; mechanism.damping is 1", remark)
     assert "lags[0] is 0.39" in remark
     tenth = replace(
         episodes, runs=tuple(replace(run, angle=run.angle / 10, speed=run.speed / 10) for run in episodes.runs)
     )
-    assert any("zeros[1] ends at the limit of its range, -5e+05" in r for r in fit_known_joint(tenth, JOINT).remarks)
+    assert any("zeros[1] ends at the limit of its range, -5e+05" in r for r in fit_known_joint(JOINT, tenth).remarks)
 
 
 def test_only_the_named_numbers_change(episodes):
-    fit = fit_known_joint(episodes, known(**{"mechanism.inertia": 0.05}), ("mechanism.inertia", "zeros"))
+    fit = fit_known_joint(known(**{"mechanism.inertia": 0.05}), episodes, ("mechanism.inertia", "zeros"))
     assert [each.path for each in fit.estimates] == ["mechanism.inertia"]
     assert fit.estimates[0].value == pytest.approx(0.03, rel=0.02)
     assert fit.arm.mechanism.damping == 0.5
@@ -99,7 +99,7 @@ def test_only_the_named_numbers_change(episodes):
 def test_the_gains_of_the_readings_are_found_by_the_force_of_the_rubber(episodes):
     """A known force that does not grow with the pressure fixes the scale of pressures and inertia together."""
     scaled = replace(episodes, runs=tuple(replace(run, pressure=run.pressure / [1.1, 0.95]) for run in episodes.runs))
-    fit = fit_known_joint(scaled, known(**{"mechanism.inertia": 0.05}), ("mechanism.inertia", "gains", "zeros"))
+    fit = fit_known_joint(known(**{"mechanism.inertia": 0.05}), scaled, ("mechanism.inertia", "gains", "zeros"))
     gains = [float(remark.partition(": ")[2].split()[0]) for remark in fit.remarks if remark.startswith("gain of")]
     np.testing.assert_allclose(gains, [1.1, 0.95], rtol=0.02)
     assert fit.estimates[0].value == pytest.approx(0.03, rel=0.02)
@@ -107,16 +107,16 @@ def test_the_gains_of_the_readings_are_found_by_the_force_of_the_rubber(episodes
 
 def test_impossible_requests_are_refused(episodes):
     with pytest.raises(ParameterError, match=r"no parameter 'mechanism.inertai'; .* Did you mean"):
-        fit_known_joint(episodes, JOINT, ("mechanism.inertai",))
+        fit_known_joint(JOINT, episodes, ("mechanism.inertai",))
     with pytest.raises(
         ParameterError, match="episodes: 24, of which a share of 1 is left out; give 4 episodes or more"
     ):
-        fit_known_joint(episodes, JOINT, left_out=1.0)
+        fit_known_joint(JOINT, episodes, left_out=1.0)
     twice = replace(episodes, runs=tuple(replace(run, angle=np.hstack([run.angle] * 2)) for run in episodes.runs))
     with pytest.raises(ParameterError, match="have 2 pressures and 2 angles, the arm 2 muscles and 1 coordinates"):
-        fit_known_joint(twice, JOINT)
+        fit_known_joint(JOINT, twice)
     with pytest.raises(ParameterError, match=r"the mapping states the pairs \[\(2, 1\)\], the joint has \[\(1, 2\)\]"):
-        fit_known_joint(episodes, JOINT, pairs=((2, 1),))
+        fit_known_joint(JOINT, episodes, pairs=((2, 1),))
 
 
 def test_pressures_in_the_order_of_the_other_muscles_are_named(episodes):
@@ -124,7 +124,7 @@ def test_pressures_in_the_order_of_the_other_muscles_are_named(episodes):
     with pytest.raises(
         IdentificationError, match=r"muscles are exchanged: .* pressure 1 raises angle 1, the record that"
     ):
-        fit_known_joint(crossed, JOINT)
+        fit_known_joint(JOINT, crossed)
 
 
 def test_the_command_takes_the_scenario_of_a_joint(episodes, tmp_path):

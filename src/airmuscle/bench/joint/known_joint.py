@@ -59,7 +59,7 @@ class ReadPressures(System):
 
 
 def fit_known_joint(
-    episodes: Episodes, arm: PressureDriven, free: Sequence[str] = (), *, pairs: Sequence[tuple[int, int]] = (),
+    arm: PressureDriven, episodes: Episodes, free: Sequence[str] = (), *, pairs: Sequence[tuple[int, int]] = (),
     left_out: float | None = None, rows: int = ROWS, progress: Callable[[str], None] = lambda text: None,
 ) -> ArmFit:  # fmt: skip
     """Estimate the unknown numbers of an arm of known muscles and geometry, such as those of the library.

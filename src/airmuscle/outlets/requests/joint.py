@@ -101,7 +101,7 @@ def fit_requested_arm(
     else:
         plant = load_scenario(request.known).plant
         arm = PressureDriven(plant.muscles, plant.mechanism, (FIRST_LAG,) * len(plant.muscles))
-        fit = fit_known_joint(episodes, arm, request.free, **common)
+        fit = fit_known_joint(arm, episodes, request.free, **common)
         names = [fit.arm.muscle[number - 1].name for pair in fit.pairs for number in pair]
         note, warning = IN_PLACE, ""
     muscles = {
