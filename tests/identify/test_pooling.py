@@ -202,6 +202,13 @@ def test_bands_of_a_new_muscle_contain_the_scatter_of_the_specimens():
     assert min(widths) > 3
 
 
+@pytest.mark.parametrize("law", [POPULATION, POOLED], ids=["population", "pooled"])
+def test_the_band_at_no_points_is_empty(law):
+    places = {"pressure": np.zeros(0), "contraction": np.zeros(0)}
+    points = Recording(places, "none", {"specimen": NAMES[0], "resting_length": LENGTHS[0]})
+    assert [each.shape for each in confidence_band(am.fit(law, runs()), points)] == [(0,)] * 3
+
+
 def held_by_bands(disturb, experiments: int) -> float:
     """The share of intervals of three measured muscles that hold their force at five points, where each run has errors
     of its own: `disturb(force, random)`. The truth is within the law, so that nothing but the rows is uncertain."""

@@ -212,14 +212,14 @@ def pooled_band(fit: Fit, points: Recording, jacobian: Array, level: float) -> t
     length = points.constants.get(RESTING_LENGTH)
     law = of_length(model.population, None if length is None else float(length))
     basis = np.array(surface.basis(*state)).T * np.asarray(model.effect_share(law.unclamped_force(*state)))[:, None]
-    name, nothing = specimen_name(points), np.zeros(len(points))
-    by_specimen = np.zeros((len(points), *effects.coefficients.shape))
-    offset, scatter = nothing, effects.deviation**2 * np.sum(basis**2, axis=1)
+    name, count = specimen_name(points), len(points)
+    by_specimen = np.zeros((count, *effects.coefficients.shape))
+    offset, scatter = np.zeros(count), effects.deviation**2 * np.sum(basis**2, axis=1)
     if name in effects.specimens:
         index = effects.specimens.index(name)
         by_specimen[:, index] = basis
-        offset, scatter = basis @ effects.coefficients[index], nothing
-    gradient = np.hstack([jacobian, by_specimen.reshape(len(points), -1)])
+        offset, scatter = basis @ effects.coefficients[index], np.zeros(count)
+    gradient = np.hstack([jacobian, by_specimen.reshape(count, effects.coefficients.size)])
     return offset, effects.covariance.half_widths(gradient, level, scatter)
 
 
