@@ -93,6 +93,14 @@ def test_a_record_that_determines_no_volume_is_refused(recording: Recording, mes
         volume_points([recording])
 
 
+@pytest.mark.parametrize("missing", ["contraction", "volume"])
+def test_a_point_without_a_value_is_refused(missing: str):
+    run = column()
+    gap = run.with_columns(**{missing: np.where(np.arange(len(run)) == 3, np.nan, run[missing])})
+    with pytest.raises(IdentificationError, match="1 of 40 points have no finite contraction and volume"):
+        fit_volume(volume_points([gap]), 0.2)
+
+
 def test_too_few_lengths_are_refused():
     with pytest.raises(IdentificationError, match="four points at three contractions"):
         fit_volume(VolumePoints(np.array([0.0, 0.1]), np.array([6e-5, 8e-5]), 2), 0.2)

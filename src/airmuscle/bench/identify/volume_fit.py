@@ -124,10 +124,14 @@ def fit_volume(points: VolumePoints, resting_length: float) -> VolumeFit:
 
     `resting_length` [m]. The standard deviation follows from the residuals; that of the muscle's own reproducibility is
     contained if the points are of several runs. Raises ParameterError for a length that is not positive, and
-    IdentificationError for fewer than four points, or points at fewer than three contractions.
+    IdentificationError for a value that is not finite, fewer than four points, or fewer than three contractions.
     """
     if not resting_length > 0.0:
         raise ParameterError(f"fit_volume: the resting length is {resting_length:g} m; it must be greater than zero.")
+    if missing := int(np.count_nonzero(~np.isfinite(points.contraction + points.volume))):
+        raise IdentificationError(
+            f"fit_volume: {missing} of {points.volume.size} points have no finite contraction and volume. Remove them."
+        )
     levels = np.unique(np.round(points.contraction, 4)).size
     if points.volume.size < 4 or levels < 3:
         raise IdentificationError(
