@@ -141,7 +141,8 @@ def previous_model_figure() -> Plot:
     model = Ferraresi2001(RUBBER["A"])
     for i, pressure in enumerate(FIG_1):
         c = model.contraction(pressure, FIG_1_LOAD)
-        radius, angle = 1e3 * model.circle(c)[0], model.circle(c)[1]
+        radius, angle = model.circle(c)
+        radius *= 1e3  # [mm]
         centre = 1e3 * model.end_radius - radius * math.cos(angle)
         theta = np.linspace(-angle, angle, 201)
         label = f"{pressure / 1e6:g} MPa, {100 * c:.1f} %"

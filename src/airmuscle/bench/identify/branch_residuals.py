@@ -168,7 +168,7 @@ def branch_notes(runs: Sequence[Recording], distance: float, quantity: str, *, d
         return []
     unit = QUANTITIES[quantity].unit
     text = f"{100 * distance:.3g} %" if unit == "1" else f"{distance:.3g} {unit}"
-    columns = {column for run in runs if (column := _branch_bins(run)[3])}
+    columns = {column for *_, column in map(_branch_bins, runs) if column}
     names = [" and ".join(branch_name(column, d) for d in (1, -1)) for column in sorted(columns, reverse=True)]
     return [
         HintedText(

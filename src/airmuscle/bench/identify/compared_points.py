@@ -106,7 +106,7 @@ class ComparedPoints:
     """Index of the fold of each row; one more than the last for rows that are never left out."""
     points: FitPoints
     """The rows of all recordings."""
-    _kept_refits: "list[_FoldRefits]" = dataclasses.field(default_factory=list)
+    _kept_refits: "list[_FoldRefits]" = dataclasses.field(default_factory=list, init=False, repr=False)
 
     @classmethod
     def of(cls, runs: Sequence[Recording], split: GroupSplit, points: FitPoints | None = None) -> "ComparedPoints":
@@ -194,11 +194,12 @@ class _FoldRefits:
         self.problem, self._group = fit.problem, group
         if points.kept.get("problem") is not fit.problem:  # not yet for another split
             bounded, values = with_slack_bounds(fit.problem, points), fit.values
-            problem, solution = bounded.problem, None
-            if is_linear(problem):
-                matrix, constant = design_matrix(problem)
+            if is_linear(bounded.problem):
+                matrix, constant = design_matrix(bounded.problem)
                 solution = LeastSquaresSolution(values, matrix @ values + constant, matrix)
-            points.kept.update(problem=fit.problem, bounded=(bounded, solution or problem.solution(values)))
+            else:
+                solution = bounded.problem.solution(values)
+            points.kept.update(problem=fit.problem, bounded=(bounded, solution))
         bounded, solution = points.kept["bounded"]
         self._refits = GroupRefits(bounded.problem, solution, bounded.groups(group, points, count), count + 1)
         self._counts, self._values = np.ones(count + 1) - np.eye(count, count + 1), dict[int, Array | None]()

@@ -40,7 +40,7 @@ class FitPoints:
     dropped: int
     """Number of rows with a missing value."""
     repeated: tuple[RepeatedRows, ...] = ()
-    kept: dict[str, Any] = dataclasses.field(default_factory=dict)
+    kept: dict[str, Any] = dataclasses.field(default_factory=dict, init=False, repr=False)
     """What was computed last for one law and all points, which laws with the same population share."""
 
     @classmethod
@@ -138,8 +138,8 @@ class FitPoints:
         if censoring is None:
             censoring = default_censoring(law)
             if isinstance(law, ForceLaw):  # the range that the law and the sensor have in common
-                sensor, (low, high) = force_limits(self.recordings), dataclasses.astuple(censoring)
-                censoring = Censoring(max(low, sensor.min_force), min(high, sensor.max_force))
+                own, sensor = censoring, force_limits(self.recordings)
+                censoring = Censoring(max(own.min_force, sensor.min_force), min(own.max_force, sensor.max_force))
         return make_problem(law, self.data, censoring, weights, fixed)
 
 

@@ -137,7 +137,8 @@ class Pooling:
         limits: dict[str, Any] = {"min_force": -UNREACHED_FORCE, "max_force": UNREACHED_FORCE}
         rows, surface = predicted.effects.coefficients.tolist(), predicted.surface
         effects = tuple(dataclasses.replace(surface, coefficients=tuple(row), **limits) for row in rows)
-        return PooledLengthLaw(population, effects, *self.specimens[:2], effect_decay=predicted.decay)
+        names, lengths, _ = self.specimens
+        return PooledLengthLaw(population, effects, names, lengths, effect_decay=predicted.decay)
 
 
 def check_poolable(law: PooledLengthLaw, points: FitPoints) -> Specimens:

@@ -229,11 +229,9 @@ class Fit(Reported):
         residuals, limited = self.residuals[self.censoring == 0], ""
         limit = self.loss.limit(residuals)
         if count := int(np.count_nonzero(np.abs(residuals) > limit)):
-            rmse, rows = (
-                float(np.sqrt(np.mean(np.clip(residuals, -limit, limit) ** 2))),
-                "row" if count == 1 else "rows",
-            )
-            limited = f"({self.format_residual(rmse)} with {count} {rows} limited to {self.format_residual(limit)})"
+            rmse = float(np.sqrt(np.mean(np.clip(residuals, -limit, limit) ** 2)))
+            rows = "1 row" if count == 1 else f"{count} rows"
+            limited = f"({self.format_residual(rmse)} with {rows} limited to {self.format_residual(limit)})"
         ranges = self.data_ranges
         return (
             NamedValue("rows used", self.rows_used,

@@ -50,12 +50,12 @@ def uncertainty_chapter(uncertainty: Uncertainty) -> Chapter:
     values: tuple[NamedValue, ...] = ()
     if (bootstrap := uncertainty.bootstrap) is not None:
         refits, groups, failed = len(bootstrap.values), bootstrap.group_count, bootstrap.failed_refits
-        text = f"bootstrap: {refits} refits, {groups} blocks resampled, seed {bootstrap.seed}"
+        text = f"Bootstrap: {refits} refits, {groups} blocks resampled, seed {bootstrap.seed}"
         text += f"; {failed} of them did not determine the parameters" if failed else ""
         if failed > MAX_FAILED_SHARE * refits:
             text += ", so the intervals are not reliable: add runs, or use a law with fewer parameters"
         text += f"; {bootstrap.caution}" if bootstrap.caution else ""
-        sentences.insert(0, f"{text.capitalize()}.")
+        sentences.insert(0, f"{text}.")
         counts = {"refits": refits, "resampled groups": groups, "failed refits": failed, "seed": bootstrap.seed}
         values = tuple(NamedValue(name, count, brief=False) for name, count in counts.items())
     if uncertainty.profiles:
