@@ -34,7 +34,13 @@ from airmuscle.bench import (
     plateau_points,
     quasi_static_rows,
 )
-from airmuscle.bench.segment import branch_column_agreement, estimate_noise, estimate_resolution, interval
+from airmuscle.bench.segment import (
+    branch_column_agreement,
+    estimate_noise,
+    estimate_resolution,
+    inspection_chapters,
+    interval,
+)
 from airmuscle.errors import ColumnError
 from airmuscle.recording import Recording
 
@@ -445,6 +451,14 @@ def test_any_recording_can_be_inspected(values: list[float], with_time: bool):
     seen = inspect(Recording(columns, "any"))
     assert sum(len(b.interval) for b in seen.branches) in (0, len(values))
     assert all(0 <= r.interval.start < r.interval.stop <= len(values) for r in seen.runs)
+
+
+def test_a_recording_without_rows_is_inspected_with_the_sensors_of_others():
+    whole, _ = bench()
+    _, _, chapter = inspection_chapters(inspect_all([whole, whole.rows(slice(0, 0))]))
+    assert chapter.title == "synthetic: 0 rows"
+    assert np.isfinite(inspect_all([whole])[0].sensors["force"].lower_limit)
+    assert chapter.tables[0].columns["min"].values == chapter.tables[0].columns["max"].values == [None] * 4
 
 
 @pytest.mark.parametrize("width", [3, 5, 41])

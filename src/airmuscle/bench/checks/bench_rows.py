@@ -86,7 +86,7 @@ def bench_rows(recordings: Sequence[Recording]) -> BenchRows:
     given = recordings_with(recordings, *BenchRows._fields)
     columns = [np.concatenate([[], *(run[name] for run in given)]) for name in BenchRows._fields]
     complete = np.isfinite(np.sum(columns, axis=0))
-    if given:  # at its upper limit, the force sensor states a bound only
+    if complete.size:  # at its upper limit, the force sensor states a bound only
         sensor = estimate_sensors([Recording({"force": each["force"]}, each.origin) for each in given])["force"]
         complete &= columns[2] < sensor.upper_limit - 0.25 * sensor.resolution
     return BenchRows(*(column[complete] for column in columns))

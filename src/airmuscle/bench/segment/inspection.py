@@ -184,7 +184,7 @@ def _time_findings(recording: Recording, sampling: Sampling | None) -> Iterator[
 def _sensor_findings(recording: Recording, sensors: Mapping[str, Sensor]) -> Iterator[Finding]:
     for name, sensor in sensors.items():
         for limit, adjective in ((sensor.lower_limit, "lower"), (sensor.upper_limit, "upper")):
-            if name not in recording.columns or not np.isfinite(limit):
+            if name not in recording.columns or not len(recording) or not np.isfinite(limit):
                 continue
             count = int(np.count_nonzero(np.abs(recording[name] - limit) <= 0.25 * sensor.resolution))
             fraction = count / len(recording)

@@ -90,14 +90,14 @@ def _rows(parts: Sequence[Any]) -> dict[str, list[int]]:
 
 def _column_table(inspection: Inspection) -> Table:
     recording, names = inspection.recording, list(inspection.recording)
-    sensors = [inspection.sensors.get(name) for name in names]
+    values, sensors = [recording[name] for name in names], [inspection.sensors.get(name) for name in names]
     limits = {end: [limit if s and np.isfinite(limit := getattr(s, f"{end}_limit")) else None for s in sensors]
               for end in ("lower", "upper")}  # fmt: skip
     columns: dict[str, Any] = {
         "column": names,
         "unit in file": [unit if (unit := recording.units.get(name, "")) != "1" else "" for name in names],
-        "min": TableColumn([float(recording[name].min()) for name in names], BY_ROW),
-        "max": TableColumn([float(recording[name].max()) for name in names], BY_ROW),
+        "min": TableColumn([float(each.min()) if each.size else None for each in values], BY_ROW),
+        "max": TableColumn([float(each.max()) if each.size else None for each in values], BY_ROW),
         "unit": unit_column(names),
         "resolution": TableColumn([(s and s.resolution) or None for s in sensors], BY_ROW, digits=3),
         "noise": TableColumn([(s and s.noise) or None for s in sensors], BY_ROW, digits=2),
