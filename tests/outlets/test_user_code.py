@@ -41,6 +41,13 @@ class Zone(ControlLaw):
 
 class Plain:
     pass
+
+
+@model
+class Unresolved(Zone):
+    """A law with an annotation of a name that is not imported."""
+
+    limit: "Decimal | None" = None
 '''
 
 
@@ -99,6 +106,7 @@ def test_tune_and_export_take_it(scenario):
         ("no_such_module:Zone", r"cannot be imported: ModuleNotFoundError.*in the current folder"),
         ("user_laws:Zones", r"cannot be imported: AttributeError"),
         ("user_laws:Plain", "is no class that is declared with @model"),
+        ("user_laws:Unresolved", "the fields of 'user_laws:Unresolved' are unknown: an annotation is of a name"),
     ],
 )
 def test_what_is_no_model_is_refused(scenario, name, message):

@@ -20,6 +20,7 @@ from typing import Any
 from ...bench.readers import read_csv
 from ...control import estimation, laws
 from ...core import Hint, HintedText, Parameter, ParameterError, UnknownNameError, abridged, one_line, suggestion
+from ...core.annotation import type_hints
 from ...engine import loop, run
 from ...physics import mechanism, muscle, plant, pneumatics
 from ...physics.muscle import characteristic, friction, geometry
@@ -124,6 +125,9 @@ def _class_of_code(name: str, where: str) -> type[Any]:
     if not _is_file_model(cls):
         raise UnknownNameError(f"{where}: '{one_line(name)}' is no class that is declared with @model.")
     found: type[Any] = cls
+    if dataclasses.fields(found) and not type_hints(found):
+        why = "an annotation is of a name that the module does not import, or imports for type checkers alone"
+        raise UnknownNameError(f"{where}: the fields of '{one_line(name)}' are unknown: {why}.")
     return found
 
 
