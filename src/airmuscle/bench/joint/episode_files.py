@@ -128,7 +128,8 @@ def _channels(path: Path, name: str, table: Any) -> Channels:
             f"{path}: {name}.unit is '{table['unit']}'; allowed: {', '.join(allowed) or 'none'}. State other units as "
             "a number, scale."
         )
-    target, factor = "Pa" if name == "pressures" else "1", allowed[table["unit"]] if "unit" in table else 1.0
+    factor = allowed[table["unit"]] if "unit" in table else 1.0
+    target = "Pa" if name == "pressures" else "1"
     scale = quantity(table.get("scale", 1.0), target, where=f"{path}: {name}.scale")
     return Channels(tuple(columns), factor * scale, table.get("divisors"))
 

@@ -57,7 +57,9 @@ _TABLE = {
 """Of the constants that have a unit: SI unit, quantity, which has its display units, allowed range [SI], that of the
 parameters of a geometry and of the ambient air, and other names."""
 CONSTANT_UNITS = {name: unit for name, (unit, *_) in _TABLE.items()}
-CONSTANT_QUANTITIES = {name: quantity for name, (_, quantity, *_) in _TABLE.items()}
+"""SI units of these constants."""
+CONSTANT_QUANTITIES = {name: kind for name, (_, kind, *_) in _TABLE.items()}
+"""Quantities of these constants."""
 _WITH_UNIT = re.compile(
     r"(?P<name>.*?)[\s_]*"
     r"(?:\[(?P<square>[^\]]*)\]|\((?P<round>[^)]*)\)|[\s_/](?P<loose>mm|cm|m|kPa|hPa|mbar|bar|Pa))"

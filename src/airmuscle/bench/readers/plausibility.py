@@ -153,8 +153,9 @@ def without_repeated_columns(table: RawTable) -> RawTable:
     same: dict[tuple[str, str], list[int]] = {}
 
     def equal(one: Cells, other: Cells) -> bool:
-        texts = isinstance(one, list)
-        return texts is isinstance(other, list) and bool(one == other if texts else np.array_equal(one, other, True))
+        if isinstance(one, list) or isinstance(other, list):
+            return type(one) is type(other) and one == other
+        return np.array_equal(one, other, equal_nan=True)
 
     for i, pair in enumerate(zip(table.headings, units, strict=True)):
         before = same.setdefault(pair, [])

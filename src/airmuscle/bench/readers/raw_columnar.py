@@ -47,7 +47,8 @@ def read_hdf5_tables(
     h5py = import_lab_package("h5py", path)
     with reading(path, "HDF5"), h5py.File(path, "r") as file:
         check_own_values(h5py, file, path)
-        contents = {each[0]: each for each in _groups(h5py, file, path.name, downsampling) if each[1]}
+        tables = _groups(h5py, file, path.name, downsampling)
+        contents = {name: (channels, constants, kept) for name, channels, constants, kept in tables if channels}
     if not contents:
         raise FileError(
             f"{path.name}: no dataset is a vector of numbers, a matrix with columns, or a table of records."
@@ -56,7 +57,7 @@ def read_hdf5_tables(
     origins = {name: f"{path.name}, group '{name}'" if len(contents) > 1 else path.name for name in contents}
     return tuple(
         reduction.noted(merge_channels(origins[name], channels, constants))
-        for name, channels, constants, reduction in contents.values() if group in (None, name)
+        for name, (channels, constants, reduction) in contents.items() if group in (None, name)
     )  # fmt: skip
 
 

@@ -66,20 +66,21 @@ def find_branches(
     runs, time = find_runs(recording) if runs is None else runs, recording.columns.get("time")
     moved = moved_column(recording)
     isobaric = [run.interval for run in runs if run.kind == ISOBARIC and moved in run.swept_columns]
-    is_moved = moved is not None and 2 * sum(map(len, isobaric)) > len(recording)
-    column, parts = (moved or "", isobaric) if is_moved else ("pressure", _split_at_runs(recording, runs))
+    column, parts = "pressure", _split_at_runs(recording, runs)
+    if moved and 2 * sum(map(len, isobaric)) > len(recording):
+        column, parts = moved, isobaric
     smooth = [_remove_spikes(recording[column][p.rows], None if time is None else time[p.rows]) for p in parts]
-    if is_moved:
-        noise = [0.0 if time is None else estimate_noise(values) for values in smooth]
-        thresholds = [max(reversal * float(np.ptp(v)), 10.0 * std) for v, std in zip(smooth, noise, strict=True)]
-    else:
+    if column == "pressure":
         if sensor is None and any(run.kind == AT_REST for run in runs):
             sensor = Sensor("pressure", 0.0, estimate_noise(recording["pressure"]))
         deviation = 10.0 * (sensor.std if sensor else 0.0)
         thresholds = [max(reversal * float(np.ptp(np.concatenate(smooth))), deviation)] * len(parts)
+    else:
+        noise = [0.0 if time is None else estimate_noise(values) for values in smooth]
+        thresholds = [max(reversal * float(np.ptp(v)), 10.0 * std) for v, std in zip(smooth, noise, strict=True)]
     branches = []
     for part, values, threshold in zip(parts, smooth, thresholds, strict=True):
-        pressure = recording["pressure"][part.rows] if is_moved else values
+        pressure = values if column == "pressure" else recording["pressure"][part.rows]
         for each, direction in _monotonic_intervals(values, threshold):
             ends = float(pressure[each.start]), float(pressure[each.stop - 1])
             interval = Interval(part.start + each.start, part.start + each.stop)

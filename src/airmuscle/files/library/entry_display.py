@@ -93,8 +93,8 @@ class EntryDisplay(Reported, abc.ABC):
         units = [check.units_of_table({"quantity": check.quantity})["equals"] for check in checks]
         columns: dict[str, Any] = {
             "checked quantity": TableColumn([check.quantity for check in checks], short="check"),
-            **{f"at {name}": TableColumn(values, unit := CHECK_UNITS[name], SHOWN_UNITS.get(unit, unit))
-               for name, values in at.items() if any(value is not None for value in values)},
+            **{f"at {name}": TableColumn(at[name], unit, SHOWN_UNITS.get(unit, unit))
+               for name, unit in CHECK_UNITS.items() if any(value is not None for value in at[name])},
             "published value": TableColumn([check.equals for check in checks], BY_ROW, short="published"),
             "tolerance": TableColumn([check.tolerance for check in checks], BY_ROW),
             "unit": TableColumn(units, shown=[SHOWN_UNITS.get(unit, unit) for unit in units]),

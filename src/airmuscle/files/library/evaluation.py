@@ -103,9 +103,8 @@ def evaluate(entry: Entry, given: Mapping[str, Any]) -> Evaluation:
     law, solved = entry.characteristic, unknown[0]
     if "pressure" in values:
         check_above_vacuum(values["pressure"])
-    if (contraction := values.get("contraction")) is not None and isinstance(
-        law, ForceLaw
-    ):  # others check it themselves
+    contraction = values.get("contraction")
+    if contraction is not None and isinstance(law, ForceLaw):  # the other laws check it themselves
         low, high = law.contraction_range
         if not low <= contraction <= high:
             as_percentage = contraction >= 1.0 and contraction / 100 <= high
