@@ -30,8 +30,8 @@ from .loops import fit_hysteresis as fit_hysteresis
 from .loops import fit_loop as fit_loop
 from .loops import initial_friction_laws as initial_friction_laws
 from .loops import make_loop_series as make_loop_series
-from .loops import preferred_fit as preferred_fit
 from .result import HysteresisFit as HysteresisFit
+from .result import preferred_fit as preferred_fit
 from .search import branch_gap as branch_gap
 from .search import repeat_difference as repeat_difference
 from .search import search_parameters as search_parameters

@@ -16,8 +16,8 @@ from ....report.shown import parameter_table
 from ...segment.runs import RELATIVE_BAND
 from ..model_evidence import effective_sample_size, format_p_value
 from .loop_data import MILLIMETRES, DataLimits, combine_limits, limit_reservations
-from .loops import LoopFit, preferred_fit
-from .result import SIGNIFICANCE_LEVEL, FrictionFit, HysteresisFit, Misfit, evidence
+from .loops import LoopFit
+from .result import SIGNIFICANCE_LEVEL, FrictionFit, HysteresisFit, Misfit, evidence, preferred_fit
 from .search import LoopSeries, search_parameters
 
 MAX_DEVIATION = 0.2

@@ -3,11 +3,10 @@
 import dataclasses
 import warnings
 from collections.abc import Callable, Mapping, Sequence
-from typing import TypeVar
 
 import numpy as np
 
-from ....core import AirmuscleWarning, Array, Hint, HintedText, IdentificationError, ShortRepr, check_whole, leaves
+from ....core import AirmuscleWarning, Array, Hint, HintedText, IdentificationError, ShortRepr, check_whole
 from ....physics import Characteristic, Friction, LoopScales
 from ....physics.muscle import friction as laws
 from ....recording import Recording
@@ -15,14 +14,11 @@ from ... import segment
 from ...segment.runs import CONTRACTION_BAND, RELATIVE_BAND
 from ..data_checks import level_text
 from . import loop_data as data
-from .result import FrictionFit, HysteresisFit, assess_fit
+from .result import HysteresisFit, assess_fit, preferred_fit
 from .search import LoopSeries, free_parameters, search_parameters
 
 CURVE_DEGREE = 5
 """Degree of the polynomial static curve of a loop, in `hysteresis` as in `campaign` (chosen)."""
-SIMILAR_RMSE = 1.02
-"""Maximum ratio of the rms errors of two laws that describe the data equally well (chosen)."""
-AnyFit = TypeVar("AnyFit", bound=FrictionFit)
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
@@ -54,22 +50,6 @@ def describe_run(run: segment.Run) -> str:
     if run.constant_column is None or run.constant_value is None:
         return run.kind.name
     return f"{run.kind.name} at {level_text(run.constant_column, run.constant_value)}"
-
-
-def preferred_fit(fits: Sequence[AnyFit]) -> AnyFit | None:
-    """The fit to use of several laws, lowest AICc first; None where the data justify none.
-
-    It is the justified one with the lowest AICc. Where the data do not determine all of its parameters, or do not judge
-    them one by one because it consists of elements, it is the one with the fewest parameters among those whose rms
-    error is at most 2 % greater.
-    """
-    justified = [fit for fit in fits if fit.justified]
-    if not justified:
-        return None
-    if not justified[0].undetermined and not any("[" in leaf.path for leaf in leaves(justified[0].friction)):
-        return justified[0]
-    similar = [fit for fit in justified if fit.rmse <= SIMILAR_RMSE * justified[0].rmse]
-    return min(similar, key=lambda fit: free_parameters(fit.friction))
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)

@@ -3,7 +3,7 @@
 import abc
 import dataclasses
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
@@ -138,6 +138,27 @@ def evidence(friction: Friction, runs: Sequence[LoopSeries], repeats: Sequence[L
         "repeat_rmse": float(np.sqrt(again[0])),
         "repeat_rmse_without_friction": float(np.sqrt(again[1])),
     }
+
+
+AnyFit = TypeVar("AnyFit", bound=FrictionFit)
+SIMILAR_RMSE = 1.02
+"""Maximum ratio of the rms errors of two laws that describe the data equally well (chosen)."""
+
+
+def preferred_fit(fits: Sequence[AnyFit]) -> AnyFit | None:
+    """The fit to use of several laws, lowest AICc first; None where the data justify none.
+
+    It is the justified one with the lowest AICc. Where the data do not determine all of its parameters, or do not judge
+    them one by one because it consists of elements, it is the one with the fewest parameters among those whose rms
+    error is at most 2 % greater.
+    """
+    justified = [fit for fit in fits if fit.justified]
+    if not justified:
+        return None
+    if not justified[0].undetermined and not any("[" in leaf.path for leaf in leaves(justified[0].friction)):
+        return justified[0]
+    similar = [fit for fit in justified if fit.rmse <= SIMILAR_RMSE * justified[0].rmse]
+    return min(similar, key=lambda fit: free_parameters(fit.friction))
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False, kw_only=True)
