@@ -10,7 +10,7 @@ import pytest
 from control_plants import LIFT
 
 import airmuscle as am
-from airmuscle.control import ExtendedKalmanFilter, MovingHorizonEstimator, UnscentedKalmanFilter
+from airmuscle.control import ExtendedKalmanFilter, MovingHorizonEstimator, StateEstimate, UnscentedKalmanFilter
 from airmuscle.core import StateVariable, System
 from airmuscle.errors import ParameterError, SolveError
 
@@ -208,6 +208,20 @@ def test_inputs_are_the_columns_of_a_recording_also_converted_ones_and_a_plant_m
     columns = {"time": 0.5 * np.arange(40), "double": np.full(40, np.nan), "length": np.full(40, 0.15)}
     record = am.Recording(columns, "test", {"resting_length": 0.2})
     assert judged.estimate(record, judged.start({"y": 0.0}, {}))["y"][-1] == pytest.approx(end, abs=1e-6)
+
+
+@pytest.mark.parametrize("kind", [ExtendedKalmanFilter, UnscentedKalmanFilter])
+def test_a_sample_needs_one_value_for_each_measured_column_and_each_input(kind):
+    judged = lift_filter(kind)
+    estimate = judged.start(START, DEVIATIONS)
+    with pytest.raises(ParameterError, match=r"the measured values are \[200000\.0\], 1; needed are pressure, pos"):
+        judged.correct(estimate, [2e5], [0.0, 0.0])
+    with pytest.raises(ParameterError, match=r"the inputs are \[0\.1\], 1; needed are fill, discharge"):
+        judged.predict(estimate, [0.1])
+    with pytest.raises(ParameterError, match=r"the inputs are \[0\.1\], 1; needed are fill, discharge"):
+        judged.columns(estimate, [0.1])
+    with pytest.raises(ParameterError, match=r"the states are \[0\.0\], 1; needed are air_mass, position, speed"):
+        judged.columns(StateEstimate(np.zeros(1), np.eye(1)), [0.0, 0.0])
 
 
 # Moving horizon

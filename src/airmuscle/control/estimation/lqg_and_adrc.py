@@ -28,6 +28,13 @@ def check_numbers(
             raise ParameterError(f"{owner}: {argument} has no number for '{name}'; give one.")
 
 
+def check_count(owner: str, what: str, values: Sequence[float], names: Sequence[str]) -> None:
+    """Raise ParameterError where there are not as many values as names."""
+    if len(values) != len(names):
+        needed = ", ".join(names) or "none"
+        raise ParameterError(f"{owner}: the {what} are {values}, {len(values)}; needed are {needed}.")
+
+
 def checked_scale(
     owner: str, model: LinearModel, columns: Mapping[str, Sequence[str]], disturbed: Sequence[str],
     permitted: Mapping[str, float], noise: tuple[Mapping[str, float], Mapping[str, float]],

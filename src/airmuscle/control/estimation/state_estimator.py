@@ -14,7 +14,7 @@ from ...core.system import check_system, state_vector
 from ...engine.compile import AugmentedRates, CompiledSystem, augmented_rates, compile_system, states_and_outputs
 from ...engine.loop import COMMAND
 from ...recording.recording import Recording
-from .lqg_and_adrc import DISTURBANCE, check_numbers
+from .lqg_and_adrc import DISTURBANCE, check_count, check_numbers
 
 UNKNOWN = 1e30
 """Factor of the variance of a missing measurement."""
@@ -200,6 +200,7 @@ class StateEstimator(ShortRepr, abc.ABC):
         innovation beyond the gate leaves the estimate as it was. Raises SolveError for an infinite value, and where the
         innovation has no positive definite covariance.
         """
+        check_count(type(self).__name__, "measured values", values, self.measured)
         given = np.asarray(values, dtype=float)
         if np.isinf(given).any():
             raise SolveError(
@@ -222,6 +223,8 @@ class StateEstimator(ShortRepr, abc.ABC):
 
     def columns(self, estimate: StateEstimate, inputs: Sequence[float]) -> dict[str, float]:
         """All states and outputs of the plant at an estimate, such as contraction and force."""
+        check_count(type(self).__name__, "states", estimate.mean.tolist(), self.states)
+        check_count(type(self).__name__, "inputs", inputs, self._compiled.description.input_names)
         table = self.table(estimate.mean[None, :], np.array([inputs], dtype=float))
         return {name: float(column[0]) for name, column in table.items()}
 
@@ -269,8 +272,7 @@ class StateEstimator(ShortRepr, abc.ABC):
 
     def table(self, means: Array, inputs: Array) -> dict[str, Array]:
         """All states and outputs of the plant at estimates (N, n) and inputs (N, m), by name."""
-        known = self._compiled.description
-        count = len(known.state_names)
+        known, count = self._compiled.description, len(self._compiled.description.state_names)
         values = states_and_outputs(self._functions, count, means, inputs, len(known.output_names))
         further = dict(zip(self.states[count:], means[:, count:].T, strict=True))
         return {**dict(zip((*known.state_names, *known.output_names), values.T, strict=True)), **further}
@@ -281,6 +283,7 @@ class StateEstimator(ShortRepr, abc.ABC):
 
     def _filled(self, estimate: StateEstimate, inputs: Sequence[float]) -> SimpleNamespace:
         """A bound filter that no other thread uses, at an estimate."""
+        check_count(type(self).__name__, "inputs", inputs, self._compiled.description.input_names)
         bound = self._idle.pop() if self._idle else self._bind()
         bound.mean[:], bound.covariance[:], bound.inputs[:] = estimate.mean, estimate.covariance, inputs
         return bound
