@@ -65,11 +65,6 @@ series:NAME      each time series (n, T)
 SERIES = "series:"
 
 
-def array_names(study: Study) -> list[str]:
-    """The names of the arrays of a chunk."""
-    return ["scalars", "failure_reasons", *with_prefix(SERIES, study.time_series)]
-
-
 def study_fingerprint(study: Study) -> str:
     """The fingerprint of a study and of the program version that runs it."""
     return fingerprint(program_fingerprint(), study.fingerprint(), study.values)
@@ -131,9 +126,10 @@ def write_chunk(chunk: Chunk, path: Path) -> None:
 
 def read_chunk(study: Study, path: Path) -> Chunk | None:
     """The chunk of a study in a file; None if the file is missing or damaged."""
+    names = "scalars", "failure_reasons", *with_prefix(SERIES, study.time_series)
     try:
         with np.load(path, allow_pickle=False) as file:
-            return {name: file[name] for name in array_names(study)}
+            return {name: file[name] for name in names}
     except Exception:  # damage to any byte of an archive: it is computed again
         return None
 
@@ -172,7 +168,7 @@ def run_study(
             write_chunk(chunk, files[index])
         done += len(study.chunks[index])
         report(done, len(study))
-    joined = {name: np.concatenate([chunks[i][name] for i in range(len(chunks))]) for name in array_names(study)}
+    joined = {name: np.concatenate([chunks[i][name] for i in range(len(chunks))]) for name in chunks[0]}
     return StudyResult(
         study,
         joined["scalars"],
