@@ -53,6 +53,7 @@ def displayed(recording: am.Recording) -> dict[str, NotebookDisplay]:
         "plant": entries["joint-dmsp-20-matrix"].plant,
         "recording": recording,
         "fit": am.fit(ContractileSurface.blank(2), recording),
+        "inspection": am.bench.inspect(recording),
     }
 
 

@@ -3,12 +3,12 @@ from .branches import branch_column_agreement as branch_column_agreement
 from .branches import branch_directions as branch_directions
 from .branches import find_branches as find_branches
 from .branches import motion_direction as motion_direction
-from .inspection import Finding as Finding
-from .inspection import Inspection as Inspection
 from .inspection import check_contents as check_contents
 from .inspection import check_swept as check_swept
 from .inspection import inspect as inspect
 from .inspection import inspect_all as inspect_all
+from .inspection_result import Finding as Finding
+from .inspection_result import Inspection as Inspection
 from .interval import Interval as Interval
 from .interval import find_static_points as find_static_points
 from .outliers import Outlier as Outlier
@@ -37,7 +37,7 @@ from .sensor import estimate_sensors as estimate_sensors
 # isort: split
 # For the other rooms, not in __all__
 from .branches import branch_name as branch_name
-from .inspection_chapter import inspection_chapters as inspection_chapters
+from .inspection_result import inspection_chapters as inspection_chapters
 from .interval import Mask as Mask
 from .interval import level_intervals as level_intervals
 from .interval import remembered as remembered

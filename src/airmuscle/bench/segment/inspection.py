@@ -1,20 +1,19 @@
 """Inspection of a recording before any fit: sampling, sensors, runs, branches, plateaus, and data-quality findings."""
 
-import dataclasses
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
 
 import numpy as np
 
-from ...core import BLUE, GREEN, ORANGE, PURPLE, RED, Array, ShortRepr, counted, legend_below, new_figure
+from ...core import counted
 from ...core.errors import ColumnError, Hint, HintedText
-from ...recording.columns import ZERO_NOT_STATED, display_scale, quantity_of
+from ...recording.columns import ZERO_NOT_STATED, quantity_of
 from ...recording.recording import Recording
 from ..readers.time_base import UNIFORM, WITHOUT_TIME
-from .branches import Branch, branch_column_agreement, find_branches
-from .interval import StaticPoints, find_static_points
-from .outliers import Outlier, find_outliers
-from .plateaus import Plateau, find_plateaus, quasi_static_rows
+from .branches import branch_column_agreement, find_branches
+from .inspection_result import Finding, Inspection
+from .interval import find_static_points
+from .outliers import find_outliers
+from .plateaus import find_plateaus, quasi_static_rows
 from .runs import AT_REST, FREE, KINDS, Run, find_runs, moved_column
 from .sensor import Sampling, Sensor, analyse_sampling, estimate_sensors
 
@@ -28,78 +27,6 @@ NOISE_FACTOR = 10.0
 """A pressure with a range below this multiple of the sensor's standard deviation is constant (chosen)."""
 MIN_ROWS_PER_STEP = 5
 """A step sampled by fewer rows than this is undersampled (chosen)."""
-_PLOTTED = ("pressure", "force", "contraction", "length", "shortening", "position", "temperature")
-_COLOURS = {1: BLUE, -1: RED}
-
-
-@dataclasses.dataclass(frozen=True)
-class Finding:
-    """A data-quality finding. If it is `serious`, a fit of the recording would fail or mislead."""
-
-    text: str
-    serious: bool = False
-
-
-@dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class Inspection(ShortRepr):
-    """Result of the inspection of a recording: sampling, sensors, segments, suspected outliers and findings."""
-
-    recording: Recording
-    sampling: Sampling | None
-    sensors: Mapping[str, Sensor]
-    runs: tuple[Run, ...]
-    branches: tuple[Branch, ...]
-    plateaus: tuple[Plateau, ...]
-    outliers: tuple[Outlier, ...]
-    quasi_static: float
-    """Fraction of the rows that is quasi-static."""
-    branch_agreement: float | None
-    """Fraction of the rows in which the branch column of the file agrees; None without such a column."""
-    findings: tuple[Finding, ...]
-    static_points: StaticPoints | None = None
-    """The levels of a force map without time; None for any other recording."""
-
-    def plot(self) -> Any:
-        """Pressure, force and length over time with branches, plateaus, outliers and limits; a Matplotlib figure."""
-        recording = self.recording
-        names = [n for n in _PLOTTED if n in recording] or [n for n in recording if n != "time"]
-        if "contraction" in names and "length" in names:
-            names.remove("length")
-        abscissa: Array = recording["time"] if "time" in recording else np.arange(1.0, len(recording) + 1)
-        figure, axes = new_figure(len(names), 1, height=1.1 + 1.5 * len(names), sharex=True, squeeze=False)
-        for axis, name in zip(axes[:, 0], names, strict=True):
-            factor, unit = display_scale(name)
-            self._draw(axis, name, abscissa, factor)
-            axis.set_ylabel(f"{name}\n[{unit}]")
-        axes[-1, 0].set_xlabel("time [s]" if "time" in recording else "row")
-        figure.align_ylabels()
-        figure.suptitle(recording.origin, fontsize=9)
-        legend_below(figure, axes[0, 0], columns=4)
-        return figure
-
-    def _draw(self, axis: Any, name: str, abscissa: Array, factor: float) -> None:
-        """One column: readings coloured by branch, plateaus as bars, outliers as crosses, limits of the sensor."""
-        values, dots = self.recording[name] * factor, {"linestyle": "none", "marker": ".", "markersize": 2.5}
-        if not self.branches:
-            axis.plot(abscissa, values, color=BLUE, label="measured", **dots)
-        for branch in self.branches:
-            rows, labels = branch.interval.rows, axis.get_legend_handles_labels()[1]
-            label = None if branch.name in labels else branch.name
-            axis.plot(abscissa[rows], values[rows], color=_COLOURS[branch.direction], label=label, **dots)
-        for i, plateau in enumerate(self.plateaus):
-            ends = abscissa[[plateau.interval.start, plateau.interval.stop - 1]]
-            level = [plateau.values.get(name, np.nan) * factor] * 2
-            axis.plot(ends, level, color=GREEN, linewidth=1.2, label="plateau" if i == 0 else None)
-        if self.outliers:  # also in axes without outliers, because the legend is that of the first axis
-            found = [outlier.row for outlier in self.outliers if outlier.column == name]
-            style = {"linestyle": "none", "marker": "x", "markersize": 6, "color": PURPLE}
-            axis.plot(abscissa[found], values[found], label="suspected outlier", **style)
-        sensor = self.sensors.get(name) if values.size else None
-        for limit in (sensor.lower_limit * factor, sensor.upper_limit * factor) if sensor else ():
-            if np.isfinite(limit):
-                axis.axhline(limit, color=ORANGE, linestyle="--", linewidth=1.0)
-                axis.annotate("sensor limit", (0.995, limit), xycoords=("axes fraction", "data"), ha="right",
-                              va="bottom", fontsize=7, color=ORANGE)  # fmt: skip
 
 
 def inspect(recording: Recording, shared_sensors: Mapping[str, Sensor] | None = None) -> Inspection:

@@ -1,53 +1,129 @@
-"""Report chapters: the inspection of recordings, each with its columns, runs, branches, plateaus and findings."""
+"""Result of the inspection of recordings, with its chapter: columns, runs, branches, plateaus and findings."""
 
 import dataclasses
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from ...core import HintedText, quantity_text
+from ...core import BLUE, GREEN, ORANGE, PURPLE, RED, Array, HintedText, legend_below, new_figure, quantity_text
+from ...recording import Recording
 from ...recording.columns import display_scale, quantity_of
 from ...report.chapter import BY_ROW, Chapter, NamedValue, Plot, Table, TableColumn
 from ..readers.constants import CONSTANT_QUANTITIES
-from ..reported import unit_column
-from .inspection import Inspection
+from ..reported import Reported, unit_column
+from .branches import Branch
+from .interval import StaticPoints
+from .outliers import Outlier
+from .plateaus import Plateau
 from .runs import Run
+from .sensor import Sampling, Sensor
 
 MAX_FILES, MAX_RUNS, MAX_LISTED = 12, 8, 4
 """Rows of the brief view: files, runs of a file, and branches or outliers (chosen)."""
+_PLOTTED = ("pressure", "force", "contraction", "length", "shortening", "position", "temperature")
+_COLOURS = {1: BLUE, -1: RED}
+
+
+@dataclasses.dataclass(frozen=True)
+class Finding:
+    """A data-quality finding. If it is `serious`, a fit of the recording would fail or mislead."""
+
+    text: str
+    serious: bool = False
+
+
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class Inspection(Reported):
+    """Result of the inspection of a recording: sampling, sensors, segments, suspected outliers and findings."""
+
+    recording: Recording
+    sampling: Sampling | None
+    sensors: Mapping[str, Sensor]
+    runs: tuple[Run, ...]
+    branches: tuple[Branch, ...]
+    plateaus: tuple[Plateau, ...]
+    outliers: tuple[Outlier, ...]
+    quasi_static: float
+    """Fraction of the rows that is quasi-static."""
+    branch_agreement: float | None
+    """Fraction of the rows in which the branch column of the file agrees; None without such a column."""
+    findings: tuple[Finding, ...]
+    static_points: StaticPoints | None = None
+    """The levels of a force map without time; None for any other recording."""
+
+    def plot(self) -> Any:
+        """Pressure, force and length over time with branches, plateaus, outliers and limits; a Matplotlib figure."""
+        recording = self.recording
+        names = [n for n in _PLOTTED if n in recording] or [n for n in recording if n != "time"]
+        if "contraction" in names and "length" in names:
+            names.remove("length")
+        abscissa: Array = recording["time"] if "time" in recording else np.arange(1.0, len(recording) + 1)
+        figure, axes = new_figure(len(names), 1, height=1.1 + 1.5 * len(names), sharex=True, squeeze=False)
+        for axis, name in zip(axes[:, 0], names, strict=True):
+            factor, unit = display_scale(name)
+            self._draw(axis, name, abscissa, factor)
+            axis.set_ylabel(f"{name}\n[{unit}]")
+        axes[-1, 0].set_xlabel("time [s]" if "time" in recording else "row")
+        figure.align_ylabels()
+        figure.suptitle(recording.origin, fontsize=9)
+        legend_below(figure, axes[0, 0], columns=4)
+        return figure
+
+    def _draw(self, axis: Any, name: str, abscissa: Array, factor: float) -> None:
+        """One column: readings coloured by branch, plateaus as bars, outliers as crosses, limits of the sensor."""
+        values, dots = self.recording[name] * factor, {"linestyle": "none", "marker": ".", "markersize": 2.5}
+        if not self.branches:
+            axis.plot(abscissa, values, color=BLUE, label="measured", **dots)
+        for branch in self.branches:
+            rows, labels = branch.interval.rows, axis.get_legend_handles_labels()[1]
+            label = None if branch.name in labels else branch.name
+            axis.plot(abscissa[rows], values[rows], color=_COLOURS[branch.direction], label=label, **dots)
+        for i, plateau in enumerate(self.plateaus):
+            ends = abscissa[[plateau.interval.start, plateau.interval.stop - 1]]
+            level = [plateau.values.get(name, np.nan) * factor] * 2
+            axis.plot(ends, level, color=GREEN, linewidth=1.2, label="plateau" if i == 0 else None)
+        if self.outliers:  # also in axes without outliers, because the legend is that of the first axis
+            found = [outlier.row for outlier in self.outliers if outlier.column == name]
+            style = {"linestyle": "none", "marker": "x", "markersize": 6, "color": PURPLE}
+            axis.plot(abscissa[found], values[found], label="suspected outlier", **style)
+        sensor = self.sensors.get(name) if values.size else None
+        for limit in (sensor.lower_limit * factor, sensor.upper_limit * factor) if sensor else ():
+            if np.isfinite(limit):
+                axis.axhline(limit, color=ORANGE, linestyle="--", linewidth=1.0)
+                axis.annotate("sensor limit", (0.995, limit), xycoords=("axes fraction", "data"), ha="right",
+                              va="bottom", fontsize=7, color=ORANGE)  # fmt: skip
+
+    def chapter(self) -> Chapter:
+        """The description of the recording."""
+        recording, sampling = self.recording, self.sampling
+        tables = [_column_table(self), _run_table(self.runs), _branch_table(self),
+                  _plateau_table(self), _outlier_table(self)]  # fmt: skip
+        summary = "The rows have no time."
+        if sampling:
+            gaps = f", {len(sampling.gaps)} gaps" if sampling.gaps else ""
+            regularity = "time stamps repeat" if sampling.rounded else f"jitter {100 * sampling.jitter:.1f} %"
+            summary = f"{sampling.rate:.4g} rows per second over {sampling.duration:.4g} s, {regularity}{gaps}."
+        return Chapter(
+            name="inspection",
+            title=f"{recording.origin}: {len(recording)} rows",
+            summary=summary,
+            values=tuple(_values(self)),
+            tables=tuple(table for table in tables if table is not None),
+            plots=(Plot("recording", f"{recording.origin}: branches, plateaus, outliers and limits.", self.plot),),
+            problems=tuple(each.text for each in self.findings if each.serious),
+            notes=(*recording.notes, *(each.text for each in self.findings if not each.serious)),
+        )
 
 
 def inspection_chapters(inspections: Sequence[Inspection]) -> list[Chapter]:
     """Return the chapter of each recording; of several, the overview stands first, and the brief view has it alone."""
     if len(inspections) == 1:
-        return [inspection_chapter(inspections[0])]
-    parts = [dataclasses.replace(inspection_chapter(each).among(suffix=f"-{i}"), brief=False)
+        return [inspections[0].chapter()]
+    parts = [dataclasses.replace(each.chapter().among(suffix=f"-{i}"), brief=False)
              for i, each in enumerate(inspections, 1)]  # fmt: skip
     return [_overview(inspections), *parts]
-
-
-def inspection_chapter(inspection: Inspection) -> Chapter:
-    """Return the chapter of one recording."""
-    recording, sampling = inspection.recording, inspection.sampling
-    tables = [_column_table(inspection), _run_table(inspection.runs), _branch_table(inspection),
-              _plateau_table(inspection), _outlier_table(inspection)]  # fmt: skip
-    summary = "The rows have no time."
-    if sampling:
-        gaps = f", {len(sampling.gaps)} gaps" if sampling.gaps else ""
-        regularity = "time stamps repeat" if sampling.rounded else f"jitter {100 * sampling.jitter:.1f} %"
-        summary = f"{sampling.rate:.4g} rows per second over {sampling.duration:.4g} s, {regularity}{gaps}."
-    return Chapter(
-        name="inspection",
-        title=f"{recording.origin}: {len(recording)} rows",
-        summary=summary,
-        values=tuple(_values(inspection)),
-        tables=tuple(table for table in tables if table is not None),
-        plots=(Plot("recording", f"{recording.origin}: branches, plateaus, outliers and limits.", inspection.plot),),
-        problems=tuple(each.text for each in inspection.findings if each.serious),
-        notes=(*recording.notes, *(each.text for each in inspection.findings if not each.serious)),
-    )
 
 
 def _values(inspection: Inspection) -> Iterator[NamedValue]:
