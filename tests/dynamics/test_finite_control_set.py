@@ -108,6 +108,12 @@ def test_an_impossible_law_is_refused(changes, message):
         FiniteControlSet(FILTER, FIRST, **given)
 
 
+@pytest.mark.parametrize("mode", [-1, 3])
+def test_a_mode_beyond_the_last_one_is_refused(mode):
+    with pytest.raises(ParameterError, match=f"FiniteControlSet: mode is {mode}; allowed range: 0 to 2"):
+        law().best_sequence(FIRST.mean, [START["position"]], mode)
+
+
 def test_a_controller_with_a_filter_can_be_sent_to_another_process():
     """Also after it has run, when it holds machine code and arrays."""
     judged = law(horizon=2)

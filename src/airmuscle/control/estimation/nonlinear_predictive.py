@@ -245,8 +245,10 @@ class FiniteControlSet(EstimatingController):
     def best_sequence(self, state: Array, wanted: Sequence[float], mode: int) -> tuple[int, ...]:
         """The modes (N,) with the least cost from an estimated state, for set points and the mode before.
 
-        Raises SolveError where no prediction is finite.
+        Raises SolveError where no prediction is finite, ParameterError for a mode beyond the last one.
         """
+        if not 0 <= mode < len(self.modes):
+            raise ParameterError(f"FiniteControlSet: mode is {mode}; allowed range: 0 to {len(self.modes) - 1}.")
         search = self._idle.pop() if self._idle else self._bound()
         _, run, states, aims, modes, best = search
         states[0], aims[:], modes[0] = state, wanted, mode
