@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import _thread
 import dataclasses
+import errno
 import json
 import re
 import threading
@@ -519,6 +520,18 @@ def test_a_column_of_a_strange_name_has_a_file(tmp_path):
     )
     assert (tmp_path / "out" / "d pressure%2Fd 0.npy").exists()
     assert found[name].shape == (2, found.time.size)
+
+
+@pytest.mark.parametrize("place", ["numpy.lib.format.open_memmap", "os.posix_fallocate", "numpy.save"])
+def test_a_full_disk_is_named_and_leaves_nothing_behind(tmp_path, monkeypatch, place):
+    """Room for the columns is reserved before the run: in it, a disk that is full would end the process."""
+
+    def fails(*_, **__):
+        raise OSError(errno.ENOSPC, "No space left on device")
+
+    monkeypatch.setattr(place, fails, raising=False)
+    refused(r"out: cannot be written to: No space left on device. Free space", FileError, into=tmp_path / "out")
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_an_error_on_the_way_leaves_nothing_behind(tmp_path, monkeypatch):

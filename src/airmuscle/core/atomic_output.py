@@ -63,17 +63,17 @@ def atomic_folder(folder: Path | str) -> Iterator[Path]:
     FileError.
     """
     target = Path(folder)
-    with _raise_file_errors(target):
+    with raise_file_errors(target):
         created = _missing_folders(target)
     try:
-        with _raise_file_errors(target):
+        with raise_file_errors(target):
             target.mkdir(parents=True, exist_ok=True)
             _remove_abandoned(target)
             staging = Path(tempfile.mkdtemp(prefix=f"{_UNFINISHED}{os.getpid()}-", dir=target))
         try:
-            with _raise_file_errors(target, FULL):
+            with raise_file_errors(target, FULL):
                 yield staging
-            with _raise_file_errors(target):
+            with raise_file_errors(target):
                 _move_files(staging, target)
         finally:
             shutil.rmtree(staging, ignore_errors=True)
@@ -123,7 +123,7 @@ def check_writable(folder: Path | str, *, shared: bool = False) -> None:
     it raises FolderInUseError. A shared folder stays, because another process may have begun to use it.
     """
     target = Path(folder)
-    with _raise_file_errors(target):
+    with raise_file_errors(target):
         created = _missing_folders(target)
     try:
         with atomic_folder(target):
@@ -157,7 +157,7 @@ def _hold(target: Path, created: list[Path]) -> None:
     """Lock a folder until the end of the block; `created` are removed then, where they are empty."""
     if fcntl is None or _held is None or target.resolve() in _held:
         return
-    with _raise_file_errors(target):
+    with raise_file_errors(target):
         target.mkdir(parents=True, exist_ok=True)
         descriptor = os.open(target, os.O_RDONLY)
     try:
@@ -174,7 +174,7 @@ def _hold(target: Path, created: list[Path]) -> None:
 
 
 @contextlib.contextmanager
-def _raise_file_errors(target: Path, numbers: Collection[int] = ()) -> Iterator[None]:
+def raise_file_errors(target: Path, numbers: Collection[int] = ()) -> Iterator[None]:
     """Raise FileError for an error of the operating system; of these numbers alone, if some are given."""
     try:
         yield

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ....core import Array, ParameterError, Status, System, as_float, check_known, one_line
+from ....core.atomic_output import raise_file_errors
 from ....core.system import check_system
 from ...compile.program import CompiledSystem, compile_system
 from ...loop import ControlLaw, ControlLoop, InputSignal, PiecewiseLinear, designed_loop
@@ -251,9 +252,10 @@ def _solved(
     job: BatchJob, names: tuple[str, ...], into: str | Path | None, precision: Precision, cores: int
 ) -> BatchSolution:
     """The solution with the columns of these names, in memory or on disk."""
-    shape = len(job.initial_states), job.times.size
-    with contextlib.nullcontext() if into is None else new_folder(Path(into)) as folder:
-        job.columns.update(new_columns(names, shape, precision.dtype, folder))
+    shape, path = (len(job.initial_states), job.times.size), Path(into or "")
+    with contextlib.nullcontext() if into is None else new_folder(path) as folder:
+        with raise_file_errors(path):
+            job.columns.update(new_columns(names, shape, precision.dtype, folder))
         _run(job, precision, cores)
         final = {name: job.final[:, i].copy() for i, name in enumerate(job.compiled.description.state_names)}
         notes = tuple(note for note in (f"simulated by {job.integrator}, in a batch", precision.note) if note)
@@ -262,8 +264,9 @@ def _solved(
             notes,
         )  # fmt: skip
         if folder is not None:
-            write_rest(solution, folder)
+            with raise_file_errors(path):
+                write_rest(solution, folder)
     if into is None:
         return solution
-    columns = {name: np.load(Path(into) / file_of(name), mmap_mode="r") for name in names}
+    columns = {name: np.load(path / file_of(name), mmap_mode="r") for name in names}
     return dataclasses.replace(solution, columns=columns)

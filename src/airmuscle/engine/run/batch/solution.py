@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from ....core import Array, Columns, Reference, Status, System, cite
+from ....core.atomic_output import raise_file_errors
 from ....core.errors import ColumnError, FileError, ParameterError, alternatives
 from ....recording import Recording
 from ..integrators import Integrator
@@ -112,11 +113,9 @@ def new_folder(path: Path) -> Iterator[Path]:
     """A context manager for a folder that is renamed to `path` when all is written. Raises FileError."""
     if path.exists():
         raise FileError(f"{path}: it exists already; give a folder that does not exist, or remove it.")
-    try:
+    with raise_file_errors(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         folder = Path(tempfile.mkdtemp(prefix=f".{path.name}-", dir=path.parent))
-    except OSError as error:
-        raise FileError(f"{path}: cannot be written: {error.strerror or error}.") from None
     try:
         yield folder
         folder.chmod(0o755)
@@ -128,7 +127,7 @@ def new_folder(path: Path) -> Iterator[Path]:
 def new_columns(names: Sequence[str], shape: tuple[int, int], kind: Any, folder: Path | None) -> dict[str, Any]:
     """Arrays (N, T) for columns, in memory or as one .npy file each. Raises ParameterError for too much memory."""
     if folder is not None:
-        return {n: np.lib.format.open_memmap(folder / file_of(n), "w+", np.dtype(kind), shape) for n in names}
+        return {name: _new_file(folder / file_of(name), kind, shape) for name in names}
     size = len(names) * shape[0] * shape[1] * np.dtype(kind).itemsize
     if size > MAX_MEMORY:
         raise ParameterError(
@@ -137,6 +136,15 @@ def new_columns(names: Sequence[str], shape: tuple[int, int], kind: Any, folder:
             "write to disk (into=...), or fewer output times (output_times=...)."
         )
     return {name: np.empty(shape, kind) for name in names}
+
+
+def _new_file(path: Path, kind: Any, shape: tuple[int, int]) -> Any:
+    """A column (N, T) as a file that has its place on the disk: where there is none, writing would end the process."""
+    column = np.lib.format.open_memmap(path, "w+", np.dtype(kind), shape)
+    if hasattr(os, "posix_fallocate"):
+        with path.open("r+b") as file:
+            os.posix_fallocate(file.fileno(), 0, path.stat().st_size)
+    return column
 
 
 def file_of(name: str) -> str:
