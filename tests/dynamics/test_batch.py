@@ -10,11 +10,13 @@ import json
 import re
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
 from joints import chosen_muscle, joint, joint_start
 
+from airmuscle import Status
 from airmuscle.core import StateVariable, System, model, ops, parameter, tree
 from airmuscle.engine import (
     ZERO_INPUT,
@@ -585,6 +587,23 @@ def test_an_interruption_keeps_what_is_done(tmp_path, monkeypatch, method, where
     assert not whole.interrupted
     if where == "disk":
         np.testing.assert_array_equal(np.load(tmp_path / "out" / "status.npy"), found.status)
+
+
+def test_an_interruption_while_threads_start_keeps_what_is_done(monkeypatch):
+    submit = ThreadPoolExecutor.submit
+
+    def interrupted(self, *task):
+        submit(self, *task)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(ThreadPoolExecutor, "submit", interrupted)
+    varied, start = around({"mechanism.mass": 10.0}, 64), plain().state_at(pressure=1e5)
+    try:
+        found = simulate_batch(plain(), varied, PULSE, duration=0.1, initial_states=start, cores=2)
+    except KeyboardInterrupt:
+        pytest.fail("the interruption is passed on, and a thread is left behind")
+    assert found.interrupted
+    assert set(found.status.tolist()) == {0, Status.INTERRUPTED}
 
 
 def test_the_recording_of_one_is_that_of_simulate():

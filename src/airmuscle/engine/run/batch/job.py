@@ -181,36 +181,50 @@ class Queue:
 
     def __init__(self, items: int) -> None:
         self.stop: npt.NDArray[np.int64] = np.zeros(1, dtype=np.int64)
-        self.done = 0
-        self._items = iter(range(items))
+        self.done = self._taken = 0
+        self._items = items
         self._lock = threading.Lock()
 
     def _take(self) -> int | None:
         with self._lock:
-            return None if self.stop[0] else next(self._items, None)
+            if self.stop[0] or self._taken == self._items:
+                return None
+            self._taken += 1
+            return self._taken - 1
 
     def work(self, worker: Callable[[int], Any]) -> None:
         """Take items until there are none, or until a worker failed or the queue was stopped."""
         try:
             while (item := self._take()) is not None:
-                worker(item)
-                with self._lock:
-                    self.done += 1
+                try:
+                    worker(item)
+                finally:
+                    with self._lock:
+                        self.done += 1
         except BaseException:
             self.stop[0] = 1
             raise
 
+    def halt(self) -> None:
+        """Let nobody take a further item, and wait for those that have been taken."""
+        with self._lock:
+            self.stop[0] = 1
+        while self.done < self._taken:
+            time.sleep(0.01)
+
 
 def run_workers(queue: Queue, workers: list[Callable[[int], Any]], advanced: Callable[[int], None]) -> bool:
     """Run each worker on its own thread until the queue is empty; False where the user interrupted it."""
-    complete = True
+    complete, working = True, list[concurrent.futures.Future[None]]()
     with concurrent.futures.ThreadPoolExecutor(max(len(workers), 1)) as threads:
-        working = [threads.submit(queue.work, worker) for worker in workers]
         try:
+            for worker in workers:
+                working.append(threads.submit(queue.work, worker))
             while concurrent.futures.wait(working, 0.05).not_done:
                 advanced(queue.done)
         except KeyboardInterrupt:
-            complete, queue.stop[0] = False, 1
+            complete = False
+            queue.halt()  # the pool does not know a thread whose start was interrupted
     for each in working:
         each.result()
     return complete
