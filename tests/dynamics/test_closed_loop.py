@@ -613,6 +613,31 @@ def test_a_memory_belongs_to_its_instant(start_time):
         )
 
 
+@pytest.mark.parametrize(
+    ("change", "other"),
+    [
+        ({"controller": OnOffController("pressure", "fill", 1e4)}, {}),
+        ({"controller": dataclasses.replace(VALVES, commanded="fill")}, {}),
+        ({"drivers": {"fill": PWM(30.0)}}, {}),
+        ({}, {"measured": (1e5, 2e5)}),
+        ({}, {"applied_inputs": (0.0,)}),
+        ({}, {"controller": None}),
+    ],
+)
+def test_a_run_goes_on_with_the_state_of_its_own_loop(change, other):
+    plant, loop = lifting(), ControlLoop(VALVES, 0.1, PRESSURE)
+    state = solution(plant, loop, duration=1.0).control_state._replace(**other)
+    with pytest.raises(ParameterError, match=r"the control_state is not that of this loop of a .*; give one that"):
+        solution(plant, dataclasses.replace(loop, **change), duration=1.0, start_time=1.0, control_state=state)
+
+
+def test_a_run_with_an_input_that_has_no_driver_in_its_list_goes_on():
+    loop = ControlLoop(VALVES, TICK, PRESSURE, drivers={"fill": (), "discharge": PWM(30.0)})
+    one = solve(Problem(lifting(), loop, 0.25))
+    two = solve(one.continuation(0.25)).raise_if_incomplete()
+    assert two.final_state == solve(Problem(lifting(), loop, 0.5)).final_state
+
+
 def test_an_experiment_takes_the_commands_of_a_loop():
     from airmuscle.bench import Experiment, InitialConditions
 

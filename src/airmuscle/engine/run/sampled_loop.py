@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from ...core import Array, ParameterError
 from ..compile.kernel_layout import DriverKind
-from ..loop import PWM, ControlLoop, ControlLoopState, InputSignal, Measurement, PwmState, SolenoidDriver
+from ..loop import PWM, ControlLaw, ControlLoop, ControlLoopState, InputSignal, Measurement, PwmState, SolenoidDriver
 from ..loop.inputs import PiecewiseLinear
 from ..loop.pwm_and_solenoid import MAX_PERIODS, SolenoidState, apply_drivers, check_command_range
 from .problem import Problem, output_times
@@ -76,6 +76,7 @@ def prepare_loop(problem: Problem, state: ControlLoopState) -> SampledLoop:
     assert isinstance(loop, ControlLoop)
     known, duration = compiled.description, problem.duration
     names = known.input_names
+    _check_state(state, loop, len(names))
     edges, sampled = _edges(loop.sample_time, state, start, problem.end_time)
     close = CLOSE * loop.sample_time
     others = snapped(loop.other_inputs, names, edges, close)
@@ -96,6 +97,22 @@ def prepare_loop(problem: Problem, state: ControlLoopState) -> SampledLoop:
         loop, edges, sampled, inputs, first_segments, commanded, setpoint, setpoints, times,
         first_rows_of(times, edges), names, loop.command_ranges(compiled.system),
     )  # fmt: skip
+
+
+def _check_state(state: ControlLoopState, loop: ControlLoop, inputs: int) -> None:
+    """Raise ParameterError for the state of a loop with another controller, with other drivers, or at another plant."""
+    law, memory = loop.controller, state.controller if isinstance(state.controller, Mapping) else {}
+    drivers = {name: len(chain) for name, chain in loop.driven_inputs.chains.items()}
+    if (
+        (len(state.measured), len(state.commanded)) != (len(law.measured_columns), len(law.inputs))
+        or len(state.applied_inputs) not in (0, inputs)
+        or {name: len(states) for name, states in state.drivers.items()} != drivers
+        or (isinstance(law, ControlLaw) and set(memory) != set(law.initial_memory))
+    ):
+        raise ParameterError(
+            f"the control_state is not that of this loop of a {type(law).__name__}; give one that a run with the same "
+            "controller, drivers and plant returned."
+        )
 
 
 def first_rows_of(times: Array, instants: Array) -> npt.NDArray[np.int64]:
@@ -227,7 +244,6 @@ class DriverTable:
         self.states, self._first = self.kept.copy(), self.kept.copy()
         self.columns, self.scratch = np.empty((m, 3, capacity)), np.empty((2, 3, capacity))
         self.counts, self.begins = np.zeros((2, m), dtype=np.int64), np.empty(m)
-
         self._first_called = state.drivers
         self.restart()
 
@@ -255,7 +271,7 @@ class DriverTable:
         """The drivers' states at the end of the last of so many completed intervals, by input."""
         if self.called:  # the last call may be that of an interval that was not completed
             return self._after if done > self._called_at else self._before
-        by_name: dict[str, tuple[Any, ...]] = {name: () for name, _ in self._order}
+        by_name: dict[str, tuple[Any, ...]] = dict.fromkeys(self._chains, ())
         for (name, driver), row in zip(self._order, self.kept.tolist(), strict=True):
             kind = _STATES[type(driver)]
             by_name[name] = (*by_name[name], kind(*row[: len(kind._fields)]))
