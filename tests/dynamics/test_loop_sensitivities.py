@@ -293,3 +293,9 @@ def test_a_gradient_needs_rows():
     for begin in (DURATION, np.nan, np.inf):
         with pytest.raises(ParameterError, match=r"begin is .* s; at least two rows must follow, allowed range: 0 to"):
             tracking_sensitivity(run, "y", begin=begin)
+
+
+def test_what_is_written_into_an_initial_memory_stays_outside_the_law():
+    law = differentiate_loop(LAG, PI_LOOP, ("controller.gain",), (0.3,)).loop.controller
+    law.initial_memory["integral"] = 5.0
+    assert law.initial_memory["integral"] == 0.0

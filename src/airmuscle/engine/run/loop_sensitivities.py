@@ -150,9 +150,13 @@ class LawWithSensitivities(ControlLaw):
     def inputs(self) -> tuple[str, ...]:
         return self._with_derivatives(self.law.inputs)
 
-    @functools.cached_property
+    @property
     def initial_memory(self) -> dict[str, float]:
         """The values of the law, then the derivatives of each."""
+        return dict(self._initial_memory)
+
+    @functools.cached_property
+    def _initial_memory(self) -> dict[str, float]:
         import casadi
 
         symbolic, parameters = autodiff.symbolic(self.law)
