@@ -108,10 +108,10 @@ def quantity_text(value: Any, si_unit: str, default: str, digits: int = 4) -> st
     return _scaled(value, *chosen_scale(si_unit, 1.0 / known_factor(default), default), digits)
 
 
-def contraction_text(value: Any, decimals: int = 2, digits: int = 4) -> str:
-    """A contraction as text: in per cent with so many decimals, or to significant digits in the chosen unit."""
+def contraction_text(value: Any, decimals: int = 2) -> str:
+    """A contraction as text: in per cent with so many decimals, or to four significant digits in the chosen unit."""
     factor, unit = chosen_scale("1", 0.0, "")
-    return _scaled(value, factor, unit, digits) if unit else f"{100 * value:.{decimals}f} %"
+    return _scaled(value, factor, unit, 4) if unit else f"{100 * value:.{decimals}f} %"
 
 
 def _scaled(value: Any, factor: float, unit: str, digits: int) -> str:
@@ -148,9 +148,9 @@ def heading_scale(heading: str) -> tuple[float, str]:
     return factor * scale, f"{match['name']}[{'-' if unit == '1' else unit}]"
 
 
-def scaled_numbers(text: str, factor: float, digits: int = 4) -> str:
+def scaled_numbers(text: str, factor: float) -> str:
     """A text with its numbers multiplied by a factor: '1 to 2' becomes '0.01 to 0.02' for 0.01."""
-    return _NUMBER.sub(lambda match: f"{float(match[0].replace('−', '-')) * factor:.{digits}g}", text)
+    return _NUMBER.sub(lambda match: f"{float(match[0].replace('−', '-')) * factor:.4g}", text)
 
 
 @functools.cache

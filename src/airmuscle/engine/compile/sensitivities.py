@@ -182,10 +182,10 @@ def _print_along(
         further = moving.along(moving.results)
         parts = moving.compute(printer, block, [p for each in further.changes for p in each.inputs.values()], arguments)
         w = t.input_rows(block, "w")
-        moved = [(i, change.inputs) for i, change in enumerate(further.changes) if change.inputs]
-        terms = {i: (w[j] * parts[part] for j, part in inputs.items()) for i, inputs in moved}
-        added = {i: functools.reduce(operator.add, each) for i, each in terms.items()}
-        columns = [row + added[i] if i in added else row for i, row in enumerate(columns)]
+        for i, change in enumerate(further.changes):
+            if change.inputs:
+                moved = functools.reduce(operator.add, (w[j] * parts[part] for j, part in change.inputs.items()))
+                columns[i] = columns[i] + moved
     rows = [computed[v] for v in values.results] + columns
     if last is not None:
         final = last.compute(printer, block, last.results)

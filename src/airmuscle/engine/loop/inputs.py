@@ -75,8 +75,12 @@ class PiecewiseLinear(ShortRepr):
             )
         if not (all_finite(ends) and all_finite(values) and all_finite(slopes)):
             raise ParameterError("segments hold a number that is not finite.")
-        few = ends.tolist() if ends.size <= FEW else []
-        if ends[0] <= start or not (all(map(operator.lt, few, few[1:])) if few else (ends[1:] > ends[:-1]).all()):
+        if ends.size > FEW:
+            rising = bool((ends[1:] > ends[:-1]).all())
+        else:
+            listed = ends.tolist()
+            rising = all(map(operator.lt, listed, listed[1:]))
+        if ends[0] <= start or not rising:
             raise ParameterError(f"segments must end in rising order after {start:g} s; they end at {ends.tolist()} s.")
 
     def as_floats(self) -> "PiecewiseLinear":

@@ -79,14 +79,14 @@ class BoundIntegrator:
 
     def run(
         self, segments: PiecewiseLinear, start: float, state: Array, times: Array, max_steps: int = MAX_STEPS,
-        rows: Array | None = None, check: Callable[[Array, float], Status] | None = None,
+        check: Callable[[Array, float], Status] | None = None,
     ) -> RawSolution:  # fmt: skip
         """Integrate from `state` (n,) at `start` [s] through the segments; rows (N, n) at rising `times` (N,).
 
         `check` states for a state (n,) and a time [s], DONE or why the run ends there; it is called between packets of
         many steps, because the steps can become endlessly many where the model does not hold.
         """
-        rows = np.empty((times.size, self.state.size)) if rows is None else rows
+        rows = np.empty((times.size, self.state.size))
         self.state[:] = state
         for i, argument in enumerate((segments.ends, segments.values, segments.slopes, times), self._first):
             self._kernel.replace_input(i, argument)
@@ -167,11 +167,10 @@ class Integrator(abc.ABC):
         return BoundIntegrator(self.binding(compiled), compiled.sizes)
 
     def run(
-        self, compiled: CompiledSystem, segments: PiecewiseLinear, start: float, state: Array, times: Array,
-        max_steps: int = MAX_STEPS,
-    ) -> RawSolution:  # fmt: skip
+        self, compiled: CompiledSystem, segments: PiecewiseLinear, start: float, state: Array, times: Array
+    ) -> RawSolution:
         """Integrate from `state` (n,) at `start` [s] through the segments; rows (N, n) at rising `times` (N,)."""
-        return self.bind(compiled).run(segments, start, state, times, max_steps)
+        return self.bind(compiled).run(segments, start, state, times)
 
 
 @model

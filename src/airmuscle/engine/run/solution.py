@@ -4,7 +4,7 @@ import dataclasses
 import functools
 import operator
 from collections.abc import Mapping
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -21,6 +21,9 @@ from ..loop.inputs import PiecewiseLinear
 from .integrators import RawSolution
 from .problem import Problem
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 _HINTS = {
     Status.TOO_MANY_STEPS: "Raise the tolerance, lengthen a fixed step, or look for a valve that chatters.",
     Status.INTERRUPTED: "Nothing is lost; the rows until then are in the recording.",
@@ -28,6 +31,7 @@ _HINTS = {
 }
 _GENERAL_HINT = "Check the last state: a parameter may be far from physical, or a fixed step too long."
 _name = functools.lru_cache(maxsize=32)(str)
+"""The text of an integrator."""
 
 
 class RowTable(NamedTuple):
@@ -232,8 +236,8 @@ class Solution(NotebookDisplay):
             return self
         raise SimulationError(self.diagnostics[-1].message, self, interrupted=self.status == Status.INTERRUPTED)
 
-    def to_pandas(self) -> Any:
-        """The recording as a data frame of pandas."""
+    def to_pandas(self) -> "pd.DataFrame":
+        """The recording as a data frame."""
         return self.recording.to_pandas()
 
     def plot(self, *names: str, ax: Any = None) -> Any:

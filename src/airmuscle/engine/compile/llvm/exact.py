@@ -17,6 +17,7 @@ class ExactBody(FunctionBody):
         self.rounder = 1.5 * 2.0**self.mantissa
         """Added to an integer of moderate size, this leaves the integer in the last bits of the sum."""
 
+    # as with conditions, without flags
     add, subtract, times, over = (functools.partialmethod(FunctionBody.logical, operator) for operator in "+-*/")
 
     def fused(self, a: str, b: str, c: str) -> str:
