@@ -128,3 +128,26 @@ def test_fit_volume_writes_the_muscle_with_its_volume_and_the_maxwell_defect(tmp
     alone = airmuscle("fit-volume", tmp_path / "column.csv", "--resting-length", "300 mm", "--out", tmp_path / "alone")
     assert alone.exit_code == 0, alone.output
     assert 'model = "Braid"' in (tmp_path / "alone" / "geometry.toml").read_text()
+
+
+@pytest.mark.parametrize(
+    ("stated", "options", "message"),
+    [
+        ((), (), "error: a muscle has exactly one resting length; the data state none. Give --resting-length"),
+        ((300, 250), (), "error: a muscle has exactly one resting length; the data state 250 mm, 300 mm"),
+        (
+            (300, 350),
+            ("--muscle", "dmsp-20-300"),
+            "the resting length of the data is 0.35 m, that of dmsp-20-300 0.3 m",
+        ),
+    ],
+)
+def test_fit_volume_names_the_resting_lengths_that_do_not_fit(stated, options, message, tmp_path: Path):
+    rows = [(0.0, 95), (0.05, 104), (0.1, 111), (0.15, 116), (0.2, 119)]
+    for length in stated or (None,):
+        lines = [f"{c},{v}" + (f",{length}" if length else "") for c, v in rows]
+        heading = "contraction [1],volume [cm3]" + (",resting_length [mm]" if length else "")
+        (tmp_path / f"column{length}.csv").write_text("\n".join([heading, *lines]))
+    result = airmuscle("fit-volume", *tmp_path.glob("*.csv"), *options, "--out", tmp_path / "out")
+    assert result.exit_code == 1, result.output
+    assert message in " ".join(result.stderr.split())

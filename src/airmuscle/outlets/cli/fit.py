@@ -88,15 +88,16 @@ def fit_volume_command(
     entry = None if request.muscle is None else load_law(request.muscle)
     check_writable(out)
     recordings = read_recordings(files, reading)
-    lengths = resting_lengths(recordings)
+    points, lengths = volume_points(recordings, request.temperature), resting_lengths(recordings)
     own = getattr(getattr(entry, "geometry", None), "resting_length", None)
-    if entry is not None and own is not None and any(abs(length - own) > 1e-6 for length in lengths):
+    others = [] if own is None else [each for each in lengths if abs(each - own) > 1e-6]
+    if entry is not None and others:
         raise ParameterError(
-            f"the resting length of the data is {lengths[0]:.4g} m, that of {entry.name} {own:.4g} m. "
+            f"the resting length of the data is {others[0]:.4g} m, that of {entry.name} {own:.4g} m. "
             "Correct one of them."
         )
-    length = float(own) if own is not None and not lengths else check_one_length(lengths)
-    fit = fit_volume(volume_points(recordings, request.temperature), length)
+    length = float(own) if own is not None and not lengths else check_one_length(lengths, "a muscle")
+    fit = fit_volume(points, length)
     if entry is None:
         chapter = volume_chapter(fit, f"Volume fitted to {list_files([f.stem for f in files])}", None, None, None)
         contents = {"geometry.toml": part_toml("geometry", fit.geometry)}

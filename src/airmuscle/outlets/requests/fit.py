@@ -75,18 +75,17 @@ def with_braid(entry: Entry, braid: Braid | None, recordings: Sequence[Recording
     return dataclasses.replace(entry, geometry=braid_of_length(braid, length))
 
 
-def check_one_length(lengths: Sequence[float]) -> float:
-    """The one resting length [m] for the braid of --braid. Raises ParameterError unless there is exactly one."""
-    problem = problem_of_lengths(lengths)
-    if problem:
-        raise ParameterError(f"--braid: {problem} Give --resting-length, or files of one muscle.")
+def check_one_length(lengths: Sequence[float], noun: str = "--braid: a braid") -> float:
+    """The one resting length [m] of what the noun names. Raises ParameterError unless there is exactly one."""
+    if problem := problem_of_lengths(lengths, noun):
+        raise ParameterError(f"{problem} Give --resting-length, or files of one muscle.")
     return lengths[0]
 
 
-def problem_of_lengths(lengths: Sequence[float]) -> str:
+def problem_of_lengths(lengths: Sequence[float], noun: str = "a braid") -> str:
     """What is wrong with the resting lengths [m] of the data of one braid; empty if there is exactly one."""
     stated = ", ".join(f"{1e3 * length:.4g} mm" for length in lengths) or "none"
-    return "" if len(lengths) == 1 else f"a braid has exactly one resting length; the data state {stated}."
+    return "" if len(lengths) == 1 else f"{noun} has exactly one resting length; the data state {stated}."
 
 
 def braid_of_length(braid: Braid, resting_length: float) -> Braid:
