@@ -127,9 +127,8 @@ def convert(
         raise typer.BadParameter("--plain belongs to a target that ends in .csv.")
     if target.suffix.lower() not in EXTENSIONS:
         raise FileError(f"{target}: the extension must be one of {', '.join(EXTENSIONS)}.")
-    recordings = read(
-        source, reading.column_mapping(), downsampling=Decimation(request.max_rows or 2**62)
-    )  # no file has as many
+    all_rows = 2**62  # no file has as many
+    recordings = read(source, reading.column_mapping(), downsampling=Decimation(request.max_rows or all_rows))
     print_row_notes(recordings)
     numbered = [target.with_name(f"{target.stem}_{i:03d}{target.suffix}") for i in range(1, len(recordings) + 1)]
     paths, sources = numbered if len(recordings) > 1 else [target], {path.resolve() for path in find_files(source)}

@@ -114,7 +114,7 @@ class FmuPackage:
         for v in self.variables:
             numbers = _numbers(v)
             if v.derivative_of is not None:
-                numbers["derivative"] = str(v.derivative_of + (fmi == 2))  # FMI 2.0 counts from 1
+                numbers["derivative"] = str(v.derivative_of + (1 if fmi == 2 else 0))  # FMI 2.0 counts from 1
             if fmi == 2:
                 SubElement(SubElement(variables, "ScalarVariable", _kind(v)), "Real", numbers)
             else:
@@ -124,18 +124,19 @@ class FmuPackage:
 
     def _add_kinds(self, root: Element, fmi: int) -> None:
         """The elements of Model Exchange and Co-Simulation, with what the FMU can."""
-        state, stepping = "FMUstate" if fmi == 2 else "FMUState", {"canHandleVariableCommunicationStepSize": "true"}
-        can = {"modelIdentifier": self.name}
-        can |= {"canNotUseMemoryManagementFunctions": "true"} if fmi == 2 else {}
-        can |= {f"canGetAndSet{state}": "true", f"canSerialize{state}": "true"}
-        kinds = {"CoSimulation": stepping}
+        if fmi == 2:
+            can = ["canNotUseMemoryManagementFunctions", "canGetAndSetFMUstate", "canSerializeFMUstate"]
+            with_states, stepping = ["providesDirectionalDerivative"], ["canInterpolateInputs"]
+        else:
+            can, stepping = ["canGetAndSetFMUState", "canSerializeFMUState"], []
+            with_states = ["providesDirectionalDerivatives", "providesAdjointDerivatives"]
+        kinds = {"CoSimulation": ["canHandleVariableCommunicationStepSize"]}
         if self.has_states:
-            derivatives = {2: ["Directional"], 3: ["Directional", "Adjoint"]}[fmi]
-            can |= {f"provides{kind}Derivative{'s' if fmi == 3 else ''}": "true" for kind in derivatives}
-            interpolating = {"canInterpolateInputs": "true"} if fmi == 2 else {}
-            kinds = {"ModelExchange": {}, "CoSimulation": {**stepping, **interpolating}}
+            can += with_states
+            kinds = {"ModelExchange": [], "CoSimulation": [*kinds["CoSimulation"], *stepping]}
         for kind, more in kinds.items():
-            element = SubElement(root, kind, {**can, **more})
+            attributes = {"modelIdentifier": self.name, **dict.fromkeys([*can, *more], "true")}
+            element = SubElement(root, kind, attributes)
             if fmi == 2:
                 files = SubElement(element, "SourceFiles")
                 for file in self._units(2):
@@ -149,16 +150,16 @@ class FmuPackage:
              [v.reference for v in self.variables if v.derivative_of is not None]),
             ("InitialUnknowns", "InitialUnknown", [v.reference for v in self.variables if v.initial == "calculated"]),
         )  # fmt: skip
+        first = 1 if fmi == 2 else 0  # FMI 2.0 counts from 1
         for group, element, references in unknowns:
             parent = SubElement(structure, group) if fmi == 2 and references else structure
             for reference in references:
-                place = {"index": str(reference + 1)} if fmi == 2 else {"valueReference": str(reference)}
-                known = " ".join(str(k + (fmi == 2)) for k in sorted(self.dependencies.get(reference, ())))
+                place = {"index" if fmi == 2 else "valueReference": str(first + reference)}
+                known = " ".join(str(first + k) for k in sorted(self.dependencies.get(reference, ())))
                 given = {} if element == "InitialUnknown" else {"dependencies": known}
                 SubElement(parent, "Unknown" if fmi == 2 else element, {**place, **given})
-        for v in self.variables if fmi == 3 else ():
-            if v.is_indicator:
-                SubElement(structure, "EventIndicator", valueReference=str(v.reference))
+        for v in (each for each in self.variables if fmi == 3 and each.is_indicator):
+            SubElement(structure, "EventIndicator", valueReference=str(v.reference))
 
     def _units(self, fmi: int) -> tuple[str, ...]:
         """The C sources that a compiler is given."""

@@ -49,13 +49,13 @@ class BraidRequest:
 
 def read_braid(text: str, where: str) -> Braid:
     """The braid of unit length that a text describes. Raises RequestError, UnitError or ParameterError."""
-    parts = {name.strip(): value.strip() for name, _, value in (part.partition("=") for part in text.split(","))}
-    if sorted(parts) != ["angle", "radius"] or text.count(",") > 1:
+    parts = [(name.strip(), value.strip()) for name, _, value in (part.partition("=") for part in text.split(","))]
+    if sorted(name for name, _ in parts) != ["angle", "radius"]:
         raise RequestError(
             f"{where} must give radius and angle once each, such as 'radius=10 mm, angle=24.4 deg', not '{text}'"
         )
     units = {"radius": "m", "angle": "rad"}
-    size = {name: quantity(value, units[name], where=f"{where}, {name}") for name, value in parts.items()}
+    size = {name: quantity(value, units[name], where=f"{where}, {name}") for name, value in parts}
     with located_errors("--braid"):  # the bounds are checked before any file is read
         return Braid(size["radius"], size["angle"], 1.0)
 

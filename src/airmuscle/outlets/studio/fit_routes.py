@@ -174,7 +174,7 @@ class FitService:
 
         changing = {
             "file": self.add_file, "remove": self.remove_file, "read": self.read, "start": self.start,
-            "task/{task}/cancel": self.status,
+            "task/{task}/cancel": self.cancel,
         }  # fmt: skip
         reading = {"task/{task}": self.status, "task/{task}/{name}": self.file}
         routes = [Route(f"/api/fit/{path}", handler, methods=["POST"]) for path, handler in changing.items()]
@@ -219,10 +219,13 @@ class FitService:
         return name, folder, read_arm_settings(given) if is_arm else read_settings(given)
 
     async def status(self, request: Any) -> Any:
-        """State and progress of a task, which a POST ends."""
-        if request.method == "POST":
-            self._queue.cancel(request.path_params["task"])
+        """State and progress of a task."""
         return json_answer(self._queue.status(request.path_params["task"]))
+
+    async def cancel(self, request: Any) -> Any:
+        """End a task."""
+        self._queue.cancel(request.path_params["task"])
+        return await self.status(request)
 
     async def file(self, request: Any) -> Any:
         """A file of a result."""

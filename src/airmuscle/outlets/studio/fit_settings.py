@@ -198,13 +198,16 @@ def used_rows(recording: am.Recording, rules: Sequence[Rule], outliers: Sequence
     column."""
     used = kept_rows(recording, outliers)
     for rule in (each for each in rules if not each.recordings or recording.origin in each.recordings):
-        inside = np.full(len(recording), rule.rows is None)
-        inside[slice(*(rule.rows or (0, 0)))] = True
-        for name, (low, high) in rule.ranges.items() if rule.rows is None else ():
-            if name not in recording:
-                text = f"{recording.origin}: no column '{name[:40]}', which a selection of rows names."
-                raise RequestError(text, "rules")
-            inside &= (recording[name] >= low) & (recording[name] <= high)
+        if rule.rows is not None:
+            inside = np.zeros(len(recording), bool)
+            inside[slice(*rule.rows)] = True
+        else:
+            inside = np.ones(len(recording), bool)
+            for name, (low, high) in rule.ranges.items():
+                if name not in recording:
+                    text = f"{recording.origin}: no column '{name[:40]}', which a selection of rows names."
+                    raise RequestError(text, "rules")
+                inside &= (recording[name] >= low) & (recording[name] <= high)
         used &= inside if rule.keep else ~inside
     return used
 
