@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import dataclasses
 import importlib.util
 import inspect
@@ -14,6 +15,7 @@ from airmuscle.files.library import model_class, model_names
 from airmuscle.recording import QUANTITIES
 
 DOCS = Path(__file__).parents[2] / "docs"
+SOURCE = DOCS.parent / "src"
 
 
 def load_generator():
@@ -56,6 +58,13 @@ def test_no_public_argument_is_missing_from_the_nomenclature():
     known = declared | set(QUANTITIES) | set(load_generator().ARGUMENTS) | {"self", "cls"}
     missing = sorted({f"{argument} ({where})" for where, argument in public_arguments() if argument not in known})
     assert not missing, f"add to docs/make_nomenclature.py, or use a name that is there: {missing}"
+
+
+def test_every_argument_of_the_nomenclature_exists():
+    """As an argument or an annotated field somewhere in the package."""
+    nodes = [node for path in SOURCE.rglob("*.py") for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))]
+    fields = {n.target.id for n in nodes if isinstance(n, ast.AnnAssign) and isinstance(n.target, ast.Name)}
+    assert set(load_generator().ARGUMENTS) - {n.arg for n in nodes if isinstance(n, ast.arg)} - fields == set()
 
 
 def test_every_parameter_has_unit_symbol_meaning_and_bounds():
