@@ -225,6 +225,13 @@ def test_the_monotone_fit_is_the_best_of_the_monotone():
     assert math.sqrt(peer.fun) == pytest.approx(100 * found.rmse, abs=1e-3)
 
 
+@pytest.mark.parametrize("degrees", [(1, 0), (0, 1), (0, 0)])
+def test_a_surface_that_does_not_depend_on_an_argument_is_monotone_in_it(degrees):
+    settings = dict(zip(("pressure_degree", "force_degree"), degrees, strict=True))
+    free, found = fit_nonlinear(CURVES, 0.40, **settings), fit_monotone(CURVES, 0.40, **settings)
+    assert found.rmse == pytest.approx(free.rmse, rel=1e-6)
+
+
 def test_data_that_are_monotone_are_fitted_as_if_free():
     pressure, force = (v.ravel() for v in LoadRange(0.0, 3e5, 50.0, 250.0).grid(9, 5))
     exponent = -1e-5 * pressure * (1 - force / 500)

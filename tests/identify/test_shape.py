@@ -78,6 +78,8 @@ def test_at_points_of_free_contraction_the_force_is_zero():
     found = fit_shape_constrained(blank_surface(4), data, free=free)
     assert found.model.unclamped_force(pressure, free["contraction"]) == pytest.approx(np.zeros(3), abs=1e-8)
     assert find_shape_violations(found.model, found.model.validity_range) == ()
+    none = fit_shape_constrained(blank_surface(4), data, free=free.rows(slice(0, 0)))
+    assert none.rmse == pytest.approx(fit_shape_constrained(blank_surface(4), data).rmse, rel=1e-6)
     many = Recording({"pressure": np.linspace(1e5, 6e5, 9), "contraction": np.linspace(0.05, 0.2, 9) ** 2}, "too many")
     with pytest.raises(IdentificationError, match="3 points of free contraction determine all 3 coefficients"):
         fit_shape_constrained(blank_surface(1), data, free=many)

@@ -42,6 +42,8 @@ def slope_rows(
 
 def _bernstein_coefficients(columns: Columns, degree: int, size: int, cells: int) -> Array:
     """Bernstein coefficients, on equal cells of -1..1, of polynomials of degree below `size`, one column each."""
+    if not size:  # the slopes of a constant
+        return np.zeros((0, degree + 1))
     t = np.linspace(0.0, 1.0, size) if size > 1 else np.array([0.5])
     order = np.arange(size)
     binomials = np.array([math.comb(size - 1, int(j)) for j in order])
@@ -61,7 +63,10 @@ def solve_constrained_least_squares(matrix: Array, right: Array, rows: Array, mi
     from scipy.optimize import nnls
 
     q, r = np.linalg.qr(matrix)
-    inner, unconstrained = solve_triangular(r, rows.T, trans="T").T, q.T @ right
+    unconstrained = q.T @ right
+    if not len(rows):
+        return np.asarray(solve_triangular(r, unconstrained))
+    inner = solve_triangular(r, rows.T, trans="T").T
     dual_matrix = np.vstack([inner.T, minimum - inner @ unconstrained])
     target = np.eye(len(dual_matrix))[-1]
     dual, remainder = nnls(dual_matrix, target, maxiter=50 * len(rows))
@@ -267,7 +272,7 @@ def fit_shape_constrained(
 def _free_contraction_basis(law: ContractileSurface, free: Recording | None) -> Array:
     """A basis of the coefficients for which the force at the points of free contraction is zero (null space)."""
     size = len(law.coefficients)
-    if free is None:
+    if free is None or not len(free):
         return np.eye(size)
     conditions = np.array(law.basis(free["pressure"], free["contraction"])).T
     _, singular, vectors = np.linalg.svd(conditions)
