@@ -11,13 +11,25 @@ import math
 import numpy as np
 import pytest
 from command_line import airmuscle
+from joints import chosen_muscle
 
 from airmuscle.bench import Experiment, InitialConditions, StartTime, fit_dynamic, rank_records
 from airmuscle.bench.identify.dynamic.candidate_records import candidate_records
 from airmuscle.engine import Schedule, simulate
 from airmuscle.errors import IdentificationError, ParameterError
 from airmuscle.files import load
-from airmuscle.physics import EnergyBalance, FillDischarge, Isometric, Muscle, Plant, Polytropic, Supply, Valve, Vessel
+from airmuscle.physics import (
+    EnergyBalance,
+    FillDischarge,
+    HangingMass,
+    Isometric,
+    Muscle,
+    Plant,
+    Polytropic,
+    Supply,
+    Valve,
+    Vessel,
+)
 from airmuscle.recording import Recording
 
 NOISE = 500.0
@@ -101,6 +113,20 @@ def test_the_expected_standard_errors_are_those_of_a_joint_fit_with_the_record(f
     joint = fitted(rig(), ("circuit.fill.conductance", VALVE, WALL), further)
     for name, expected in zip((VALVE, WALL), best.precision.standard_errors, strict=True):
         assert joint[name].stderr / joint[name].value == pytest.approx(expected, rel=0.2)
+
+
+def test_a_load_that_does_not_rest_at_ambient_pressure_leaves_the_other_records():
+    plant = dataclasses.replace(rig(chosen_muscle(), Polytropic(1.2)), mechanism=HangingMass(20.0))
+    start = InitialConditions.at_rest(plant, 3e5)
+    run = simulate(plant, FILL, duration=1.0, initial_state=start.guess, output_times=0.01)
+    fit = fit_dynamic(
+        plant, [Experiment(run, FILL, start)], free=("circuit.fill.conductance", "gas.exponent"),
+        observed={"pressure": NOISE},
+    )  # fmt: skip
+    compared = [each.description for each in rank_records(fit).ranking]
+    assert compared.count("a repeat of the record") == 1
+    assert any("rigid tank of known volume" in each for each in compared)
+    assert not any("throttle" in each for each in compared)
 
 
 def test_a_tank_of_known_volume_separates_conductance_and_volume():

@@ -1,12 +1,13 @@
 """Candidate records of a next experiment: fills and discharges of the same rig that differ from those of a fit."""
 
+import contextlib
 import dataclasses
 import itertools
 from collections.abc import Iterator
 
 import numpy as np
 
-from ....core import Array, tree
+from ....core import Array, EquilibriumError, tree
 from ....engine import Schedule
 from ....physics import EnergyBalance, FillDischarge, Isometric, Muscle, Plant, Valve, Vessel, WallHeatTransfer
 from ....recording import Recording
@@ -42,22 +43,25 @@ class CandidateRecord:
 
 
 def candidate_records(fit: DynamicFit) -> tuple[CandidateRecord, ...]:
-    """The records to compare for a fit of a plant with one muscle, as far as circuit and mechanism allow; the first is
-    a repeat of its first record, and each has as many rows as this one."""
+    """The records to compare for a fit: a repeat of its first record, a longer one, and further ones for a plant, as
+    far as circuit and mechanism allow; each has as many rows as the first record."""
     plant, model = fit.plant(0), fit.problem.record_models[0]
-    assert isinstance(plant, Plant)
     begun = dataclasses.replace(model.experiment, plant=plant, start_time=0.0)
     times = model.times - model.start_time(fit.values)
     candidates = [
         CandidateRecord("a repeat of the record", _with_times(begun, times, model.names)),
         CandidateRecord(f"the same record, {LONGER:g} times as long", _with_times(begun, LONGER * times, model.names)),
     ]
+    if not isinstance(plant, Plant):
+        return tuple(candidates)
     pressure = float(begun.initial_conditions.known.get("pressure", 0.0))
     identified = frozenset(path for unknown in fit.unknowns for path in unknown.paths)
     context = _Context(plant, begun, times, model.names, pressure, identified)
     candidates += [*context.supplies(), *context.lengths()]
     if isinstance(plant.circuit, FillDischarge) and len(plant.muscles) == 1:
-        candidates += [*context.valve_records(plant.circuit), *context.tank(plant.circuit)]
+        with contextlib.suppress(EquilibriumError):  # a hanging load does not rest at ambient pressure
+            candidates.extend(context.valve_records(plant.circuit))
+        candidates += context.tank(plant.circuit)
     return tuple(candidates)
 
 

@@ -241,7 +241,7 @@ def check_ambient(plant: System, experiment: Experiment) -> None:
 def describe_other_ambient(plant: System, experiment: Experiment) -> list[str]:
     """A note where the plant of an experiment has another ambient air than a plant; empty otherwise."""
     own, other = (getattr(each, "ambient", None) for each in (plant, experiment.plant))
-    if own is None or other is None or own == other:
+    if not (isinstance(own, Ambient) and isinstance(other, Ambient)) or own == other:
         return []
     texts = [f"{each.pressure / 1e3:.4g} kPa and {each.temperature:.4g} K" for each in (other, own)]
     return [f"the ambient air is that of the record, {texts[0]}; the plant was identified at {texts[1]}"]

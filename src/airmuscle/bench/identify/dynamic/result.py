@@ -261,7 +261,8 @@ def locate_pressure_sensor(*, in_muscle: DynamicFit, in_line: DynamicFit) -> Sen
         raise IdentificationError("locate_pressure_sensor compares two fits of one record with one observed pressure.")
     (first,), (second,) = models
     rows, others = first.measured[:, 0], second.measured[:, 0]
-    if not np.array_equal(rows, others):
+    if not np.array_equal(rows, others, equal_nan=True):
         found = "but these have different rows"
         raise IdentificationError(f"locate_pressure_sensor compares two fits of the same record, {found}.")
-    return SensorLocation(in_muscle.rms(first.names[0]), in_line.rms(second.names[0]), float(np.ptp(rows)))
+    rise = float(np.nanmax(rows) - np.nanmin(rows))
+    return SensorLocation(in_muscle.rms(first.names[0]), in_line.rms(second.names[0]), rise)
