@@ -16,6 +16,7 @@ from urllib.parse import urlencode
 
 import numpy as np
 import pytest
+from command_line import airmuscle
 from studio_pages import InThisProcess, request
 from studio_tasks import WorkerHere, fail, write_slowly
 
@@ -198,6 +199,18 @@ def test_settings_that_are_not_possible_are_refused_with_their_field(app):
     ):
         assert request(app, "POST", "/api/fit/read", body).status in (400, 404)
     assert request(app, "POST", "/api/fit/read", b" " * (MAX_SETTINGS + 1)).status == 413
+
+
+def test_a_quantity_is_refused_in_the_words_of_the_command(app, tmp_path):
+    """Both are built from one declaration of the request."""
+    name = upload(app, "Messung.csv", german_table()).json()["set"]
+    (tmp_path / "Messung.csv").write_bytes(german_table())
+    for field, text in (("resting_length", "0 mm"), ("ambient", "-5 kPa"), ("displacement_zero", "3 s")):
+        refused = post(app, "read", set=name, settings={field: text}).json()["error"]
+        assert (
+            airmuscle("inspect", tmp_path / "Messung.csv", f"--{field.replace('_', '-')}", text).stderr
+            == f"error: {refused}\n"
+        )
 
 
 # Uploads

@@ -14,10 +14,9 @@ import numpy.typing as npt
 import airmuscle as am
 
 from ...bench.segment.outliers import Outlier, kept_rows, leave_out
-from ...core import AirmuscleError, quantity
+from ...core import AirmuscleError, UnitError, quantity
 from ...files.library.files import list_laws
-from ..requests import SPLITS as GROUPS
-from ..requests import BraidRequest, ReadingRequest, RequestError, build, form_fields
+from ..requests import BraidRequest, FitRequest, ReadingRequest, RequestError, build, form_fields
 
 MAX_RULES, MAX_CHOICES = 200, 500
 """Maximum number of selections of rows; of corrected columns, or of files with facts of their own (chosen)."""
@@ -25,17 +24,11 @@ TEXTS = tuple(each["name"] for each in form_fields(ReadingRequest))
 """Fields with a text that applies to all files."""
 BRAID = ("braid_radius", "braid_angle")
 """The geometry of a muscle whose law contains none, at rest."""
-QUANTITIES = {
-    "resting_length": ("m", "300 mm"), "ambient": ("Pa", "98 kPa"), "displacement_zero": ("m", "12 mm"),
-    "braid_radius": ("m", "10 mm"), "braid_angle": ("rad", "24.4 deg"), "length": ("m", "300 mm"),
-}  # fmt: skip
-"""Fields and facts that are quantities, with their units and an example."""
-FILE_FACTS = ("resting_length", "length", "specimen")
+LENGTHS = ("resting_length", "length")
+FILE_FACTS = (*LENGTHS, "specimen")
 """Facts that may be stated for one file."""
 COLUMN_CHOICES = (*am.recording.QUANTITIES, "resting_length", "ambient")
 """Quantities of a column."""
-SPLITS: Mapping[str, am.bench.GroupSplit | None] = {"": None, **GROUPS}
-"""Groups that are left out in turn; by default those that the data allow."""
 
 
 @dataclasses.dataclass(frozen=True)
@@ -67,7 +60,7 @@ class FitSettings:
     facts: Mapping[str, Mapping[str, str]]
     rules: tuple[Rule, ...]
     entry: str
-    leave_out: str
+    leave_out: am.bench.GroupSplit | None
     hysteresis: bool
 
     def mapping(self, columns: Mapping[str, str] | None = None) -> am.bench.ColumnMapping:
@@ -84,7 +77,10 @@ class FitSettings:
     @property
     def braid(self) -> am.geometry.Braid | None:
         """The braid, of unit length; None if none is stated. Raises RequestError."""
-        return build(BraidRequest, {name: self.texts[name] for name in BRAID}, _words).braid
+        try:
+            return build(BraidRequest, {name: self.texts[name] for name in BRAID}, _words).braid
+        except UnitError as error:
+            raise RequestError(error.message, next(name for name in BRAID if _words(name) in error.message)) from None
 
 
 def _words(name: str) -> str:
@@ -108,35 +104,27 @@ def read_settings(data: Any) -> FitSettings:
     rules = data.get("rules", [])
     if not isinstance(rules, list) or len(rules) > MAX_RULES:
         raise RequestError(f"at most {MAX_RULES} selections of rows are possible; remove some.", "rules")
-    entry, leave_out = (_text(data.get(name, ""), name) for name in ("entry", "leave_out"))
+    entry, left_out = (_text(data.get(name, ""), name) for name in ("entry", "leave_out"))
+    leave_out = build(FitRequest, {"compare": True, "leave_out": left_out}, _words).leave_out
     hysteresis = data.get("hysteresis") is True
     settings = FitSettings(texts, columns, facts, tuple(map(_rule, rules)), entry, leave_out, hysteresis)
-    for name in QUANTITIES:
-        if texts.get(name):
-            _check_quantity(texts[name], name, name)
     _ = settings.braid  # checks it
     for file, stated in facts.items():
-        for name in (each for each in stated if each in QUANTITIES):
-            _check_quantity(stated[name], name, f"file:{file}")
+        for name in (each for each in stated if each in LENGTHS):
+            _check_length(stated[name], _words(name), f"file:{file}")
     if entry and entry not in list_laws():
         raise RequestError(f"the library has no muscle or law '{entry}'.", "entry")
-    if leave_out not in SPLITS:
-        allowed = ", ".join(filter(None, SPLITS))
-        raise RequestError(f"'{leave_out}' is no group; allowed: {allowed}.", "leave_out")
     settings.mapping()
     return settings
 
 
-def _check_quantity(text: str, name: str, field: str) -> None:
-    words, (unit, example) = _words(name), QUANTITIES[name]
+def _check_length(text: str, words: str, field: str) -> None:
     try:
-        value = quantity(text, unit, ambient=0.0, where=words)
+        value = quantity(text, "m", where=words)
     except AirmuscleError as error:
-        raise RequestError(f"{error.message} Write a number with its unit, such as {example}.", field) from None
-    signed = name == "displacement_zero"
-    if not (math.isfinite(value) and (signed or value > 0)):
-        allowed = "finite" if signed else "positive"
-        raise RequestError(f"{words} is {text}; it must be {allowed}, such as {example}.", field)
+        raise RequestError(error.message, field) from None
+    if not 0 < value < math.inf:
+        raise RequestError(f"{words} is {text}; it must be positive, such as 300 mm.", field)
 
 
 def _text(value: Any, field: str, longest: int = 200) -> str:

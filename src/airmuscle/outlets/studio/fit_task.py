@@ -34,7 +34,7 @@ from ...report.write import write_into
 from ..requests import FitRequest, RequestError, fit_requested, problem_of_lengths
 from .arm_task import ArmTexts, run_arm_fit
 from .fit_reading import FileColumn, ReadSet, as_field_error, in_page_words, read_set
-from .fit_settings import SPLITS, FitSettings, Rule, selected, used_rows
+from .fit_settings import FitSettings, Rule, selected, used_rows
 from .fit_uploads import FILES
 
 Report = Callable[[float, str], None]
@@ -72,7 +72,7 @@ def run_fit(folder: str, out: str, settings: FitSettings | ArmTexts, report: Rep
     def progress(name: str, fraction: float) -> None:
         report(SHARES[0] + (SHARES[1] - SHARES[0]) * fraction, f"comparison: {name}" if name else "comparison")
 
-    named, split = settings.entry or None, SPLITS[settings.leave_out]
+    named, split = settings.entry or None, settings.leave_out
     request = FitRequest(compare=True, characteristic=named, leave_out=split, braid=braid)
     try:
         found = fit_requested(request, names, recordings, progress)
