@@ -355,3 +355,9 @@ def test_a_time_whose_inverse_is_infinite_ends_the_run(shortest):
     for signal, duration in ((FILL, shortest), (jump, 0.1)):
         with pytest.raises(SimulationError, match="is not finite, after 0 steps"):
             simulate(isothermal(), signal, duration=duration, initial_state=begin)
+
+
+def test_a_ratio_has_no_unit_in_the_reason():
+    plant = load("joint-dmsp-20-proportional").plant
+    run = solve(Problem(plant, Schedule({"left.command": ((0.0, 1.0),)}), 10.0, integrator=RungeKutta4(0.2)))
+    assert ", right.spool 0, right.spool_speed 0 1/s" in run.diagnostics[-1].text

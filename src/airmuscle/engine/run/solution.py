@@ -164,8 +164,8 @@ def make_solution(
 def early_end(compiled: CompiledSystem, raw: RawSolution, end: float) -> Diagnostic:
     """Time, reason and state of an early end of a run, and the remedy."""
     state = dict(zip(compiled.description.state_names, raw.state.tolist(), strict=True))
-    units = [s.unit for s in compiled.system.states]
-    at = ", ".join(f"{name} {v:.4g} {unit}" for (name, v), unit in zip(state.items(), units, strict=True))
+    units = ["" if s.unit in ("", "1") else f" {s.unit}" for s in compiled.system.states]
+    at = ", ".join(f"{name} {v:.4g}{unit}" for (name, v), unit in zip(state.items(), units, strict=True))
     hint = _HINTS.get(raw.status, _GENERAL_HINT)
     if raw.status != Status.INTERRUPTED:
         hint = compiled.system.failure_hint(state) or hint
