@@ -75,7 +75,8 @@ def _described(value: Any) -> str:
     for field in dataclasses.fields(value):
         each, default = getattr(value, field.name), field.default
         is_default = type(each) is type(default) and not isinstance(each, np.ndarray) and bool(each == default)
-        texts += [f"{field.name}={_described(each)}"] if field.repr and not is_default else []
+        if field.repr and not is_default:
+            texts.append(f"{field.name}={_described(each)}")
     return f"{type(value).__name__}({', '.join(texts)})"
 
 

@@ -216,5 +216,8 @@ def list_rows(label: str, rows: Sequence[Any] | Any, most: int) -> str:
     """The first of the row numbers, with the word for a row: `lines 12, 15 and 5 more`."""
     if len(rows) == 1:
         return f"{label} {rows[0]}"
-    *others, last = [*map(str, rows[:most]), *([f"{len(rows) - most} more"] if len(rows) > most else [])]
+    shown = [str(row) for row in rows[:most]]
+    if len(rows) > most:
+        shown.append(f"{len(rows) - most} more")
+    *others, last = shown
     return f"{label}s {', '.join(others)} and {last}"

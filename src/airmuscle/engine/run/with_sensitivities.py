@@ -98,10 +98,10 @@ class WithSensitivities(SensitivitySystem):
     @property
     def input_variables(self) -> tuple[Input, ...]:
         """The inner system's inputs, then the derivatives of the dependent ones, without bounds."""
-        known, infinity = self.inner.input_variables, float("inf")
-        of_each = [name for name in self.dependent_inputs for _ in self.columns]
-        named = zip(self.inputs[len(known) :], of_each, strict=True)
-        return (*known, *(Input(name, "", -infinity, infinity, f"derivative of {of}") for name, of in named))
+        further, infinity = [], float("inf")
+        for name, k in itertools.product(self.dependent_inputs, range(len(self.columns))):
+            further.append(Input(sensitivity(name, k), "", -infinity, infinity, f"derivative of {name}"))
+        return (*self.inner.input_variables, *further)
 
     @property
     def state_lower_bounds(self) -> Sequence[float]:

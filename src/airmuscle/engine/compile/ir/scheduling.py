@@ -111,7 +111,10 @@ class _Pieces:
         pieces: dict[_Piece, list[Instruction]] = {}
         for line in self._code.body:  # of the same gates, separately for early instructions
             gates = self._apart.gates.get(line.result)
-            (straight if gates is None else pieces.setdefault((gates, line.result in self._early), [])).append(line)
+            if gates is None:
+                straight.append(line)
+            else:
+                pieces.setdefault((gates, line.result in self._early), []).append(line)
         while straight or pieces:
             waiting = []
             for line in straight:
