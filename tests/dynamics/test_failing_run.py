@@ -340,11 +340,12 @@ def test_no_more_steps_are_taken_than_allowed(method):
     plant = Plant(chosen_muscle(), FillDischarge(Supply(5e5), VALVE, VALVE), HangingMass(10.0))
     start = state_vector(plant, plant.state_at(pressure=1e5))
     segments, times = FILL.segments(plant.inputs, 0.0, 1.0), np.linspace(0.0, 1.0, 11)
-    whole = method.run(compile_system(plant), segments, 0.0, start, times)
+    bound = method.bind(compile_system(plant))
+    whole = bound.run(segments, 0.0, start, times)
     assert whole.status == 0
-    left = method.run(compile_system(plant), segments, 0.0, start, times, whole.steps - 1)
+    left = bound.run(segments, 0.0, start, times, whole.steps - 1)
     assert (left.status, left.steps) == (Status.TOO_MANY_STEPS, whole.steps - 1)
-    enough = method.run(compile_system(plant), segments, 0.0, start, times, whole.steps)
+    enough = bound.run(segments, 0.0, start, times, whole.steps)
     np.testing.assert_array_equal(enough.rows, whole.rows)
 
 
