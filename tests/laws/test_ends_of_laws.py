@@ -170,6 +170,15 @@ def test_a_slack_muscle_has_the_stiffness_zero_without_a_sign():
         assert not np.signbit(thing.stiffness(1e5, np.array([0.2])))
 
 
+@pytest.mark.parametrize("name", ["saga2007", "saga2007-circle"])
+def test_straight_fibres_at_zero_contraction_have_the_slopes_of_an_array(name: str):
+    law = law_of(name)
+    with np.errstate(all="ignore"):
+        column = law.slopes(1e5, np.array([0.0]))
+    np.testing.assert_array_equal(law.slopes(1e5, 0.0), np.ravel(column))
+    assert np.isnan(law.stiffness("1 bar", "0 %"))
+
+
 def test_four_fibres_are_the_fewest_and_the_contraction_ends_below_the_pole():
     law = law_of("saga2007")
     law = replace(law, fibres=4, projection_factor=1.0, geometry=replace(law.geometry, rings=2))

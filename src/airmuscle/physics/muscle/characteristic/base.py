@@ -9,7 +9,7 @@ import abc
 from collections.abc import Callable, Iterable
 from typing import ClassVar, NamedTuple, Self
 
-from ....core import IdentificationError, Reference, Value, autodiff, model, ops, parameter
+from ....core import INFINITY, IdentificationError, Reference, Value, autodiff, model, ops, parameter
 from ....core.declaration import forwarded
 from ..quantity_arguments import QuantityMethods, Units
 from .solve import check_solution, describe_range, solve_direction, warn_above_whole_length
@@ -201,7 +201,7 @@ class ContractionLaw(Characteristic):
         force = self.force(pressure, contraction)
         by_pressure = autodiff.derivative(self, "contraction", pressure, force, wrt=0)
         by_force = autodiff.derivative(self, "contraction", pressure, force, wrt=1)
-        return Slopes(-by_pressure / by_force, 1.0 / by_force)
+        return Slopes(_ratio(-by_pressure, by_force), _ratio(1.0, by_force))
 
 
 class PressureLaw(Characteristic):
@@ -223,7 +223,12 @@ class PressureLaw(Characteristic):
         force = self.force(pressure, contraction)
         by_contraction = autodiff.derivative(self, "pressure", contraction, force, wrt=0)
         by_force = autodiff.derivative(self, "pressure", contraction, force, wrt=1)
-        return Slopes(1.0 / by_force, -by_contraction / by_force)
+        return Slopes(_ratio(1.0, by_force), _ratio(-by_contraction, by_force))
+
+
+def _ratio(a: Value, b: Value) -> Value:
+    """a/b, of numbers as of arrays: infinite where b is 0, as the slopes of straight fibres are."""
+    return a * INFINITY if isinstance(b, float) and b == 0.0 else a / b
 
 
 @model
