@@ -32,7 +32,7 @@ class Line:
         self.way, self.input = 3 * (states[1] - states[0]), inputs[0]
         self.start = states[0] - self.way / 3
         self.scale = np.abs(np.array([self.slopes(s) for s in np.linspace(0, 1, 40)])).max(axis=0)
-        self.scale[self.scale == 0] = 1.0
+        self.scale[self.scale < printed.ROUNDING] = 1.0
 
     def slopes(self, s):
         f, j = np.empty(self.ready.sizes.states), np.zeros(max(self.ready.sizes.jacobian, 1))

@@ -26,6 +26,7 @@ SOME = ("dmsp-20-300", "overlap", "shaped joint with friction", "manifold on tan
 """Plants with every kind of block: valves that are shut, clamps, selections, a spool, several coordinates."""
 SMALL_DIFFERENCES = (
     "vessel", "three positions through a tube", "manifold on tank and regulator", "stop, lagging wall",
+    "two pressure regulators on a tank",
 )  # fmt: skip
 ALL = [pytest.param(name, marks=() if name in SOME else pytest.mark.slow) for name in plants.EXAMPLES]
 JAVASCRIPT = """

@@ -261,7 +261,7 @@ def check_known(
     error: type[AirmuscleError] = ParameterError,
 ) -> None:  # fmt: skip
     """Raise an error, "no input 'x'; there are a, b.", with the nearest name, for the first name that is not known."""
-    for name in (names,) if isinstance(names, str) else names:
+    for name in names if isinstance(names, Iterable) and not isinstance(names, str) else (names,):
         if name not in known:
             raise error(f"{missing} '{name}'{alternatives(str(name), known, introduction)}")
 
