@@ -150,6 +150,21 @@ def test_a_length_needs_the_resting_length_and_a_pressure_is_gauge_unless_stated
         assert any("is read as gauge" in note for note in recording["notes"])
 
 
+def test_each_delimiter_that_the_form_offers_is_taken_as_it_is(app):
+    """Also a tab and a blank, which are no texts."""
+    form = {field["name"]: field for field in request(app, "GET", "/api/library").json()["forms"]["fit"]}
+    offered = [value for value, _ in form["delimiter"]["offered"] if value]
+    assert {"\t", " "} < set(offered)
+    rows = [("pressure_bar", "contraction", "force_N"), (1.5, 0.1, 50.5), (2.5, 0.1, 90.5)]
+    for right in offered:
+        table = "\n".join(right.join(map(str, row)) for row in rows)
+        name = upload(app, "a.csv", table.encode()).json()["set"]
+        for given in (each for each in offered if each == right or not (each + right).isspace()):
+            sheet = post(app, "read", set=name, settings={"delimiter": given}).json()
+            forces = [force for each in sheet["recordings"] for force in each["points"]["force"]]
+            assert forces == ([50.5, 90.5] if given == right else []), (given, right)
+
+
 def test_a_column_may_state_the_resting_length(app):
     """By its heading, or because the user selects it."""
     table = "p [bar],L [mm],F [N],rest_length [cm],note [mm]\n1,300,50,30,310\n2,290,40,30,310\n3,280,40,30,310\n"

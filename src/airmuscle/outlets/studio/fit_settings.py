@@ -20,8 +20,9 @@ from ..requests import BraidRequest, FitRequest, ReadingRequest, RequestError, b
 
 MAX_RULES, MAX_CHOICES = 200, 500
 """Maximum number of selections of rows; of corrected columns, or of files with facts of their own (chosen)."""
-TEXTS = tuple(each["name"] for each in form_fields(ReadingRequest))
-"""Fields with a text that applies to all files."""
+OFFERED = {each["name"]: [value for value, _ in each["offered"]] for each in form_fields(ReadingRequest)}
+"""Values that the form offers, by the fields with a text that applies to all files."""
+TEXTS = tuple(OFFERED)
 BRAID = ("braid_radius", "braid_angle")
 """The geometry of a muscle whose law contains none, at rest."""
 LENGTHS = ("resting_length", "length")
@@ -91,15 +92,18 @@ def read_settings(data: Any) -> FitSettings:
     """The settings in a request of the page. Raises RequestError."""
     if not isinstance(data, dict):
         raise RequestError("the request must be a table of settings.")
-    texts = {name: _text(data.get(name, ""), name) for name in (*TEXTS, *BRAID)}
+    texts = dict[str, str]()
+    for name in (*TEXTS, *BRAID):
+        given = data.get(name, "")
+        texts[name] = given if given in OFFERED.get(name, ()) else _text(given, name)  # tab and blank as they are
     facts: dict[str, dict[str, str]] = {}
     for file, value in _table(data.get("files", {}), "files").items():
         field = f"file:{file}"
-        given = _table(value, field)
-        for unknown in (each for each in given if each not in FILE_FACTS):
+        table = _table(value, field)
+        for unknown in (each for each in table if each not in FILE_FACTS):
             text = f"'{str(unknown)[:40]}' is no fact of a file; allowed: {', '.join(FILE_FACTS)}."
             raise RequestError(text, field)
-        facts[file] = {name: text for name in FILE_FACTS if (text := _text(given.get(name, ""), field))}
+        facts[file] = {name: text for name in FILE_FACTS if (text := _text(table.get(name, ""), field))}
     columns = {key: _heading(key, value) for key, value in _table(data.get("columns", {}), "columns").items()}
     rules = data.get("rules", [])
     if not isinstance(rules, list) or len(rules) > MAX_RULES:
