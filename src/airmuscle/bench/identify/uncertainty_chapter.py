@@ -65,14 +65,10 @@ def uncertainty_chapter(uncertainty: Uncertainty) -> Chapter:
         )
     caption = "95 % intervals in units of the standard error; an arrow marks an interval beyond the axis."
     return Chapter(
-        name="uncertainty",
-        title="Uncertainty of the parameters",
-        summary=tuple(sentences),
-        values=values,
-        tables=(_table(uncertainty),),
-        plots=(Plot("intervals", caption, partial(_figure, uncertainty)),),
+        "uncertainty", "Uncertainty of the parameters", summary=tuple(sentences), values=values,
+        tables=(_table(uncertainty),), plots=(Plot("intervals", caption, partial(_figure, uncertainty)),),
         notes=("no parameter is weakly determined; the standard errors are valid",) if uncertainty.none_weak else (),
-    )
+    )  # fmt: skip
 
 
 def _table(uncertainty: Uncertainty) -> Table:
@@ -106,12 +102,11 @@ def length_error_chapter(errors: Sequence[LengthError]) -> Chapter:
         "rms residual after": [each.rmse_after for each in errors],
     }
     return Chapter(
-        name="length-errors",
-        title="Errors of recorded resting lengths",
+        "length-errors", "Errors of recorded resting lengths",
         summary=f"As if {', or '.join(map(str, errors))}. Normal prior with a standard deviation of "
         f"{PRIOR_STD * 1e3:g} mm (chosen).",
         tables=(Table("resting-lengths", "Resting lengths", columns, "Residuals in SI units.", brief=len(errors)),),
-    )
+    )  # fmt: skip
 
 
 def _figure(uncertainty: Uncertainty) -> Any:
@@ -158,8 +153,7 @@ def shape_chapter(shaped: ShapeConstrainedFit, unconstrained: Fit, free: int) ->
     verdict = "violates them in the regions of the table" if violations else "satisfies these constraints too"
     title = "Monotonicity violations of the unconstrained surface"
     return Chapter(
-        name="shape",
-        title="Shape-constrained surface",
+        "shape", "Shape-constrained surface",
         summary=(
             f"Rms error {shaped.rmse:.4g} N with constraints, {shaped.unconstrained_rmse:.4g} N without.",
             "The muscle file contains the constrained surface: within its validity range the force does not decrease "

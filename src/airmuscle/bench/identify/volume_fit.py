@@ -204,9 +204,7 @@ def volume_chapter(
         plots.append(Plot("reciprocity", caption, partial(_reciprocity_figure, fit, law, validity_range)))
     model = type(fit.geometry).__name__
     return Chapter(
-        name="volume",
-        title=title,
-        summary=f"{volume_summary(fit)}.",
+        "volume", title, summary=f"{volume_summary(fit)}.",
         values=(
             NamedValue("law", model, brief=False),
             NamedValue("points", len(fit.points.contraction), brief=False),
@@ -216,8 +214,7 @@ def volume_chapter(
             *([] if defect is None else defect_values(defect)),
         ),
         tables=(*_tables(fit), parameter_table(fit.geometry, "volume-parameters", f"Parameters of {model}")),
-        plots=tuple(plots),
-        references=tuple(cite(fit.geometry)),
+        plots=tuple(plots), references=tuple(cite(fit.geometry)),
     )  # fmt: skip
 
 

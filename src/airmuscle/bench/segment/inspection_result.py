@@ -106,15 +106,12 @@ class Inspection(Reported):
             regularity = "time stamps repeat" if sampling.rounded else f"jitter {100 * sampling.jitter:.1f} %"
             summary = f"{sampling.rate:.4g} rows per second over {sampling.duration:.4g} s, {regularity}{gaps}."
         return Chapter(
-            name="inspection",
-            title=f"{recording.origin}: {len(recording)} rows",
-            summary=summary,
-            values=tuple(_values(self)),
+            "inspection", f"{recording.origin}: {len(recording)} rows", summary, values=tuple(_values(self)),
             tables=tuple(table for table in tables if table is not None),
             plots=(Plot("recording", f"{recording.origin}: branches, plateaus, outliers and limits.", self.plot),),
             problems=tuple(each.text for each in self.findings if each.serious),
             notes=(*recording.notes, *(each.text for each in self.findings if not each.serious)),
-        )
+        )  # fmt: skip
 
 
 def inspection_chapters(inspections: Sequence[Inspection]) -> list[Chapter]:
@@ -144,9 +141,8 @@ def _values(inspection: Inspection) -> Iterator[NamedValue]:
         yield NamedValue("quasi-static rows", inspection.quasi_static, "1", "%", 2)
     if inspection.branch_agreement is not None:
         yield NamedValue("agreement with the branch column", inspection.branch_agreement, "1", "%", 3)
-    yield NamedValue(
-        "suspected outliers", len(inspection.outliers), remark="not removed" if inspection.outliers else ""
-    )
+    remark = "not removed" if inspection.outliers else ""
+    yield NamedValue("suspected outliers", len(inspection.outliers), remark=remark)
 
 
 def _units(name: str, value: Any) -> tuple[str, str]:
@@ -158,10 +154,8 @@ def _units(name: str, value: Any) -> tuple[str, str]:
 
 def _rows(parts: Sequence[Any]) -> dict[str, list[int]]:
     """The columns of a table with the first and the last row of each part, counted from 1."""
-    return {
-        "first row": [each.interval.start + 1 for each in parts],
-        "last row": [each.interval.stop for each in parts],
-    }
+    first, last = [each.interval.start + 1 for each in parts], [each.interval.stop for each in parts]
+    return {"first row": first, "last row": last}
 
 
 def _column_table(inspection: Inspection) -> Table:

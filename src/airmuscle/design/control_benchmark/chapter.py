@@ -43,16 +43,12 @@ def benchmark_chapter(result: BenchmarkResult, curves: Sequence[LearningCurve] =
     sources = cite((joint.model, *(truth.plant for truth in joint.truths), *(each.law for each in result.results)))
     tuned = [reference for each in result.results if each.tuning for reference in each.tuning.references]
     return Chapter(
-        name="benchmark",
-        title=f"Control of an antagonistic joint with {joint.name}",
-        summary=tuple(_summary(result)),
-        values=(NamedValue("seeds", ", ".join(map(str, result.seeds)), brief=False),),
-        tables=tuple(tables),
-        plots=benchmark_plots(result, curves),
-        notes=tuple(learned),
+        "benchmark", f"Control of an antagonistic joint with {joint.name}", summary=tuple(_summary(result)),
+        values=(NamedValue("seeds", ", ".join(map(str, result.seeds)), brief=False),), tables=tuple(tables),
+        plots=benchmark_plots(result, curves), notes=tuple(learned),
         references=tuple({reference.key: reference for reference in (*sources, BONE2019, *tuned)}.values()),
         chosen=_settings(result),
-    )
+    )  # fmt: skip
 
 
 def ranking_table(result: BenchmarkResult, group: Group) -> Table:

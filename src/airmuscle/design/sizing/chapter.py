@@ -26,15 +26,12 @@ def sizing_chapter(result: SizingResult, scenario: SizingScenario | None = None)
     laws = (best.entry.characteristic, best.conditions.ambient, *scenario_valves(simulated))
     tables = [_products(result), _end_points(result), _air(result), _valves(simulated), _unsuitable(result)]
     return Chapter(
-        name="sizing",
-        title=f"Muscles for {result.requirement.describe()}, supply {result.conditions.supply / 1e5:.4g} bar",
-        summary=_summary(result),
-        tables=tuple(table for table in tables if table is not None),
-        plots=(sizing_plot(best),),
-        notes=() if scenario is None or not scenario.note else (scenario.note,),
+        "sizing", f"Muscles for {result.requirement.describe()}, supply {result.conditions.supply / 1e5:.4g} bar",
+        summary=_summary(result), tables=tuple(table for table in tables if table is not None),
+        plots=(sizing_plot(best),), notes=() if scenario is None or not scenario.note else (scenario.note,),
         references=tuple(best.entry.references) + tuple(cite(laws)),
         chosen=(*_settings(result), *_valve_settings(simulated)),
-    )
+    )  # fmt: skip
 
 
 def product_of(choice: MuscleChoice) -> str:

@@ -176,26 +176,17 @@ def study_chapter(result: StudyResult, *, execution: str = "") -> Chapter:
         summary.append(f"{TIME_SERIES_FILE} contains the time series ({names}), one row per run, and their times.")
     scenario = study.template.scenario
     metrics = [(f"metric {name}", str(metric), "study") for name, metric in study.metrics.items()]
+    counts = {"runs": len(study), "failed runs": int(result.failed.size)}
+    chosen = (
+        ("scenario", scenario.title, str(study.path.name)), ("design", str(study.design), "study"), *metrics,
+        ("integrator", str(scenario.problem.integrator), "scenario"),
+        ("input signal", str(scenario.problem.input), "scenario"),
+    )  # fmt: skip
     return Chapter(
-        name="study",
-        title=study.title,
-        summary=(*summary, execution),
-        values=(
-            NamedValue("runs", len(study), brief=False),
-            NamedValue("failed runs", int(result.failed.size), brief=False),
-        ),
-        plots=tuple(plots),
-        tables=(*tables, variation_table(study)),
-        notes=tuple(_notes(result, indices)),
-        references=tuple(cite(scenario.plant)),
-        chosen=(
-            ("scenario", scenario.title, str(study.path.name)),
-            ("design", str(study.design), "study"),
-            *metrics,
-            ("integrator", str(scenario.problem.integrator), "scenario"),
-            ("input signal", str(scenario.problem.input), "scenario"),
-        ),
-    )
+        "study", study.title, (*summary, execution), plots=tuple(plots), tables=(*tables, variation_table(study)),
+        values=tuple(NamedValue(name, count, brief=False) for name, count in counts.items()), chosen=chosen,
+        notes=tuple(_notes(result, indices)), references=tuple(cite(scenario.plant)),
+    )  # fmt: skip
 
 
 def _notes(result: StudyResult, indices: dict[str, SobolIndices]) -> Iterator[str]:

@@ -114,16 +114,12 @@ def tuning_chapter(
     bound = [f"'{path}' is on a bound of its range; a wider range may give a smaller objective"
              for path in tuning.on_bound]  # fmt: skip
     return Chapter(
-        name="tuning",
-        title=title,
-        summary=_summary(tuning),
+        "tuning", title, summary=_summary(tuning),
         values=tuple(NamedValue(name, value, brief=False) for name, value in values.items()),
         tables=(gain_table(tuning, units), case_table(tuning, units), *([rule_table(rules)] if rules else [])),
-        plots=tuple(plots),
-        notes=(*notes, *bound),
-        references=(*tuning.references, *cite(tuple(rules))),
+        plots=tuple(plots), notes=(*notes, *bound), references=(*tuning.references, *cite(tuple(rules))),
         chosen=_settings(tuning),
-    )
+    )  # fmt: skip
 
 
 def _runs(tuning: Tuning, integrator: Integrator | None) -> dict[str, Recording]:

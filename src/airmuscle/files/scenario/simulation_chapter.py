@@ -43,24 +43,19 @@ def run_chapter(scenario: Scenario, recording: Recording) -> Chapter:
         plots.append(_input_plot(scenario, recording))
     start = ", ".join(f"{name} {typographic(format_number(value))}" for name, value in scenario.initial_state.items())
     own = {key: "scenario" for key in ("integrator", "initial_state") if key not in scenario.defaults}
-    return Chapter(
-        name="simulation",
-        title=scenario.title,
-        summary=f"Simulation of {problem.duration:g} s{early}. {len(recording)} rows; recording.csv has all columns.",
-        plots=tuple(plots),
-        tables=(
-            _range_table(scenario, recording),
-            parameter_table(scenario.plant, "parameters", "Parameters of the plant"),
-            *((controller_table(scenario, loop),) if loop else ()),
-        ),
-        notes=recording.notes,
-        references=tuple(cite((scenario.plant, loop))),
-        chosen=(
-            ("integrator", str(problem.integrator), own.get("integrator", "default")),
-            ("initial state (SI)", start, own.get("initial_state", "default: equilibrium at ambient pressure")),
-            ("inputs", describe_input(problem.input), "scenario"),
-        ),
+    tables = [_range_table(scenario, recording)]
+    tables.append(parameter_table(scenario.plant, "parameters", "Parameters of the plant"))
+    tables += [controller_table(scenario, loop)] if loop else []
+    chosen = (
+        ("integrator", str(problem.integrator), own.get("integrator", "default")),
+        ("initial state (SI)", start, own.get("initial_state", "default: equilibrium at ambient pressure")),
+        ("inputs", describe_input(problem.input), "scenario"),
     )
+    summary = f"Simulation of {problem.duration:g} s{early}. {len(recording)} rows; recording.csv has all columns."
+    return Chapter(
+        "simulation", scenario.title, summary, plots=tuple(plots), tables=tuple(tables), notes=recording.notes,
+        references=tuple(cite((scenario.plant, loop))), chosen=chosen,
+    )  # fmt: skip
 
 
 def _range_table(scenario: Scenario, recording: Recording) -> Table:
