@@ -599,6 +599,14 @@ def test_an_infinite_value_is_refused_and_a_missing_one_left_out():
     assert "np.isfinite" in said
 
 
+@pytest.mark.parametrize("name", ["pressure", "contraction", "force"])
+def test_a_missing_value_of_one_of_two_recordings_is_left_out_of_the_checks_too(name: str):
+    recording = points(surface(2).force, n=50)
+    gap = recording.with_columns(**{name: np.where(np.arange(50) == 7, np.nan, recording[name] + 1e-6)})
+    found = fit(ContractileSurface.blank(2, **WIDE), [gap, recording])
+    assert "1 rows with a missing value (NaN) were dropped." in found.notes
+
+
 def test_points_beyond_the_reach_of_a_law_are_named():
     law = MartensBoblan2017(Braid(0.01, 0.45, 0.3), 1.8e-3, 9e7, -7e8, 1.5e9, -5e8)
     recording = points(lambda p, c: 1e-3 * p, n=20)

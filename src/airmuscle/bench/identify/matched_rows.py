@@ -160,7 +160,7 @@ def _with_residuals(blocks: list[Block]) -> list[Block]:
 
 def _matched_runs(blocks: Sequence[Block], recordings: Sequence[Recording]) -> list[MatchedRuns]:
     """Every pair of blocks of one direction with enough matched rows."""
-    highest = max(float(np.max(np.abs(run["pressure"]))) for run in recordings)
+    highest = max(float(np.nanmax(np.abs(run["pressure"]), initial=0.0)) for run in recordings)
     reach = np.array([PRESSURE_REACH * max(highest, 1.0), CONTRACTION_REACH])
     points = [block.points / reach for block in blocks]
     limits = [(x.min(axis=0) - 1.0, x.max(axis=0) + 1.0) for x in points]
