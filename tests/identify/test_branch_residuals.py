@@ -51,3 +51,10 @@ def test_the_order_of_a_map_is_no_branch():
     pressure, contraction = (g.ravel() for g in np.meshgrid(np.linspace(1e5, 6e5, 12), np.linspace(0.0, 0.15, 8)))
     columns = {"pressure": pressure, "contraction": contraction, "force": LAW.force(pressure, contraction)}
     assert branch_notes([Recording(columns, "map")], degree=1) == []
+
+
+def test_missing_times_are_no_branches_and_no_delay():
+    timed = [
+        run.with_columns(time=np.where(np.arange(len(run)) < 9, np.nan, 0.1 * np.arange(len(run)))) for run in runs(0.0)
+    ]
+    assert fit(blank_surface(3, 1e4), timed).notes == fit(blank_surface(3, 1e4), runs(0.0)).notes

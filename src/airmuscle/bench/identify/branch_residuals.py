@@ -74,7 +74,7 @@ def _turns(recording: Recording) -> Iterator[tuple[float, ...]]:
     turning point, width of the loop [N], sample time [s]; none where the pressure dwells there or the force is flat."""
     if any(name not in recording for name in ("time", "pressure", "force")) or len(recording) < 2 * MIN_LOOP_ROWS:
         return
-    if not np.isfinite(recording["pressure"] + recording["force"]).all():
+    if not np.isfinite(recording["time"] + recording["pressure"] + recording["force"]).all():
         return
     branches = [branch for branch in find_branches(recording) if branch.column == "pressure"]
     for up, down in itertools.pairwise(branches):
