@@ -105,6 +105,16 @@ def test_a_stream_whose_beginning_is_no_table_is_refused():
     assert row["pressure"] == 1e3
 
 
+@pytest.mark.parametrize(
+    "lines", [["time_[s] force_[N] valve x y", "0 1,5 A 2,5 3,5", "0,1 2,5 1 2,5 3,5"], ["time [s];force [N]", "0,5"]]
+)
+def test_a_stream_whose_numbers_are_not_separated_as_its_headings_is_refused(lines: list[str]):
+    reader = RowReader("port")
+    assert not any(map(reader.read, lines[:-1]))
+    with pytest.raises(ColumnError, match=rf"port, line {len(lines)}: the numbers are separated by '.', the headings"):
+        reader.read(lines[-1])
+
+
 def test_damaged_rows_of_a_serial_log_are_left_out_and_counted():
     reader = RowReader("port", ColumnMapping(columns={"1": "pressure [bar]", "2": "length [mm]", "3": "force [N]"}, constants={"resting_length": "200 mm"}))  # fmt: skip
     rows = [

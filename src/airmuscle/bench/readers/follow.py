@@ -56,13 +56,17 @@ class RowReader:
         self._head.append((self._line, line))
         if len(self._head) > MAX_HEADER_LINES:
             raise FileError(f"{self.origin}: no row of numbers in the first {MAX_HEADER_LINES} lines.")
-        text_format = TextFormat(headerless=bool(self._names))
-        cells = split_cells(line, text_format.detect_delimiter(line))
+        text_format, place = TextFormat(headerless=bool(self._names)), f"{self.origin}, line {self._line}"
+        delimiter = text_format.detect_delimiter(line)
+        cells = split_cells(line, delimiter)
         while cells and not cells[-1]:
             cells.pop()  # a delimiter at the end of the line
         if is_comment(line) or not cells or not all(is_number(cell) for cell in cells):
             return None
         header = parse_header(self.origin, self._head, text_format)
+        if header.delimiter != delimiter and len(cells) > 1:
+            signs = f"{delimiter!r}, the headings by {header.delimiter!r}"
+            raise ColumnError(f"{place}: the numbers are separated by {signs}. Separate both alike.")
         self._delimiter, self._comma = header.delimiter, header.delimiter != ","
         first = [float(self._point(cell)) for cell in cells]
         headings = tuple(self._names.get(text, self._names.get(str(i), text))
@@ -75,8 +79,7 @@ class RowReader:
             )
         if len(headings) != len(first):
             raise ColumnError(
-                f"{self.origin}, line {self._line}: the line must have {len(headings)} cells ({listed(headings)}); "
-                f"it has {len(first)}."
+                f"{place}: the line must have {len(headings)} cells ({listed(headings)}); it has {len(first)}."
             )
         columns, rows = tuple(np.array([value]) for value in first), np.array([self._line], dtype=np.int64)
         table = RawTable(self.origin, headings, header.units, columns, rows, constants=header.constants)
