@@ -100,10 +100,8 @@ class RegulatorLag:
 
 
 def fit_regulator_lags(episodes: Episodes, rows: int = ROWS) -> tuple[RegulatorLag, ...]:
-    """The regulator of each muscle whose pressures over `rows` further rows are nearest to the measured ones.
-
-    Empty if an episode has no commands.
-    """
+    """The regulator of each muscle whose pressures over `rows` further rows are nearest to the measured ones. Empty if
+    an episode has no commands."""
     if any(run.command is None for run in episodes.runs):
         return ()
     pressure, command = cut(episodes, 0, rows).pressure, _commands(episodes, rows)

@@ -41,10 +41,8 @@ class RowReader:
         self._line = self._unreadable = 0
 
     def read(self, line: str) -> dict[str, float] | None:
-        """The quantities of a line [SI]; None for a line of the header, a comment, or a row that cannot be read.
-
-        Raises ColumnError, FileError or UnitError for a header without known quantities, or too many unreadable rows.
-        """
+        """The quantities of a line [SI]; None for a line of the header, a comment, or a row that cannot be read. Raises
+        ColumnError, FileError or UnitError for a header without known quantities, or too many unreadable rows."""
         self._line += 1
         if not has_content(line) or self._line <= (self.mapping.skip_rows or 0):
             return None

@@ -214,10 +214,8 @@ class Reduction:
         return self.downsampling.note(self.rows, self.step) if self.step > 1 else ""
 
     def read(self, get: Callable[[int, int], Any], rows: int) -> Any:
-        """The reduced rows of a column, or of the first axis of a matrix.
-
-        `get(first, end)` returns the rows from `first` up to `end`; at most `PIECE_ROWS` are requested at once.
-        """
+        """The reduced rows of a column, or of the first axis of a matrix. `get(first, end)` returns the rows from
+        `first` up to `end`; at most `PIECE_ROWS` are requested at once."""
         if self.step == 1:
             return get(0, rows)
         size = max(PIECE_ROWS // self.step, 1) * self.step

@@ -138,9 +138,7 @@ def from_pandas(frame: Any, mapping: ColumnMapping = ColumnMapping(), *, origin:
 
 def to_xarray(recording: Recording) -> Any:
     """An xarray.Dataset over `time`, or over the row number without time; units, origin and constants are attributes.
-
-    Raises AirmuscleError without the package xarray.
-    """
+    Raises AirmuscleError without the package xarray."""
     try:
         import xarray
     except ImportError:

@@ -99,9 +99,7 @@ def _split_at_runs(recording: Recording, runs: tuple[Run, ...]) -> list[Interval
 
 def motion_direction(values: Array, time: Array | None = None, *, reversal: float = REVERSAL_FRACTION) -> Array:
     """The direction of motion (N,) of any signal (N,): 1 rising, -1 falling, 0 everywhere if the signal is constant.
-
-    Reversals are detected as for the branches of the pressure.
-    """
+    Reversals are detected as for the branches of the pressure."""
     smooth = _remove_spikes(values, time)
     signs = np.zeros(len(values))
     threshold = reversal * float(np.ptp(smooth)) if len(smooth) else 0.0
@@ -153,10 +151,8 @@ def branch_directions(recording: Recording, branches: tuple[Branch, ...]) -> Arr
 
 
 def branch_column_agreement(recording: Recording, branches: tuple[Branch, ...]) -> float | None:
-    """Fraction of rows that agree with the branch column of the file (1 inflating, 2 deflating); None without it.
-
-    None also for branches of a motion at constant pressure.
-    """
+    """Fraction of rows that agree with the branch column of the file (1 inflating, 2 deflating); None without it. None
+    also for branches of a motion at constant pressure."""
     if "branch" not in recording or any(branch.column != "pressure" for branch in branches):
         return None
     return float(np.mean(np.where(recording["branch"] == 1, 1.0, -1.0) == branch_directions(recording, branches)))

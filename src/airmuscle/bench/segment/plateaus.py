@@ -49,10 +49,8 @@ MIN_CHANGE = 30.0
 
 
 def rate_of_change(recording: Recording, name: str) -> float:
-    """The rate that 95 % of the rows do not exceed [SI per s]; 0 without time or where the quantity is constant.
-
-    The interval is doubled from one row until the change within it exceeds the noise.
-    """
+    """The rate that 95 % of the rows do not exceed [SI per s]; 0 without time or where the quantity is constant. The
+    interval is doubled from one row until the change within it exceeds the noise."""
     if "time" not in recording or name not in recording:
         return 0.0
     time, values = recording["time"], recording[name]

@@ -116,10 +116,8 @@ def check_describes_law(tables: Mapping[str, Any], what: str) -> None:
 
 
 def build_entry(tables: Mapping[str, Any], location: Location, kind: type[Any] = Entry) -> Any:
-    """The muscle, law, valve, product or plant of the tables of a file.
-
-    The ratings of an Entry are those of its `product` unless it states some.
-    """
+    """The muscle, law, valve, product or plant of the tables of a file. The ratings of an Entry are those of its
+    `product` unless it states some."""
     given: dict[str, Any] = {"name": Path(location.file).stem}
     if kind is PlantEntry:
         keys, place = (*SCENARIO_TABLES, "sources"), location.inside("sources")

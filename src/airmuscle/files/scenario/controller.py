@@ -24,10 +24,8 @@ from .values import Number, build_input_signal, read_drivers
 
 
 def build_law(table: Any, plant: Plant, units: Mapping[str, str], location: Location, sample_time: float) -> Controller:
-    """The controller of a table, with the laws inside it; `units` are those of the signals of the plant by name.
-
-    The table is read twice: the first time without its numbers, to find the signals that determine their units.
-    """
+    """The controller of a table, with the laws inside it; `units` are those of the signals of the plant by name. The
+    table is read twice: the first time without its numbers, to find the signals that determine their units."""
 
     def built(known: Mapping[str, str] | None) -> Controller:
         reader = dataclasses.replace(PLANT_READER, signals=PlantSignals(plant, sample_time, known))

@@ -141,10 +141,8 @@ def build_scenario(
     plant: Plant | None = None,
     equilibrium: dict[str, float] | None = None,
 ) -> Scenario:
-    """The scenario of the tables of a file.
-
-    `plant` replaces the table [plant], `equilibrium` the computed initial equilibrium. Raises as `load_scenario`.
-    """
+    """The scenario of the tables of a file. `plant` replaces the table [plant], `equilibrium` the computed initial
+    equilibrium. Raises as `load_scenario`."""
     check_keys(tables, [field.name for field in dataclasses.fields(ScenarioTables)], location)
     for key in ("plant", "run"):
         required_table(tables, key, location)
