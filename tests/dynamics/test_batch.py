@@ -265,6 +265,18 @@ def thick_and_thin(count, thin):
     return {"muscle.geometry.radius": radius}
 
 
+class WithoutHint(Functions):
+    def failure_hint(self, state):
+        raise ZeroDivisionError
+
+
+def test_a_batch_asks_for_no_remedy():
+    start = {"x": [1.0, np.finfo(float).max], "y": 0.0}
+    found = simulate_batch(WithoutHint(), {"power": [0.5, 0.5]}, ZERO_INPUT, duration=0.1, initial_states=start)
+    assert found.failed.tolist() == [1]
+    assert found.reason(1).startswith("the run ended at 0 of 0.1 s because")
+
+
 def test_a_plant_that_fails_does_not_stop_the_others():
     start = plain().state_at(pressure=1e5, position=0.002, speed=0.1)
     found = simulate_batch(

@@ -163,16 +163,20 @@ def make_solution(
 
 def early_end(compiled: CompiledSystem, raw: RawSolution, end: float) -> Diagnostic:
     """Time, reason and state of an early end of a run, and the remedy."""
-    state = dict(zip(compiled.description.state_names, raw.state.tolist(), strict=True))
-    units = ["" if s.unit in ("", "1") else f" {s.unit}" for s in compiled.system.states]
-    at = ", ".join(f"{name} {v:.4g}{unit}" for (name, v), unit in zip(state.items(), units, strict=True))
     hint = _HINTS.get(raw.status, _GENERAL_HINT)
     if raw.status != Status.INTERRUPTED:
+        state = dict(zip(compiled.description.state_names, raw.state.tolist(), strict=True))
         hint = compiled.system.failure_hint(state) or hint
-    text = (
-        f"the run ended at {raw.time:.6g} of {end:.6g} s because {raw.status.message}, after {raw.steps} steps, at {at}"
-    )
-    return Diagnostic(DiagnosticCode.INCOMPLETE, "run", text, hint=hint)
+    return Diagnostic(DiagnosticCode.INCOMPLETE, "run", reason_of_end(compiled, raw, end), hint=hint)
+
+
+def reason_of_end(compiled: CompiledSystem, raw: RawSolution, end: float) -> str:
+    """Time, reason and state of an early end of a run, without a full stop."""
+    units = ["" if s.unit in ("", "1") else f" {s.unit}" for s in compiled.system.states]
+    state = zip(compiled.description.state_names, raw.state.tolist(), units, strict=True)
+    at = ", ".join(f"{name} {value:.4g}{unit}" for name, value, unit in state)
+    why = f"{raw.status.message}, after {raw.steps} steps, at {at}"
+    return f"the run ended at {raw.time:.6g} of {end:.6g} s because {why}"
 
 
 class Statistics(NamedTuple):

@@ -21,7 +21,7 @@ from ..compiled_loop import CompiledLoop, CompiledRun
 from ..integrators import Integrator, RawSolution
 from ..problem import Problem
 from ..sampled_loop import first_rows_of, prepare_loop
-from ..solution import RowRecorder, early_end
+from ..solution import RowRecorder, reason_of_end
 from .variations import Variations
 
 NOT_RUN = -1
@@ -165,7 +165,7 @@ class BatchJob:
                 column[index, reached:] = np.nan
         self.final[index], self.status[index], self.reached[index] = raw.state, raw.status, reached
         if raw.status:
-            self.reasons[index] = early_end(self.compiled, raw, self.start_time + self.duration).text
+            self.reasons[index] = reason_of_end(self.compiled, raw, self.start_time + self.duration)
 
     def mark_not_run(self, index: int, status: Status, reason: str | None = None) -> None:
         """Write that a plant was not simulated."""
