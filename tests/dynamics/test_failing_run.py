@@ -221,7 +221,7 @@ def test_a_batch_has_no_more_plants_than_it_has():
     for given, message in (
         *wrong,
         ({"variations": [1, 2]}, "give a column of values"),
-        ({"variations": {3: [1]}}, "a mapping, from a text to an array of numbers"),
+        ({"variations": {3: [1]}}, "Plant has no parameter '3'"),
     ):
         with pytest.raises(AirmuscleError, match=message):
             simulate_batch(isothermal(), input=FILL, duration=0.1,
