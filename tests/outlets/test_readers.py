@@ -23,6 +23,7 @@ from airmuscle.bench.readers import (
     mapping_of_tables,
     raw_csv,
     read_mapping,
+    read_mat_tables,
     seconds_from_clock,
     separate_process,
 )
@@ -165,6 +166,7 @@ def test_matlab_structs_matrices_and_simulink(tmp_path: Path):
     same(first)
     assert (first.origin, second.origin) == ("two.mat, run1", "two.mat, run2")
     assert len(only(read(tmp_path / "two.mat", ColumnMapping(group="run2")))) == 9
+    assert [len(t.rows) for t in read_mat_tables(tmp_path / "two.mat", group="run2")] == [9]
     said = refusal(FileError, tmp_path / "two.mat", group="run3")
     assert "no struct 'run3' with vectors; the structs are run1, run2" in said
 

@@ -77,11 +77,13 @@ def in_separate_process(package: str) -> Callable[[Callable[Given, Result]], Cal
     def decorated(read: Callable[Given, Result]) -> Callable[Given, Result]:
         @functools.wraps(read)
         def call(*arguments: Given.args, **named: Given.kwargs) -> Result:
-            path: Any = arguments[0]
+            given = inspect.signature(read).bind(*arguments, **named)
+            given.apply_defaults()
+            path, *others = given.args
             if not is_installed(package):
                 raise _missing_package(package, path)
             check_regular_file(path)
-            found: Result = call_in_separate_process(read.__module__, read.__name__, path, *arguments[1:])
+            found: Result = call_in_separate_process(read.__module__, read.__name__, path, *others)
             return found
 
         return call
