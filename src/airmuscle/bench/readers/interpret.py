@@ -188,7 +188,7 @@ def unit_conversion(table: RawTable, heading: Heading, ambient: float) -> UnitCo
 def _keep_unknown_column(
     table: RawTable, heading: Heading, cells: Cells, columns: dict[str, Array], unknown: list[str]
 ) -> str:
-    """Keep an unknown column without conversion; the note on this column alone, without which it is in `unknown`."""
+    """Keep an unknown column without conversion; its note, or if it has numbers and none, its text in `unknown`."""
     if isinstance(cells, list) and not any(cells):
         return ""
     if isinstance(cells, list):  # a few different texts are kept as their numbers
