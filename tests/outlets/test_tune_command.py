@@ -199,7 +199,7 @@ def test_a_scenario_that_cannot_be_tuned_is_refused(scenario):
         (["--index", "mse"], "--index is 'mse'; allowed range: rmse, iae, itae. Did you mean 'rmse'?"),
         (["--loads", "0.5;2"], "--loads is '0.5;2'; it must be factors with commas between them"),
         (["--loads", "0"], "loads contains 0; a factor must be positive"),
-        (["--quantile", "2"], "quantile is 2.0; allowed range: 0 to 1"),
+        (["--quantile", "2"], "--quantile is 2; allowed range: 0 to 1"),
         (["--budget", "9" * 30], "Invalid value for '--budget'"),
         (["--budget", "20"], "budget is 20; it must be a whole number of at least 80"),
     ],
@@ -228,3 +228,11 @@ def test_a_file_that_cannot_be_written_is_refused_before_the_search(scenario):
     assert "cannot take the place of" in refused(scenario, "--save", other / "new.toml")
     with pytest.raises(ParameterError, match="gain"):
         loaded.save({"gain": float("nan")}, scenario.with_name("nan.toml"))
+
+
+@pytest.mark.parametrize("option", ["--quantile 1.5", "--leak 2", "--delay 1001", "--draws -1", "--air-weight -1"])
+def test_an_option_has_the_range_of_the_field_that_it_sets(scenario, option):
+    refused = run("tune", scenario, *option.split())
+    assert refused.exit_code == 2
+    assert "Invalid value" in refused.stderr
+    assert option.split()[0] in refused.stderr

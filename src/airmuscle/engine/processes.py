@@ -147,8 +147,8 @@ class Worker:
     prepare  function that a new process calls before its first task
     quiet    whether what the process writes to the standard error is discarded
 
-    Unlike those of `process_pool`, the process does not import the program of the caller, a file of a user that may
-    call this one without `if __name__ == "__main__"`.
+    Unlike those of `process_pool` and of pebble, the process does not import the program of the caller, a file of a
+    user that may call this one without `if __name__ == "__main__"`.
     """
 
     def __init__(self, prepare: Callable[[], object] | None = None, *, quiet: bool = False) -> None:

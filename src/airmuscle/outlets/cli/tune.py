@@ -43,6 +43,13 @@ def read_factors(text: str, where: str) -> tuple[float, ...]:
         ) from None
 
 
+def _field(cls: Any, name: str, meaning: str, **declared: Any) -> Any:
+    """An option with the default and the bounds that a dataclass declares for its field."""
+    field = cls.__dataclass_fields__[name]
+    bounds = field.metadata.get("within", (0.0, float("inf")))
+    return option(meaning, default=field.default, bounds=bounds, **declared)
+
+
 @request
 class TuneRequest:
     """What a tuning is asked for."""
@@ -54,21 +61,25 @@ class TuneRequest:
     index: type[TrackingIndex] = option(
         f"Tracking index of a run: {', '.join(INDICES)}.", choices=INDICES, default="rmse"
     )
-    quantile: float = option("Quantile of the index over the cases; 1: the worst case.", default=0.9)
-    quantile_weight: float = option("Weight of the quantile; that of the mean is 1.", default=1.0)
-    air_weight: float = option("Weight of the mean air drawn [kg/s].", default=0.0)
-    travel_weight: float = option("Weight of the mean travel of the commands [strokes/s].", default=0.0)
+    quantile: float = _field(RobustObjective, "quantile", "Quantile of the index over the cases; 1: the worst case.")
+    quantile_weight: float = _field(
+        RobustObjective, "quantile_weight", "Weight of the quantile; that of the mean is 1."
+    )
+    air_weight: float = _field(RobustObjective, "air_weight", "Weight of the mean air drawn [kg/s].")
+    travel_weight: float = _field(
+        RobustObjective, "travel_weight", "Weight of the mean travel of the commands [strokes/s]."
+    )
     loads: Any = option(
         "Factors of the load; '' for none.", default="0.5,2", metavar="FACTORS", read=read_factors, empty=True
     )
     supplies: Any = option(
         "Factors of the supply pressure; '' for none.", default="0.8", metavar="FACTORS", read=read_factors, empty=True
     )
-    leak: float = option(
-        "Leak at each muscle, relative to the largest conductance; 0 for none.", default=0.01, metavar="RATIO"
+    leak: float = _field(
+        Perturbations, "leak", "Leak at each muscle, relative to the largest conductance; 0 for none.", metavar="RATIO"
     )
-    delay: int = option("Dead time of the measurements in samples; 0 for none.", default=1, bounds=(0, 1000))
-    draws: int = option("Draws of fitted parameters, from their covariance.", default=4, bounds=(0, 10_000))
+    delay: int = _field(Perturbations, "delay", "Dead time of the measurements in samples; 0 for none.")
+    draws: int = _field(Perturbations, "draws", "Draws of fitted parameters, from their covariance.")
     rules: bool = option("Start from SIMC and AMIGO settings by a simulated step (PID only).", default=False)
     budget: int = option("Maximum number of simulated loops.", default=4000, bounds=(8, 10_000_000))
     seed: int = option("Seed of the optimiser and of the draws.", default=0, bounds=(0, float("inf")))
