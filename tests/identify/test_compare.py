@@ -378,6 +378,14 @@ def test_a_law_without_a_guess_is_not_started_and_says_so():
         am.characteristic.BorzikovaDirect.guess(bench())
 
 
+@pytest.mark.parametrize(("name", "factor", "cause"), [("force", 0, "positive force"), ("force", -1, "positive force"),
+                                                       ("pressure", 0, "pressure is 0 Pa in every row")])  # fmt: skip
+def test_data_without_tension_or_pressure_determine_no_law_and_say_so(name, factor, cause):
+    runs = [run.with_columns(**{name: factor * run[name]}) for run in bench()]
+    with pytest.raises(IdentificationError, match=f"the data determine none of the(.|\n)*{cause}"):
+        compare(runs)
+
+
 def test_laws_that_need_a_length_are_named_where_none_is_stated():
     runs = [dataclasses.replace(run, constants={}) for run in bench()]
     found = compare(runs, leave_out=RunSplit())

@@ -49,7 +49,7 @@ class Hunt2017(PressureLaw):
 
     @classmethod
     def guess(cls, data: MeasuredPoints) -> Self:
-        scales = DataScales.of(data)
+        scales = DataScales.of(data).check_positive("force")
         factor = 450.0 / scales.force  # the published values are of a 10 mm muscle, with a maximum force of about 450 N
         span = min(max(scales.contraction, 0.02), 0.5)
         return cls(span, span_by_force=0.331e-3 * factor * span / 0.17, by_force=1.23e3 * factor)

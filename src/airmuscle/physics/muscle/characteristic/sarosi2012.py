@@ -28,7 +28,7 @@ class Sarosi2012(ForceLaw):
 
     @classmethod
     def guess(cls, data: MeasuredPoints) -> Self:
-        scales = DataScales.of(data)
+        scales = DataScales.of(data).check_positive("pressure")
         factor = scales.force / 1500.0  # relative to a DMSP-20, whose measured map these values fit
         slope = factor * 6e5 / scales.pressure
         return cls(1.2e-4 * slope, 420 * factor, -57.0, -8.7e-3 * slope, 2.7e-3 * slope, -310 * factor)

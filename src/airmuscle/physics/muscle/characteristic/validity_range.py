@@ -102,10 +102,17 @@ class DataScales:
     @property
     def braid(self) -> Braid:
         """A braid of the resting length that exerts the maximum force at the maximum pressure, with a radius of 0.2 to
-        100 mm. Raises IdentificationError unless every recording states its resting length."""
-        area = math.pi * self.pressure * (3 / math.tan(BRAID_ANGLE) ** 2 - 1 / math.sin(BRAID_ANGLE) ** 2)
+        100 mm. Raises IdentificationError without a positive pressure, or unless every recording states its length."""
+        area = math.pi * self.check_positive("pressure").pressure
+        area *= 3 / math.tan(BRAID_ANGLE) ** 2 - 1 / math.sin(BRAID_ANGLE) ** 2
         radius = min(max(math.sqrt(max(self.force, 1.0) / area), 2e-4), 0.1)
         return Braid(radius, BRAID_ANGLE, self.resting_length)
+
+    def check_positive(self, name: str) -> Self:
+        """These scales. Raises IdentificationError where the maximum of `force` or `pressure` is not positive."""
+        if not getattr(self, name) > 0:
+            refuse_guess(f"no row has a positive {name}")
+        return self
 
     def check_lengths(self) -> Self:
         """These scales. Raises IdentificationError for fewer than two resting lengths."""
