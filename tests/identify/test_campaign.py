@@ -177,6 +177,13 @@ def test_no_usable_record_is_an_error_that_names_each_record():
         identify_campaign([recording(short, "run")])
 
 
+def test_a_campaign_at_exactly_one_pressure_plans_no_further_static_runs():
+    columns = MUSCLE.isometric(0.05, RANDOM)
+    campaign = identify_campaign([recording({**columns, "pressure": np.full(600, 3.5e4)}, "one pressure")])
+    assert isinstance(campaign.static, StaticStage)
+    assert not any(each.plan for each in campaign.next_experiments)
+
+
 def test_two_specimens_of_one_length_are_refused():
     runs = [recording(MUSCLE.isobaric(3.0, RANDOM), name, specimen=name) for name in ("A", "B")]
     with pytest.raises(IdentificationError, match=r"records of 300 mm are of several specimens: A, B"):

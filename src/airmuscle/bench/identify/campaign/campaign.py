@@ -116,11 +116,9 @@ class Campaign(ShortRepr):
         )  # fmt: skip
 
     def predict(self, recording: Recording) -> Prediction:
-        """The force along the pressure and the motion of a recording, with its 95 % band.
-
-        The band is that of further runs for a resting length of the records, and that of other lengths otherwise.
-        Raises IdentificationError without a static law, ColumnError without pressure and contraction.
-        """
+        """The force along the pressure and the motion of a recording, with its 95 % band. The band is that of further
+        runs for a resting length of the records, and that of other lengths otherwise. Raises IdentificationError
+        without a static law, ColumnError without pressure and contraction."""
         if not isinstance(self.static, StaticStage):
             raise IdentificationError(f"the campaign has no static characteristic: {self.static.reason}.")
         length = recording.constants.get("resting_length")
@@ -281,12 +279,12 @@ def _levels(run: PlannedRun) -> str:
 def _static_runs(stage: StaticStage) -> list[NextExperiment]:
     fit, ranges = stage.fit, stage.fit.data_ranges
     (low, high), (least, greatest) = ranges["pressure"], ranges["contraction"]
-    limits = BenchLimits(ValidityRange(max(low, 0.0), high, max(least, 0.0), greatest), ranges["force"][1])
     fixed = tuple(leaf.path for i, leaf in enumerate(fit.problem.leaves) if i not in set(fit.problem.free))
     sigma = max(fit.sigma, 1e-9)
     try:
+        limits = BenchLimits(ValidityRange(max(low, 0.0), high, max(least, 0.0), greatest), ranges["force"][1])
         plan = optimal_design(fit.model, limits, runs=PLANNED_RUNS, points=PLANNED_POINTS, sigma=sigma, fixed=fixed)
     except AirmuscleError:
-        return []  # the law has no derivative at a corner of the range; the other experiments remain
+        return []  # a range of one value, or no derivative of the law at a corner; the other experiments remain
     text = f"Measure {len(plan.runs)} further static runs: {'; '.join(map(_levels, plan.runs))}."
     return [NextExperiment(text, "static characteristic: the D-optimal runs within the range of the records", plan)]
