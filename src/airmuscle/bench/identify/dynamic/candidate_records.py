@@ -30,11 +30,9 @@ FILL = Schedule({"fill": ((0.0, 1.0),)})
 @dataclasses.dataclass(frozen=True, eq=False)
 class CandidateRecord:
     """A record that could be measured: what it is, its simulated experiment, and what it does not share with the fit.
-
     `changed` are parameters that are unknowns of its own: those whose values differ from the fit by an unknown amount,
     such as the conductance of a throttled valve, and those that the records of the fit do not use. `replaced` is the
-    beginning of the paths of a part of the plant that this record replaces by a known one.
-    """
+    beginning of the paths of a part of the plant that this record replaces by a known one."""
 
     description: str
     experiment: Experiment

@@ -16,11 +16,9 @@ from .initial_conditions import InitialConditions
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
 class Experiment(ShortRepr):
-    """One record: the recording, the command that was applied, and the initial conditions.
-
-    `command` counts from the start of the run, which is at `start_time` [s] on the clock of the recording; rows before
-    it are at the initial state. `plant` replaces the plant of the fit, for example with another load.
-    """
+    """One record: the recording, the command that was applied, and the initial conditions. `command` counts from the
+    start of the run, which is at `start_time` [s] on the clock of the recording; rows before it are at the initial
+    state. `plant` replaces the plant of the fit, for example with another load."""
 
     recording: Recording
     command: InputSignal

@@ -44,20 +44,16 @@ class InitialConditions:
     @classmethod
     def at_rest(cls, plant: Plant, pressure: MusclePressures) -> "InitialConditions":
         """Equilibrium at gauge pressures [Pa], one for all muscles or one for each; walls, tubes and tanks are settled.
-
-        Raises ParameterError for another number of pressures than muscles, EquilibriumError where there is none.
-        """
+        Raises ParameterError for another number of pressures than muscles, EquilibriumError where there is none."""
         pressures = check_pressures(pressure, len(plant.muscles), plant.ambient)
         return _steady_conditions(plant, find_equilibrium(plant, pressure=tuple(pressures)), pressures, at_rest=True)
 
     @classmethod
     def at_coordinates(cls, plant: Plant, pressure: MusclePressures, **coordinates: float) -> "InitialConditions":
-        """A plant at gauge pressures [Pa], one for all muscles or one for each, and given coordinates [SI].
-
-        Speeds are zero unless given. Walls and tubes are in steady state at these pressures, tanks and regulators at
-        their supply, also where their parameters are unknowns. Raises ParameterError for another number of pressures
-        than muscles, or an unknown name.
-        """
+        """A plant at gauge pressures [Pa], one for all muscles or one for each, and given coordinates [SI]. Speeds are
+        zero unless given. Walls and tubes are in steady state at these pressures, tanks and regulators at their supply,
+        also where their parameters are unknowns. Raises ParameterError for another number of pressures than muscles, or
+        an unknown name."""
         pressures = check_pressures(pressure, len(plant.muscles), plant.ambient)
         return _steady_conditions(plant, plant.state_at(pressure=pressures, **coordinates), pressures, at_rest=False)
 

@@ -55,12 +55,10 @@ class Optimum:
 
 
 def distinct_optima(values: Array, costs: Array, scales: Array, margins: Array) -> tuple[Optimum, ...]:
-    """The optima of searches that ended at `values` (S, P) with `costs` (S,), lowest first.
-
-    Two searches ended at one optimum if their sums of squares and all unknowns, relative to their values or at least a
-    thousandth of `scales` (P,), agree; start times and initial values relative to their `margins` (P,), which are NaN
-    for parameters. Searches without a result are left out.
-    """
+    """The optima of searches that ended at `values` (S, P) with `costs` (S,), lowest first. Two searches ended at one
+    optimum if their sums of squares and all unknowns, relative to their values or at least a thousandth of `scales`
+    (P,), agree; start times and initial values relative to their `margins` (P,), which are NaN for parameters. Searches
+    without a result are left out."""
     optima: list[Optimum] = []
     for point, cost in zip(values[np.isfinite(costs)], costs[np.isfinite(costs)], strict=True):
         for i, optimum in enumerate(optima):

@@ -251,11 +251,9 @@ class SensorLocation:
 
 
 def locate_pressure_sensor(*, in_muscle: DynamicFit, in_line: DynamicFit) -> SensorLocation:
-    """Locate the pressure sensor of one fill by two fits of it: sensor in the muscle, and sensor in the line.
-
-    Both fits need physical bounds, because a valve with b = 0.9 or a muscle that grows tenfold would imitate a line.
-    Raises IdentificationError where a fit is not of one pressure in one record, or the rows differ.
-    """
+    """Locate the pressure sensor of one fill by two fits of it: sensor in the muscle, and sensor in the line. Both fits
+    need physical bounds, because a valve with b = 0.9 or a muscle that grows tenfold would imitate a line. Raises
+    IdentificationError where a fit is not of one pressure in one record, or the rows differ."""
     models = [fit.problem.record_models for fit in (in_muscle, in_line)]
     if any(len(each) != 1 or len(each[0].names) != 1 for each in models):
         raise IdentificationError("locate_pressure_sensor compares two fits of one record with one observed pressure.")

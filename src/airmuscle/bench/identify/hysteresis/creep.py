@@ -131,11 +131,9 @@ class CreepFit:
 
 
 def fit_creep(recording: Recording, quantity: str) -> CreepFit:
-    """Fit creep of a column, `contraction` or `force`, to the rows of a hold at constant pressure.
-
-    Time counts from the first row. An element is added as long as the F test is significant. Raises IdentificationError
-    for another column, fewer than 12 rows, or time that does not increase.
-    """
+    """Fit creep of a column, `contraction` or `force`, to the rows of a hold at constant pressure. Time counts from the
+    first row. An element is added as long as the F test is significant. Raises IdentificationError for another column,
+    fewer than 12 rows, or time that does not increase."""
     if quantity not in ("contraction", "force"):
         raise IdentificationError(
             f"{recording.origin}: creep of the column '{one_line(quantity)}' is not fitted; give 'contraction' or "

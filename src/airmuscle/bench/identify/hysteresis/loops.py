@@ -188,10 +188,8 @@ def initial_friction_laws(
     path: Array, force: Array, elements: int = 8, others: Sequence[type[Friction]] = ()
 ) -> tuple[Friction, ...]:
     """Every law of `friction` with a `guess`, its initial parameters scaled by a path [m] and the forces [N] along it.
-
     `elements` is the number of elements of MaxwellSlip and PrandtlIshlinskii, `others` are classes of a user. Raises
-    IdentificationError for a constant path, and for one of the `others` without a `guess`.
-    """
+    IdentificationError for a constant path, and for one of the `others` without a `guess`."""
     check_whole("initial_friction_laws", "elements", elements, 1)
     scales = LoopScales.of(path, force, elements)
     known = [cls for name in dir(laws) if isinstance(cls := getattr(laws, name), type) and issubclass(cls, Friction)]
@@ -263,9 +261,7 @@ def fit_loop(
     progress: Callable[[str], None] | None = None,
 ) -> LoopFit:  # fmt: skip
     """Fit every friction law to a loop and sort the fits by AICc; laws with terms of speed need a speed that varies.
-
-    `elements` and `others` are those of `initial_friction_laws`; `progress` is called with the name of each law.
-    """
+    `elements` and `others` are those of `initial_friction_laws`; `progress` is called with the name of each law."""
     run = dataclasses.replace(loop.series(loop.recording, loop.fitted_rows), transient_rows=loop.transient_rows)
     second_run = None if loop.repeat is None else loop.series(*loop.repeat)
     fits, failed = list[HysteresisFit](), dict[str, HintedText]()

@@ -146,12 +146,10 @@ SIMILAR_RMSE = 1.02
 
 
 def preferred_fit(fits: Sequence[AnyFit]) -> AnyFit | None:
-    """The fit to use of several laws, lowest AICc first; None where the data justify none.
-
-    It is the justified one with the lowest AICc. Where the data do not determine all of its parameters, or do not judge
-    them one by one because it consists of elements, it is the one with the fewest parameters among those whose rms
-    error is at most 2 % greater.
-    """
+    """The fit to use of several laws, lowest AICc first; None where the data justify none. It is the justified one with
+    the lowest AICc. Where the data do not determine all of its parameters, or do not judge them one by one because it
+    consists of elements, it is the one with the fewest parameters among those whose rms error is at most 2 %
+    greater."""
     justified = [fit for fit in fits if fit.justified]
     if not justified:
         return None

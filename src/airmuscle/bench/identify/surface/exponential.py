@@ -239,11 +239,9 @@ class SurfaceProblem:
 def fit_linearised(
     recording: Recording, saturation: float, *, pressure_degree: int = 4, force_degree: int = 2
 ) -> SurfaceFit:
-    """Fit v to ln(1 - k/k_max) by linear least squares, as in the paper.
-
-    `recording` has pressure [Pa], force [N] and contraction [1]; `saturation` is k_max [1]. Points with k >= k_max have
-    no logarithm; they are omitted, and the result states their number. Raises IdentificationError.
-    """
+    """Fit v to ln(1 - k/k_max) by linear least squares, as in the paper. `recording` has pressure [Pa], force [N] and
+    contraction [1]; `saturation` is k_max [1]. Points with k >= k_max have no logarithm; they are omitted, and the
+    result states their number. Raises IdentificationError."""
     problem = SurfaceProblem.from_recording(recording, saturation, pressure_degree, force_degree)
     usable = problem.contraction < saturation
     problem.check_determined(problem.design_matrix[usable])
@@ -255,11 +253,9 @@ def fit_linearised(
 def fit_nonlinear(
     recording: Recording, saturation: float, *, pressure_degree: int = 4, force_degree: int = 2
 ) -> SurfaceFit:
-    """Fit k itself by nonlinear least squares, S(A) = Sum (k_i - f(p_i, F_i, A))^2, with exact derivatives.
-
-    The arguments are those of `fit_linearised`. All points are used, also those with k >= k_max. Raises
-    IdentificationError.
-    """
+    """Fit k itself by nonlinear least squares, S(A) = Sum (k_i - f(p_i, F_i, A))^2, with exact derivatives. The
+    arguments are those of `fit_linearised`. All points are used, also those with k >= k_max. Raises
+    IdentificationError."""
     from scipy.optimize import least_squares
 
     problem = SurfaceProblem.from_recording(recording, saturation, pressure_degree, force_degree)

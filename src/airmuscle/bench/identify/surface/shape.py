@@ -153,11 +153,9 @@ FORCE_FALLS = MonotonicityRule("force falls with pressure", "force", 0, -1.0)
 def find_monotonicity_violations(
     law: ContractionLaw, validity_range: LoadRange | None = None, points: tuple[int, int] = (201, 201)
 ) -> tuple[MonotonicityViolation, ...]:
-    """The regions of a validity range where k rises with F or falls with p, largest first.
-
-    `validity_range` is by default that of the law. Exact slopes are evaluated on an even grid of `points` pressures and
-    forces, edges included.
-    """
+    """The regions of a validity range where k rises with F or falls with p, largest first. `validity_range` is by
+    default that of the law. Exact slopes are evaluated on an even grid of `points` pressures and forces, edges
+    included."""
     validity_range = validity_range or LoadRange.from_law(law)
     return find_violations(law, (RISES_WITH_FORCE, CONTRACTION_FALLS), *validity_range.grid(*points))
 
@@ -166,12 +164,10 @@ def fit_monotone(
     recording: Recording, saturation: float, *, pressure_degree: int = 4, force_degree: int = 2,
     cells: tuple[int, int] = (16, 12),
 ) -> SurfaceFit:  # fmt: skip
-    """Fit k by least squares with the constraint that it never rises with F and never falls with p.
-
-    The arguments are those of `fit_linearised`. The slopes are enclosed on `cells` in pressure and force; more cells
-    are slower and less conservative. The method is Gauss-Newton; each step solves a least-squares problem with linear
-    inequalities. Raises IdentificationError.
-    """
+    """Fit k by least squares with the constraint that it never rises with F and never falls with p. The arguments are
+    those of `fit_linearised`. The slopes are enclosed on `cells` in pressure and force; more cells are slower and less
+    conservative. The method is Gauss-Newton; each step solves a least-squares problem with linear inequalities. Raises
+    IdentificationError."""
     problem = SurfaceProblem.from_recording(recording, saturation, pressure_degree, force_degree)
     constraints = slope_constraints(pressure_degree, force_degree, cells)
     coefficients = solve_constrained_least_squares(*problem.linear_system(), constraints, MIN_SLOPE)
@@ -246,12 +242,10 @@ def fit_shape_constrained(
     cells: tuple[int, int] = (6, 6),
 ) -> ShapeConstrainedFit:  # fmt: skip
     """Fit a surface by least squares with the constraint that its force never falls with p and never rises with eps.
-
     The constraint holds on the validity range of the data. `free` holds points (pressure, contraction) of free
     contraction, where the force is required to be zero. The slopes are enclosed on `cells` in pressure and contraction;
     more cells are slower and less conservative. The rows are those that are active in the unconstrained fit. Raises
-    IdentificationError where no surface of this degree satisfies the constraints.
-    """
+    IdentificationError where no surface of this degree satisfies the constraints."""
     runs = [recordings] if isinstance(recordings, Recording) else list(recordings)
     # As censored rows the points of free contraction only extend the validity range.
     unconstrained = fit(law, runs if free is None else [*runs, free.with_columns(force=np.zeros(len(free)))])
