@@ -58,7 +58,7 @@ class Evaluation(Reported):
             values.append(NamedValue("stiffness per contraction", stiffness, "N", brief=False))
         elif stiffness is not None:
             values.append(NamedValue("stiffness per contraction", stiffness, "N", "N/%", remark="at constant pressure"))
-        law, title = self.entry.characteristic, self.entry.title
+        title = self.entry.title
         caption = f"{title}: force over contraction at constant gauge pressure. Working point: {describe_point(point)}."
         inside = None if limits is None else bool(limits.contains(point.pressure, point.contraction))
         permitted = None if ratings is None else not ratings.excesses(**point._asdict())
@@ -73,8 +73,12 @@ class Evaluation(Reported):
                 NamedValue("inside the validity range", inside, brief=False),
                 NamedValue("permitted", permitted, brief=False),
             ),
-            plots=(Plot("isobars", caption, lambda: isobar_figure(law, title, self.isobars(), limits, point)),),
+            plots=(Plot("isobars", caption, self._figure),),
         )
+
+    def _figure(self) -> Any:
+        law, title = self.entry.characteristic, self.entry.title
+        return isobar_figure(law, title, self.isobars(), self.validity_range, self.point)
 
     def isobars(self) -> Isobars:
         """The isobars of the law, with that of the point."""
