@@ -4,13 +4,12 @@ import abc
 import bisect
 import dataclasses
 import itertools
-import operator
 from collections.abc import Iterable, Mapping, Sequence
 from typing import ClassVar
 
 import numpy as np
 
-from ...core import FEW, Array, ParameterError, ShortRepr, abridged, all_finite, as_float, check_known, one_line
+from ...core import Array, ParameterError, ShortRepr, abridged, all_finite, as_float, check_known, one_line
 from ...core.declaration import forwarded
 
 FEW_SEGMENTS = 16
@@ -75,12 +74,7 @@ class PiecewiseLinear(ShortRepr):
             )
         if not (all_finite(ends) and all_finite(values) and all_finite(slopes)):
             raise ParameterError("segments hold a number that is not finite.")
-        if ends.size > FEW:
-            rising = bool((ends[1:] > ends[:-1]).all())
-        else:
-            listed = ends.tolist()
-            rising = all(map(operator.lt, listed, listed[1:]))
-        if ends[0] <= start or not rising:
+        if ends[0] <= start or not (ends[1:] > ends[:-1]).all():
             raise ParameterError(f"segments must end in rising order after {start:g} s; they end at {ends.tolist()} s.")
 
     def as_floats(self) -> "PiecewiseLinear":

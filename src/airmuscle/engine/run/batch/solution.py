@@ -127,7 +127,12 @@ def new_folder(path: Path) -> Iterator[Path]:
 def new_columns(names: Sequence[str], shape: tuple[int, int], kind: Any, folder: Path | None) -> dict[str, Any]:
     """Arrays (N, T) for columns, in memory or as one .npy file each. Raises ParameterError for too much memory."""
     if folder is not None:
-        return {name: _new_file(folder / file_of(name), kind, shape) for name in names}
+        files = {name: folder / file_of(name) for name in names}
+        columns = {name: np.lib.format.open_memmap(file, "w+", np.dtype(kind), shape) for name, file in files.items()}
+        for file in files.values() if hasattr(os, "posix_fallocate") else ():  # without room, writing ends the process
+            with file.open("r+b") as opened:
+                os.posix_fallocate(opened.fileno(), 0, file.stat().st_size)
+        return columns
     size = len(names) * shape[0] * shape[1] * np.dtype(kind).itemsize
     if size > MAX_MEMORY:
         raise ParameterError(
@@ -136,15 +141,6 @@ def new_columns(names: Sequence[str], shape: tuple[int, int], kind: Any, folder:
             "write to disk (into=...), or fewer output times (output_times=...)."
         )
     return {name: np.empty(shape, kind) for name in names}
-
-
-def _new_file(path: Path, kind: Any, shape: tuple[int, int]) -> Any:
-    """A column (N, T) as a file that has its place on the disk: where there is none, writing would end the process."""
-    column = np.lib.format.open_memmap(path, "w+", np.dtype(kind), shape)
-    if hasattr(os, "posix_fallocate"):
-        with path.open("r+b") as file:
-            os.posix_fallocate(file.fileno(), 0, path.stat().st_size)
-    return column
 
 
 def file_of(name: str) -> str:
