@@ -103,6 +103,12 @@ def test_names_that_are_imported_on_use_exist():
     assert {f"{face.__name__}.{name}" for face in faces for name in face.__all__ if not hasattr(face, name)} == set()
 
 
+def test_every_room_lists_its_names_alone():
+    """In `dir`, which completes them in a notebook."""
+    rooms = [importlib.import_module(f"airmuscle.{path.parent.name}") for path in SOURCE.glob("*/__init__.py")]
+    assert {room.__name__ for room in rooms if sorted(dir(room)) != sorted(room.__all__)} == set()
+
+
 # Independence of packages and laws
 
 

@@ -1,5 +1,5 @@
 """Reproduction of three papers, claim by claim."""
 
-from .run import PAPERS, chapter_texts, reproduce
+from ..core.stubs import attach_stub
 
-__all__ = ["PAPERS", "chapter_texts", "reproduce"]
+__getattr__, __dir__, __all__ = attach_stub(__name__, __file__)

@@ -15,7 +15,7 @@ from ..compile.program import CompiledSystem
 from ..loop import ControlLaw, ControlLoopState, PiecewiseLinear
 from .compiled_law import compiled_sample, parameters_of
 from .integrators import INTERRUPT_CHECK_STEPS, MAX_STEPS, Integrator, RawSolution
-from .sampled_loop import CalledController, DriverTable, SampledLoop, are_called, greatest_capacity
+from .sampled_loop import CalledController, DriverTable, SampledLoop, are_called, max_capacity
 
 FIRST_SEGMENTS = 4096
 """Segments and rows that the buffers of driven inputs hold at first."""
@@ -34,7 +34,7 @@ class CompiledLoop:
         self.parameters = parameters_of(self.law) if self.law is not None else np.zeros(1)
         self.called_drivers = bool(loop.drivers) and are_called(prepared)
         pieces = int(np.diff(prepared.first_segments).max())
-        self.capacity = pieces if self.called_drivers else greatest_capacity(prepared) if loop.drivers else 0
+        self.capacity = pieces if self.called_drivers else max_capacity(prepared) if loop.drivers else 0
         columns = (*known.state_names, *known.output_names)
         measured_at = np.array([columns.index(name) for name in controller.measured_columns], dtype=np.int64)
         commanded_at = np.array(prepared.commanded, dtype=np.int64)

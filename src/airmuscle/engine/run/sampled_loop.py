@@ -199,10 +199,10 @@ class CalledController:
 def are_called(prepared: SampledLoop) -> bool:
     """Whether a driver of a loop must be called from Python, because the kernel does not implement it."""
     known = all(type(driver) in KINDS for chain in prepared.loop.driven_inputs.chains.values() for driver in chain)
-    return not known or greatest_capacity(prepared) > MAX_CAPACITY
+    return not known or max_capacity(prepared) > MAX_CAPACITY
 
 
-def greatest_capacity(prepared: SampledLoop) -> int:
+def max_capacity(prepared: SampledLoop) -> int:
     """The maximum number of segments of an input within an interval, before and after each of its drivers."""
     duration = float(np.diff(prepared.instants).max())
     greatest = pieces = int(np.diff(prepared.first_segments).max())

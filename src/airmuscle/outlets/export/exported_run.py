@@ -156,7 +156,7 @@ def export_loop(problem: Problem, name: str, title: str, tunable: Sequence[str] 
                     "input signals."
                 )
     prepared = prepare_loop(problem, loop.init(problem.start_time))
-    capacity = sampled_loop.greatest_capacity(prepared)
+    capacity = sampled_loop.max_capacity(prepared)
     if capacity > MAX_CAPACITY:
         raise ParameterError(
             f"the drivers make up to {capacity} segments of an input between two samples; {MAX_CAPACITY} are allowed. "
