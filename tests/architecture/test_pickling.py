@@ -124,9 +124,11 @@ RESULTS: dict[str, Callable[[], Any]] = {
         LIFT, ("pressure",), 0.01, {}, {"pressure": 500.0}
     ),
     "an entry of the library": lambda: am.load("dmsp-20-300"),
-    "a chapter of a working point": lambda: files.library.evaluate(
-        PRODUCT, {"pressure": 3e5, "contraction": 0.1}
-    ).chapter(),
+    "chapters of a muscle, a valve and a working point": lambda: (
+        PRODUCT.chapter(),
+        am.load("matrix-821").chapter(),
+        files.library.evaluate(PRODUCT, {"pressure": 3e5, "contraction": 0.1}).chapter(),
+    ),
     "a scenario of the library": lambda: files.load_scenario(EXAMPLE_FILES / "pressure_loop.toml"),
     "a study": lambda: design.load_study(EXAMPLE_FILES / "valve_study.toml"),
     "a learning law": lambda: control.IterativeLearning(0.01, (1.0, 0.5)),

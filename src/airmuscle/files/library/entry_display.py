@@ -3,6 +3,7 @@
 import abc
 import dataclasses
 from collections.abc import Iterator
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -112,8 +113,9 @@ class EntryDisplay(Reported, abc.ABC):
         """Function that draws the chart, or None: the isobars of a law, the flow of a valve."""
         entry: Any = self
         if hasattr(entry, "characteristic"):
-            return lambda: plot_isobars(entry.characteristic, type(entry.characteristic).__name__, entry.validity_range)
-        return (lambda: _plot_flow(entry)) if hasattr(entry, "valve") else None
+            name = type(entry.characteristic).__name__
+            return partial(plot_isobars, entry.characteristic, name, entry.validity_range)
+        return partial(_plot_flow, entry) if hasattr(entry, "valve") else None
 
 
 def _plot_flow(entry: Any) -> Any:
