@@ -23,7 +23,7 @@ from airmuscle.bench import (
     predict_dynamic,
     rank_records,
 )
-from airmuscle.bench.identify.dynamic import DynamicProfile
+from airmuscle.bench.identify.dynamic import DynamicProfile, cross_predict
 from airmuscle.core import StateVariable, System, model, parameter, tree
 from airmuscle.engine import Schedule, simulate
 from airmuscle.engine.run import BoundIntegrator
@@ -440,6 +440,21 @@ def test_a_system_of_any_kind_is_fitted_whatever_its_surroundings_are():
     assert not any("ambient air" in note for note in (*fit.notes, *warmer.notes))
     best = rank_records(fit, ("ambient", "time_constant")).ranking[0]
     assert best.description == "the same record, 4 times as long"
+
+
+def test_a_record_that_cannot_be_simulated_with_the_parameters_of_the_others_is_not_predicted():
+    plant = rigid_plant()
+    fit = fit_dynamic(
+        plant, [rigid_fill(plant), rigid_fill(plant, 4)], free=("circuit.fill.conductance",),
+        observed={"pressure": 300.0},
+    )  # fmt: skip
+
+    def refit(chosen):
+        estimates = tuple(dataclasses.replace(e, value=np.nan if chosen == [0] else e.value) for e in fit.estimates)
+        return dataclasses.replace(fit, estimates=estimates)
+
+    (prediction,) = cross_predict(fit, refit)
+    assert prediction.ratio == pytest.approx(1.0)
 
 
 # Bad input

@@ -234,15 +234,15 @@ def cross_predict(fit: DynamicFit, refit: Callable[[Sequence[int]], DynamicFit])
         return ()
     predictions = []
     for i in range(count):
+        model = fit.problem.record_models[i]
         try:
             part = refit([k for k in range(count) if k != i])
-        except AirmuscleError:
+            common = {e.name: e.value for e in part.estimates if OF_RECORD not in e.name}
+            estimates = tuple(dataclasses.replace(e, value=common.get(e.name, e.value)) for e in fit.estimates)
+            other = dataclasses.replace(fit, estimates=estimates)
+            rms, fitted = ({name: each.rms(name, i) for name in model.names} for each in (other, fit))
+        except AirmuscleError:  # the others give no fit, or one with which this record cannot be simulated
             continue
-        model = fit.problem.record_models[i]
-        common = {e.name: e.value for e in part.estimates if OF_RECORD not in e.name}
-        estimates = tuple(dataclasses.replace(e, value=common.get(e.name, e.value)) for e in fit.estimates)
-        other = dataclasses.replace(fit, estimates=estimates)
-        rms, fitted = ({name: each.rms(name, i) for name in model.names} for each in (other, fit))
         predictions.append(CrossPrediction(model.experiment.recording.origin, rms, fitted, common))
     return tuple(predictions)
 
