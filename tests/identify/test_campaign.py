@@ -204,8 +204,12 @@ def test_creep_of_maxwell_elements_is_found_again_with_its_standard_error():
     rng = np.random.default_rng(1)
     force = 800.0 - 1500.0 * stretch + rng.normal(0.0, 1.0, time.size)
     columns = {"time": time, "pressure": np.full(time.size, 3e5), "length": 0.3 - path, "force": force}
-    stage = fit_creep_stage(classify_records([recording(columns, "hold")]))
+    without = {name: values for name, values in columns.items() if name != "force"}
+    assert isinstance(fit_creep_stage(classify_records([recording(without, "no force")])), LeftOutStage)
+    force[[700, -1]] = np.nan
+    stage = fit_creep_stage(classify_records([recording(columns, "hold"), recording(without, "no force")]))
     assert isinstance(stage, CreepStage)
+    assert [name for name, _ in stage.holds] == ["hold"]
     (stiffness,), (relaxation,) = stage.elements.stiffnesses, stage.elements.relaxation_times
     assert abs(stiffness - 1500.0) < 3.0 * stage.standard_errors[0]
     assert abs(relaxation - 8.0) < 3.0 * stage.standard_errors[1]

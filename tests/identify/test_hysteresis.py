@@ -276,6 +276,7 @@ def test_creep_with_none_one_or_two_time_constants_is_told_apart(parts):
     time = np.arange(0.0, 60.0, 0.1)
     rng = np.random.default_rng(4)
     values = creep.value_at(time) + 2e-4 * rng.standard_normal(time.size)
+    values[100] = np.nan  # a missing reading
     fit = fit_creep(Recording({"time": time + 7.0, "contraction": values}, "hold"), "contraction")
     assert fit.creep.time_constants == pytest.approx(parts[1], rel=0.1)
     assert fit.creep.amplitudes == pytest.approx(parts[0], rel=0.1)

@@ -80,6 +80,7 @@ class HeldRows:
             )
         start = int(np.argmax(later))
         kept, path = start + thinned_rows(len(whole) - start, FIT_ROWS), displacement(whole)
+        kept = kept[np.isfinite(whole["force"][kept])]
         path = np.where(np.arange(path.size) < start, path, np.median(path[start:]))  # no motion by the noise
         return cls(whole.rows(kept), whole["time"], path, kept)
 
@@ -92,13 +93,14 @@ def fit_creep_stage(records: Sequence[CampaignRecord]) -> CreepStage | LeftOutSt
     """Fit Maxwell elements to the holds at constant length and pressure. The number of elements is the largest that the
     F test justifies in a hold. Relaxation times and stiffnesses are common to all holds, each hold has its own initial
     force."""
-    if not records:
+    recordings = [record.recording for record in records if "force" in record.recording]
+    if not recordings:
         remedy = (
             "move the muscle by a few per cent of its length within a second at constant pressure, hold the length for "
             "two minutes or more, and record the force"
         )
-        return LeftOutStage(NAME, "no record is a hold after a motion", remedy)
-    motions = [(record.recording, find_motion(record.recording)) for record in records]
+        return LeftOutStage(NAME, "no record with a force is a hold after a motion", remedy)
+    motions = zip(recordings, map(find_motion, recordings), strict=True)
     return fit_held_rows([HeldRows.after(recording, motion.end) for recording, motion in motions if motion])
 
 

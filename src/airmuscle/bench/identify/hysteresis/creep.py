@@ -139,7 +139,8 @@ def fit_creep(recording: Recording, quantity: str) -> CreepFit:
             f"{recording.origin}: creep of the column '{one_line(quantity)}' is not fitted; give 'contraction' or "
             "'force'. A length becomes a contraction where the recording states the resting length."
         )
-    time, values = recording["time"], recording[quantity]
+    known = np.isfinite(recording[quantity])
+    time, values = recording["time"][known], recording[quantity][known]
     if time.size < 12 or not (np.diff(time) > 0).all():
         raise IdentificationError(
             f"{recording.origin}: a fit of creep needs 12 or more rows of a hold in increasing time; there are "
