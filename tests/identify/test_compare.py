@@ -373,6 +373,27 @@ def test_each_started_law_gives_forces_of_the_size_of_the_data():
     assert started["MartensBoblan2017"].fixed == ("wall_thickness",)
 
 
+@pytest.mark.parametrize("name", ["pressure", "contraction", "force"])
+def test_laws_are_not_started_without_any_value_of_a_column(name: str):
+    with pytest.raises(IdentificationError, match="no value of the pressure, of the contraction or of the force"):
+        standard_candidates([run.with_columns(**{name: np.full(len(run), np.nan)}) for run in bench()])
+
+
+def test_the_laws_of_a_small_muscle_start_within_their_bounds():
+    small = [run.with_columns(force=1e-4 * run["force"]) for run in bench()]
+    assert {each.name for each in standard_candidates(small)} == {each.name for each in standard_candidates(bench())}
+
+
+@pytest.mark.parametrize("split", [RunSplit(), BlockSplit(), LevelSplit("pressure")])
+def test_a_recording_without_rows_does_not_count_in_a_comparison(split):
+    given = [*bench(), bench()[0].rows(slice(0, 0))]
+    assert standard_candidates(given) == standard_candidates(bench())
+    errors = [
+        compare(each, CANDIDATES[:1], leave_out=split).recommended.cross_validated_rmse for each in (given, bench())
+    ]
+    assert errors[0] == errors[1]
+
+
 def test_a_law_without_a_guess_is_not_started_and_says_so():
     with pytest.raises(IdentificationError, match=r"BorzikovaDirect is not started from data; give its initial par"):
         am.characteristic.BorzikovaDirect.guess(bench())

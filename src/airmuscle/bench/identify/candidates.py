@@ -123,7 +123,8 @@ class ExcludedModel:
 
 def standard_candidates(recordings: Sequence[Recording]) -> tuple[Candidate, ...]:
     """Every law whose initial values follow from the data: those of all classes of `characteristic` that define `guess`
-    or `variants`, and laws of partial pooling for three specimens or more."""
+    or `variants`, and laws of partial pooling for three specimens or more. Raises IdentificationError where the data
+    have no value of pressure, contraction or force."""
     return started_candidates(recordings)[0]
 
 

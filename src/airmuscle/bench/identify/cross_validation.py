@@ -157,7 +157,8 @@ class BlockSplit(GroupSplit):
         labels = []
         for i, run in enumerate(recordings):
             values = run[self.quantity]
-            low, high = float(np.nanmin(values)), float(np.nanmax(values))
+            known = values[~np.isnan(values)]
+            low, high = (float(known.min()), float(known.max())) if known.size else (0.0, 0.0)
             fractions = (np.nan_to_num(values, nan=low) - low) / (high - low if high > low else 1.0)
             interval = np.minimum((2 * self.folds * fractions).astype(np.intp), 2 * self.folds - 1)
             inside = (interval > 0) & (interval < 2 * self.folds - 1)

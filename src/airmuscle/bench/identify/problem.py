@@ -43,8 +43,7 @@ PRESSURE = FittedQuantity("pressure", ("contraction", "force"), "pressure")
 
 
 def rows_by_length(law: Any, data: Recording) -> list[tuple[float | None, npt.NDArray[np.intp]]]:
-    """Each resting length in the data with the indices of its rows; None, if the law does not depend on it, or without
-    rows."""
+    """Each resting length in the data with the indices of its rows; once None, without rows or an effect of length."""
     if RESTING_LENGTH not in data.columns or not hasattr(law, "with_resting_length") or not len(data):
         return [(None, np.arange(len(data)))]
     lengths = data[RESTING_LENGTH]

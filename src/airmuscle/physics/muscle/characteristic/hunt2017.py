@@ -52,7 +52,8 @@ class Hunt2017(PressureLaw):
         scales = DataScales.of(data).check_positive("force")
         factor = 450.0 / scales.force  # the published values are of a 10 mm muscle, with a maximum force of about 450 N
         span = min(max(scales.contraction, 0.02), 0.5)
-        return cls(span, span_by_force=0.331e-3 * factor * span / 0.17, by_force=1.23e3 * factor)
+        shortening, stiffening = 0.331e-3 * factor * span / 0.17, 1.23e3 * factor
+        return cls(span, span_by_force=min(shortening, 0.1), by_force=min(stiffening, 1e7))  # within their bounds
 
     def check(self) -> None:
         if self.direction not in (-1, 0, 1):

@@ -78,13 +78,15 @@ class DataScales:
 
     @classmethod
     def of(cls, data: "MeasuredPoints") -> "DataScales":
-        """The scales of all rows of one recording or several; given scales as they are."""
+        """The scales of all rows of one recording or several; given scales as they are. Raises IdentificationError
+        where a column has no value."""
         if isinstance(data, DataScales):
             return data
-        runs = [data] if isinstance(data, Recording) else list(data)
-        force, pressure, contraction = (
-            max(float(np.nanmax(run[name])) for run in runs) for name in ("force", "pressure", "contraction")
-        )
+        runs, names = [data] if isinstance(data, Recording) else list(data), ("force", "pressure", "contraction")
+        columns = [[run[name] for run in runs if not np.isnan(run[name]).all()] for name in names]
+        if not all(columns):
+            refuse_guess("the recordings have no value of the pressure, of the contraction or of the force")
+        force, pressure, contraction = (max(float(np.nanmax(values)) for values in column) for column in columns)
         lengths = [run.constants.get("resting_length") for run in runs]
         known = {float(length) for length in lengths if length is not None}
         complete = len(lengths) > 0 and None not in lengths
