@@ -20,6 +20,7 @@ import pytest
 from airmuscle.bench import BlockMeans, ColumnMapping, Decimation, RecordedTime, read
 from airmuscle.bench.readers import (
     call_in_separate_process,
+    check_bench,
     mapping_of_tables,
     raw_csv,
     read_mapping,
@@ -151,6 +152,18 @@ def save_v73(path: Path, content: dict[str, object]) -> Path:
     with path.open("r+b") as file:
         file.write(head)
     return path
+
+
+@pytest.mark.parametrize("missing", ["pressure", "length", "force"])
+@pytest.mark.parametrize("rows", [slice(None), slice(3, 9)])
+def test_what_is_missing_in_a_recording_is_no_suspicious_value(missing: str, rows: slice):
+    columns = {"time": TIME, "pressure": 1e3 * PRESSURE, "length": 1e-3 * LENGTH, "force": 1.0 * FORCE}
+    good, gaps = Recording(columns, "good"), columns[missing].copy()
+    gaps[rows] = np.nan
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        check_bench([good])
+        check_bench([good, Recording(columns | {missing: gaps}, "gaps")])
 
 
 @pytest.mark.parametrize("save", [save_v5, save_v73])

@@ -30,8 +30,8 @@ LEVELS = 8
 
 
 def recordings_with(recordings: Sequence[Recording], *names: str) -> list[Recording]:
-    """The recordings that have all named columns."""
-    return [recording for recording in recordings if all(name in recording for name in names)]
+    """The recordings that have all named columns, with a reading in each."""
+    return [run for run in recordings if all(name in run and np.isfinite(run[name]).any() for name in names)]
 
 
 def limits(values: Array) -> tuple[float, float]:

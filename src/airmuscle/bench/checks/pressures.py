@@ -130,7 +130,7 @@ def _is_atmosphere(lowest: float) -> bool:
 def _begins_at_ambient(recording: Recording, greatest: float) -> bool:
     """Whether the muscle does not pull at the lowest pressure: at the start of a rise, or near its resting length."""
     low, high = limits(recording["pressure"])
-    rows = recording["pressure"] <= float(recording["pressure"].min()) + 3e3
+    rows = recording["pressure"] <= float(np.nanmin(recording["pressure"])) + 3e3
     if "force" not in recording:
         return high - low > MIN_RISE
     slack = np.abs(recording["force"]) <= SLACK_FORCE * greatest
@@ -184,7 +184,7 @@ def check_force_area(recordings: Sequence[Recording]) -> Iterator[str]:
     """A maximum force that is too great or too small for the highest pressure."""
     given = recordings_with(recordings, "pressure", "force")
     greatest, (highest, _) = _greatest_force(given), _highest_pressure(recordings)
-    varied = any(float(np.ptp(each["pressure"])) > 0.1 * highest for each in given)
+    varied = any(np.nanmax(each["pressure"]) - np.nanmin(each["pressure"]) > 0.1 * highest for each in given)
     if greatest <= 0 or highest <= 0 or (highest < 1e3 and not varied):
         return
     area = greatest / highest

@@ -166,9 +166,9 @@ def _motion_findings(recording: Recording) -> Iterator[Finding]:
 
 def _pressure_range(recording: Recording) -> str:
     """The pressure range as ` (pressure 298.8 to 301.2 kPa)`, to show which pressure was taken as constant."""
-    if "pressure" not in recording:
+    if "pressure" not in recording or not np.isfinite(recording["pressure"]).any():
         return ""
-    low, high = np.quantile(recording["pressure"], [0.01, 0.99])
+    low, high = np.nanquantile(recording["pressure"], [0.01, 0.99])
     return f" (pressure {low / 1e3:.4g} to {high / 1e3:.4g} kPa)"
 
 
