@@ -192,13 +192,13 @@ def test_an_input_beyond_its_range_is_found_among_few_and_many_numbers(count, se
 @pytest.mark.parametrize("spoil", ["end", "value", "slope", "order"])
 def test_segments_that_a_kernel_cannot_take_are_refused_among_few_and_many(count, spoil):
     ends, values, slopes = np.arange(1.0, count + 1), np.zeros((count, 1)), np.zeros((count, 1))
-    PiecewiseLinear(ends, values, slopes).check_shape(1, 0.0)
+    PiecewiseLinear(ends, values, slopes).check_shape(1, 0.0, count)
     if spoil == "order":
         ends[-1] = ends[-2]
     else:
         {"end": ends, "value": values, "slope": slopes}[spoil][-1] = np.nan
     with pytest.raises(ParameterError, match="segments"):
-        PiecewiseLinear(ends, values, slopes).check_shape(1, 0.0)
+        PiecewiseLinear(ends, values, slopes).check_shape(1, 0.0, count)
 
 
 class Steps(InputSignal):

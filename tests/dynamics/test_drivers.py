@@ -343,5 +343,5 @@ def test_stepping_with_the_memory_of_the_drivers_is_the_whole_run():
         state = advance(plant, state, segments, dt, method, start_time=i * dt)
     for variable in plant.states:
         assert state[variable.name] == pytest.approx(whole[variable.name][-1], abs=1e-8 * variable.nominal)
-    with pytest.raises(ParameterError, match=r"the segments end at 0\.3 s; start_time \+ dt is 0\.1 s"):
+    with pytest.raises(ParameterError, match=r"segments end at 0\.3 s; they must end with the run, at 0\.1 s"):
         advance(plant, state, segments, 0.1)

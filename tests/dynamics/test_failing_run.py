@@ -10,9 +10,12 @@ from joints import chosen_muscle
 from widths import widened
 
 from airmuscle import Status, load
+from airmuscle.control import OnOffController
 from airmuscle.core import Columns, DiagnosticCode
 from airmuscle.core.system import state_vector
 from airmuscle.engine import (
+    ControlLoop,
+    InputSignal,
     PiecewiseLinear,
     Problem,
     Rodas4,
@@ -25,7 +28,7 @@ from airmuscle.engine import (
 )
 from airmuscle.engine.compile import compile_system
 from airmuscle.engine.run import integrators
-from airmuscle.errors import AirmuscleError, SimulationError
+from airmuscle.errors import AirmuscleError, ParameterError, SimulationError
 from airmuscle.physics import (
     EnergyBalance,
     FillDischarge,
@@ -53,6 +56,7 @@ from airmuscle.physics import (
 HUGE = Valve(9e-6, 0.3)
 VALVE = Valve(2.6e-9, 0.4)
 FILL = Schedule({"fill": ((0.05, 1.0),)})
+SETPOINT = Schedule({"pressure": ((0.0, 1e5),)})
 
 
 def test_a_fixed_step_that_is_too_long_is_not_called_a_result():
@@ -175,6 +179,22 @@ def test_segments_of_another_shape_never_reach_a_kernel(segments, message):
     """A kernel reads as many inputs as the plant has, whether they are there or not."""
     with pytest.raises(AirmuscleError, match=message):
         advance(isothermal(), STATE, segments, 0.01)
+
+
+@pytest.mark.parametrize("end", [0.005, 0.02])
+def test_a_signal_that_ends_at_another_time_than_the_run_is_refused(end):
+    """A run ends with the segments of its inputs: it would be shorter or longer than asked."""
+
+    class Own(InputSignal):
+        def segments(self, inputs, start, duration):
+            return pieces([end], [[0.5, 0.0]])
+
+    given, loop = {"duration": 0.01}, ControlLoop(OnOffController("pressure", "fill", 1e4), 1e-3, SETPOINT, Own())
+    for act in (lambda: simulate(isothermal(), Own(), initial_state=STATE, **given),
+                lambda: simulate(isothermal(), loop, initial_state=STATE, **given),
+                lambda: simulate_batch(isothermal(), {}, [Own()], initial_states=STATE, **given)):  # fmt: skip
+        with pytest.raises(ParameterError, match=rf"segments end at {end:g} s; they must end with the run, at 0.01 s"):
+            act()
 
 
 @pytest.mark.parametrize(

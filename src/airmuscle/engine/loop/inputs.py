@@ -60,12 +60,10 @@ class PiecewiseLinear(ShortRepr):
         values, slopes = self.values[:, i].tolist(), self.slopes[:, i].tolist()
         return list(zip(self.ends.tolist(), values, slopes, strict=True))
 
-    def check_shape(self, inputs: int, start: float) -> None:
-        """Raise ParameterError unless ends rise from `start` [s] and every segment has all inputs, all finite.
-
-        Kernels rely on it.
-        """
-        ends, values, slopes = self.ends, self.values, self.slopes
+    def check_shape(self, inputs: int, start: float, duration: float) -> None:
+        """Raise ParameterError unless ends rise from `start` [s] for `duration` [s], and every segment has all inputs,
+        all finite. Kernels rely on it; a run ends with its segments."""
+        ends, values, slopes, end = self.ends, self.values, self.slopes, start + duration
         shape = (ends.size, inputs)
         if ends.ndim != 1 or not ends.size or values.shape != shape or slopes.shape != shape:
             raise ParameterError(
@@ -76,6 +74,8 @@ class PiecewiseLinear(ShortRepr):
             raise ParameterError("segments hold a number that is not finite.")
         if ends[0] <= start or not (ends[1:] > ends[:-1]).all():
             raise ParameterError(f"segments must end in rising order after {start:g} s; they end at {ends.tolist()} s.")
+        if abs(ends[-1] - end) > max(1e-9 * duration, 4 * np.spacing(abs(end))):
+            raise ParameterError(f"segments end at {ends[-1]:g} s; they must end with the run, at {end:g} s.")
 
     def as_floats(self) -> "PiecewiseLinear":
         """The same inputs as arrays that a kernel can read: contiguous, writeable, of float64."""
@@ -119,7 +119,7 @@ class InputSignal(abc.ABC):
 
     @abc.abstractmethod
     def segments(self, inputs: Sequence[str], start: float, duration: float) -> PiecewiseLinear:
-        """These inputs from `start` [s] on, split so that every input is linear within a segment.
+        """These inputs from `start` [s] on for `duration` [s], in segments in which every input is linear.
 
         Raises ParameterError for an input that the plant does not have.
         """
@@ -128,7 +128,7 @@ class InputSignal(abc.ABC):
         """The same as arrays that a kernel can read. Raises ParameterError also for segments that do not rise in time,
         lack an input or hold a number that is not finite."""
         segments = self.segments(inputs, start, duration)
-        segments.check_shape(len(inputs), start)
+        segments.check_shape(len(inputs), start, duration)
         return segments.as_floats()
 
     @property
