@@ -453,6 +453,15 @@ def test_any_recording_can_be_inspected(values: list[float], with_time: bool):
     assert all(0 <= r.interval.start < r.interval.stop <= len(values) for r in seen.runs)
 
 
+def test_a_time_that_stands_still_has_no_rate():
+    step = Recording({"time": np.zeros(20), "pressure": np.repeat([0.0, 2e5], 10)}, "still")
+    seen = inspect(step)
+    assert [each.serious for each in seen.findings[:1]] == [True]
+    chapter = seen.chapter()
+    assert chapter.summary == "The time stands still."
+    assert not any("nan" in text for text in (*chapter.problems, *chapter.notes, str(seen)))
+
+
 def test_a_recording_without_rows_is_inspected_with_the_sensors_of_others():
     whole, _ = bench()
     _, _, chapter = inspection_chapters(inspect_all([whole, whole.rows(slice(0, 0))]))

@@ -194,7 +194,7 @@ def _duration_findings(
             serious=not abs(changes[0] - usual) <= RAMP_TOLERANCE * usual,  # in a sweep, it changes as it usually does
         )
     max_step = float(np.max(np.abs(np.diff(pressure)))) if len(pressure) > 1 else 0.0
-    if max_step > 0.5 * span > 0:
+    if max_step > 0.5 * span > 0 and sampling.sample_time:
         yield Finding(
             f"the pressure changes by {max_step / 1e3:.4g} kPa between two rows, more than half of its range: the step "
             f"is undersampled at {sampling.rate:.4g} rows per second."

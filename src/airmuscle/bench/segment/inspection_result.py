@@ -100,8 +100,8 @@ class Inspection(Reported):
         recording, sampling = self.recording, self.sampling
         tables = [_column_table(self), _run_table(self.runs), _branch_table(self),
                   _plateau_table(self), _outlier_table(self)]  # fmt: skip
-        summary = "The rows have no time."
-        if sampling:
+        summary = "The time stands still." if sampling else "The rows have no time."
+        if sampling and sampling.sample_time:
             gaps = f", {len(sampling.gaps)} gaps" if sampling.gaps else ""
             regularity = "time stamps repeat" if sampling.rounded else f"jitter {100 * sampling.jitter:.1f} %"
             summary = f"{sampling.rate:.4g} rows per second over {sampling.duration:.4g} s, {regularity}{gaps}."
