@@ -141,11 +141,12 @@ def test_records_that_cannot_be_used_state_the_reason():
     without_length = {name: values for name, values in columns.items() if name != "length"}
     without_pressure = {name: values for name, values in columns.items() if name != "pressure"}
     short, empty = ({name: values[:rows] for name, values in columns.items()} for rows in (5, 0))
-    gap = recording(columns, "e")
+    gap, hold = recording(columns, "e"), recording(MUSCLE.hold(3.0, 0.05, RANDOM), "f")
+    time = np.where(np.arange(len(hold)) == 0, np.nan, hold["time"])
     gap = gap.with_columns(contraction=np.where(np.arange(len(gap)) == 60, np.nan, gap["contraction"]))
     records = classify_records(
         [recording(without_length, "a"), recording(without_pressure, "b"), recording(short, "c"),
-         recording(empty, "d"), gap]
+         recording(empty, "d"), gap, Recording({**hold.columns, "time": time}, "f", hold.constants)]
     )  # fmt: skip
     assert all(record.kind is RecordKind.UNUSED for record in records)
     reasons = [record.reason for record in records]
@@ -153,7 +154,7 @@ def test_records_that_cannot_be_used_state_the_reason():
     assert reasons[1] == "no pressure column"
     assert "at least 8" in reasons[2]
     assert "0 rows" in reasons[3]
-    assert reasons[4] == "values of the contraction are missing"
+    assert reasons[4:] == ["values of the contraction are missing", "values of the time are missing"]
 
 
 def test_slow_runs_without_tension_give_no_static_law():

@@ -143,9 +143,8 @@ def _classify(inspection: Inspection) -> CampaignRecord:
         return CampaignRecord(recording, RecordKind.UNUSED, unusable, inspection)
     if inspection.static_points is not None and "force" in recording:
         return CampaignRecord(recording, RecordKind.STATIC, inspection.static_points.description, inspection)
-    for name in ("time", "contraction"):  # along which friction and creep act
-        if name in recording and not np.isfinite(recording[name]).all():
-            return CampaignRecord(recording, RecordKind.UNUSED, f"values of the {name} are missing", inspection)
+    if not np.isfinite(recording["contraction"]).all():  # friction acts along it
+        return CampaignRecord(recording, RecordKind.UNUSED, "values of the contraction are missing", inspection)
     if "time" in recording:
         steps = find_pressure_steps(recording, inspection.sensors)
         if steps and _span(recording["contraction"]) <= CONTRACTION_BAND:
@@ -155,6 +154,8 @@ def _classify(inspection: Inspection) -> CampaignRecord:
         motion = find_motion(recording)
         has_length = isinstance(recording.constants.get("resting_length"), float | int)
         if has_length and motion is not None and abs(motion.travel) > 0.5 * motion.range:  # moved once, and not back
+            if not np.isfinite(recording["time"]).all():
+                return CampaignRecord(recording, RecordKind.UNUSED, "values of the time are missing", inspection)
             rest, pressure = float(recording["time"][-1]) - motion.end, recording["pressure"]
             held = _span(pressure) <= RELATIVE_BAND * max(float(np.max(np.abs(pressure))), 1.0)
             if held and rest >= max(MIN_HOLD, MIN_HOLD_RATIO * motion.duration):
