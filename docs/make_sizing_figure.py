@@ -7,7 +7,7 @@ from pathlib import Path
 import airmuscle as am
 from airmuscle.core.plotting import save
 from airmuscle.design import LiftRequirement, SizingConditions, choose
-from airmuscle.design.sizing.chapter import sizing_plot
+from airmuscle.design.sizing.tables import sizing_plot
 
 PICTURE = Path(__file__).with_name("images") / "sizing.png"
 

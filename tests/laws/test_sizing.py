@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+import pickle
 import re
 
 import numpy as np
@@ -36,7 +37,7 @@ from airmuscle.design import (
     scenario_text,
     size_muscles,
 )
-from airmuscle.design.sizing import air_path, sizing_chapter
+from airmuscle.design.sizing import air_path
 from airmuscle.design.sizing.search import static_muscle
 from airmuscle.errors import AirmuscleError, ParameterError, SolveError
 from airmuscle.files import Entry
@@ -486,6 +487,14 @@ def test_an_unreachable_load_states_the_reason_and_what_is_reachable():
     assert "3 x dmsp-20-300" in str(error.value)
 
 
+def test_a_result_shows_its_choices_or_what_is_reachable():
+    found, none = (size_muscles(dataclasses.replace(LIFT, mass=mass), SIX_BAR, (am.load("dmsp-20-300"),))
+                   for mass in (20.0, 500.0))  # fmt: skip
+    assert "The best choice is 1 x festo-dmsp-20" in str(pickle.loads(pickle.dumps(found)))
+    assert "No muscle meets the requirement" in str(none)
+    assert "Reachable: " in none._repr_html_()
+
+
 def test_what_is_stated_as_reachable_is_reachable_and_more_is_not():
     entry, short = am.load("dmsp-20-300"), dataclasses.replace(SIX_BAR, max_length=0.15, max_count=1)
     with pytest.raises(SolveError, match=r"over 40 mm: dmsp-20-300: with 150 mm") as error:
@@ -602,7 +611,7 @@ def test_the_diameter_is_twice_the_largest_radius_or_that_of_a_braid_at_25_per_c
 def test_the_row_of_a_choice_states_air_a_minute_and_efficiency_of_the_choice():
     choice = choose(am.load("dmsp-20-300"), LIFT, dataclasses.replace(SIX_BAR, cycle_time=3.0))
     result = SizingResult(LIFT, choice.conditions, (choice,), (), (choice.entry,))
-    (table,) = [each for each in sizing_chapter(result).tables if each.name == "air"]
+    (table,) = [each for each in result.chapter().tables if each.name == "air"]
     row = {name: column.values[0] for name, column in table.columns.items() if hasattr(column, "values")}
     assert row["air a minute"] == pytest.approx(20 * row["air a cycle"], rel=1e-12)
     assert row["air a cycle"] == pytest.approx(choice.reference_volume, rel=1e-12)

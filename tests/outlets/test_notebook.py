@@ -47,6 +47,7 @@ def recording() -> am.Recording:
 def displayed(recording: am.Recording) -> dict[str, NotebookDisplay]:
     names = ("dmsp-20-300", "matrix-821", "festo-dmsp-20", "joint-dmsp-20-matrix", "borzikova-monotone")
     entries = {name: am.load(name) for name in names}
+    lift = am.design.LiftRequirement(stroke=0.03, force=300.0)
     return {
         **entries,
         "muscle": entries["dmsp-20-300"].muscle,
@@ -54,6 +55,7 @@ def displayed(recording: am.Recording) -> dict[str, NotebookDisplay]:
         "recording": recording,
         "fit": am.fit(ContractileSurface.blank(2), recording),
         "inspection": am.bench.inspect(recording),
+        "sizing": am.design.size_muscles(lift, am.design.SizingConditions(6e5, max_count=1), (entries[names[0]],)),
     }
 
 

@@ -36,7 +36,7 @@ from airmuscle.bench.identify.static_fit_chapter import _rows
 from airmuscle.bench.identify.uncertainty_chapter import uncertainty_chapter
 from airmuscle.design import LiftRequirement, SizingConditions, size_muscles
 from airmuscle.design.sizing import scenario_valves
-from airmuscle.design.sizing.chapter import _valve_settings, sizing_chapter
+from airmuscle.design.sizing.result import _valve_settings
 from airmuscle.engine import Schedule
 from airmuscle.physics import (
     Braid,
@@ -72,7 +72,7 @@ def test_a_choice_of_a_sizing_is_in_millimetres_bar_per_cent_and_litres():
     lift = LiftRequirement(force=300.0, stroke=0.03)
     conditions = SizingConditions(supply=6e5, max_count=1)
     result = size_muscles(lift, conditions, (am.load("dmsp-20-300"),))
-    choice, chapter = result.best, sizing_chapter(result)
+    choice, chapter = result.best, result.chapter()
     row = {name: column[0] for name, column in (table_of(chapter, "choices") | table_of(chapter, "air")).items()}
     first, last = choice.design.extended, choice.design.contracted
     assert row["nominal length [mm]"] == pytest.approx(1e3 * choice.length)

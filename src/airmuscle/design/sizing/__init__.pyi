@@ -1,4 +1,3 @@
-from .chapter import sizing_chapter as sizing_chapter
 from .requirement_and_choice import SORT_KEYS as SORT_KEYS
 from .requirement_and_choice import JointRequirement as JointRequirement
 from .requirement_and_choice import LiftRequirement as LiftRequirement
@@ -11,6 +10,10 @@ from .requirement_and_choice import by_count as by_count
 from .requirement_and_choice import by_diameter as by_diameter
 from .requirement_and_choice import by_length as by_length
 from .requirement_and_choice import by_reserve as by_reserve
+from .result import SizingResult as SizingResult
+from .result import UnsuitableMuscle as UnsuitableMuscle
+from .result import catalogue as catalogue
+from .result import size_muscles as size_muscles
 from .scenario import MOVING as MOVING
 from .scenario import RESTING as RESTING
 from .scenario import air_path as air_path
@@ -18,10 +21,6 @@ from .scenario import discharge_valve as discharge_valve
 from .scenario import fill_valve as fill_valve
 from .scenario import scenario_text as scenario_text
 from .scenario import scenario_valves as scenario_valves
-from .search import SizingResult as SizingResult
-from .search import UnsuitableMuscle as UnsuitableMuscle
-from .search import catalogue as catalogue
 from .search import choose as choose
-from .search import size_muscles as size_muscles
 from .static_muscle import EndPoint as EndPoint
 from .static_muscle import StaticMuscle as StaticMuscle

@@ -1,7 +1,6 @@
 """`airmuscle size`: muscles of the catalogue for a lift or a joint."""
 
 from ...core import check_writable
-from ...design.sizing.chapter import sizing_chapter
 from ...design.sizing.scenario import sizing_scenario
 from ..requests.size import SizeRequest
 from .delivery import deliver
@@ -33,4 +32,4 @@ def size(request: SizeRequest, out: OptionalFolder = None, json: Json = False) -
         result = request.evaluate(lambda fraction: show("", fraction))
     scenario = sizing_scenario(result.choices, SCENARIO_FILE if out is not None else "scenario.toml of --out")
     files = {SCENARIO_FILE: scenario.text} if scenario.text else {}
-    deliver("size", [sizing_chapter(result, scenario)], json=json, out=out, title="Sizing", files=files)
+    deliver("size", [result.chapter(scenario)], json=json, out=out, title="Sizing", files=files)

@@ -15,8 +15,8 @@ import airmuscle as am
 
 from ...bench.readers.file_kind import parse_toml
 from ...core import AirmuscleError, Array, ParameterError, is_known_unit
-from ...design.sizing.chapter import product_of, sizing_chapter
 from ...design.sizing.scenario import sizing_scenario
+from ...design.sizing.tables import product_of
 from ...files.library import Location, is_path, list_plants, plant_tables, read_toml
 from ...files.library.loading import build_entry, check_describes_law, load_law
 from ...physics.muscle.characteristic.validity_range import validity_range_of
@@ -141,7 +141,7 @@ def size_sheet(text: str) -> dict[str, Any]:
     given = read_request(text)
     request = build(SizeRequest, given, lambda name: name.replace("_", " "))
     result = request.evaluate()
-    chapter = sizing_chapter(result, sizing_scenario(result.choices, "in the page"))
+    chapter = result.chapter(sizing_scenario(result.choices, "in the page"))
     sheet: dict[str, Any] = {
         "tab": "size", "name": "sizing", "provenance": "the library", "request": given, "form": size_form(),
         "own_text": text, **as_sheet(chapter), "title": result.requirement.describe(),

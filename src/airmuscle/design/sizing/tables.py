@@ -1,37 +1,24 @@
-"""Report chapter: choices of muscles for a lift or a joint, the valves for the best one, and its chart."""
+"""Tables of a sizing: products, choices and air, valves for a choice; and the chart of a choice."""
 
 import functools
 import warnings
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from ...core import AirmuscleWarning, cite, plotting
+from ...core import AirmuscleWarning, plotting
 from ...files.library import list_valves, load, products_of_laws
 from ...physics.muscle.characteristic.validity_range import validity_range_of
 from ...physics.muscle.isobars import compute_isobars, isobar_figure
-from ...report.chapter import Chapter, Plot, Table, TableColumn
-from . import JointRequirement, LiftRequirement, MuscleChoice, SizingConditions, SizingResult
-from .scenario import MOVING, SizingScenario, air_path, scenario_valves
+from ...report.chapter import Plot, Table, TableColumn
+from . import LiftRequirement, MuscleChoice
+from .scenario import MOVING, air_path
 
-SHORT_UNSUITABLE, SHORT_VALVES = 3, 4
+SHORT_VALVES = 4
 """Rows of the brief view (chosen)."""
 POINTS = 121
 """Points of the curve of the capacity."""
-
-
-def sizing_chapter(result: SizingResult, scenario: SizingScenario | None = None) -> Chapter:
-    """The chapter of a sizing with at least one choice; `scenario` is that which is written with it."""
-    best, simulated = result.best, None if scenario is None else scenario.choice
-    laws = (best.entry.characteristic, best.conditions.ambient, *scenario_valves(simulated))
-    tables = [_products(result), _end_points(result), _air(result), _valves(simulated), _unsuitable(result)]
-    return Chapter(
-        "sizing", f"Muscles for {result.requirement.describe()}, supply {result.conditions.supply / 1e5:.4g} bar",
-        summary=_summary(result), tables=tuple(table for table in tables if table is not None),
-        plots=(sizing_plot(best),), notes=() if scenario is None or not scenario.note else (scenario.note,),
-        references=tuple(best.entry.references) + tuple(cite(laws)),
-        chosen=(*_settings(result), *_valve_settings(simulated)),
-    )  # fmt: skip
 
 
 def product_of(choice: MuscleChoice) -> str:
@@ -39,31 +26,12 @@ def product_of(choice: MuscleChoice) -> str:
     return products_of_laws().get(choice.entry.name) or choice.entry.name
 
 
-def _summary(result: SizingResult) -> tuple[str, ...]:
-    best, product = result.best, product_of(result.best)
-    side = " (half of them on each side)" if isinstance(best.requirement, JointRequirement) else ""
-    others = [each for each in result.choices[1:] if product_of(each) == product and each.count == best.count]
-    spread = ""
-    if others:
-        lengths = [1e3 * each.length for each in others]
-        ends = " to ".join(dict.fromkeys(f"{end:.4g}" for end in (min(lengths), max(lengths))))
-        spread = (
-            f" The other published laws of this product give {ends} mm: the spread is the uncertainty of the models, "
-            "not a choice between muscles."
-        )
-    by_law = "" if product == best.entry.name else f" by the law {best.entry.name}"
-    return (
-        f"The best choice is {best.total_count} x {product}{side}, nominal length {1e3 * best.length:.4g} mm{by_law}: "
-        f"the shortest that reaches both end points.{spread}",
-    )
-
-
-def _products(result: SizingResult) -> Table:
+def product_table(choices: Sequence[MuscleChoice]) -> Table:
     """One row for each product and number of muscles: its best law, and the lengths by all its laws."""
     groups: dict[tuple[str, int], list[MuscleChoice]] = {}
-    for choice in result.choices:
+    for choice in choices:
         groups.setdefault((product_of(choice), choice.total_count), []).append(choice)
-    first, cycle = [group[0] for group in groups.values()], result.conditions.cycle_time
+    first, cycle = [group[0] for group in groups.values()], choices[0].conditions.cycle_time
     volumes = [choice.reference_volume for choice in first]
     lengths = [sorted(choice.length for choice in group) for group in groups.values()]
     columns: dict[str, Any] = {
@@ -85,21 +53,21 @@ def _products(result: SizingResult) -> Table:
     return Table("products", "Products, best first", columns, note, brief=len(first))
 
 
-def _radius(choices: list[MuscleChoice], short: str = "") -> dict[str, TableColumn]:
+def _radius(choices: Sequence[MuscleChoice], short: str = "") -> dict[str, TableColumn]:
     if choices[0].design.radius is None:
         return {}
     return {"pulley radius": TableColumn([choice.design.radius for choice in choices], "m", "mm", short=short)}
 
 
-def _end_points(result: SizingResult) -> Table:
+def end_point_table(choices: Sequence[MuscleChoice]) -> Table:
     """All choices, best first, with the end points of each muscle."""
-    first, last = ([getattr(c.design, end) for c in result.choices] for end in ("extended", "contracted"))
-    columns: dict[str, Any] = {**_common(result)}
+    first, last = ([getattr(c.design, end) for c in choices] for end in ("extended", "contracted"))
+    columns: dict[str, Any] = {**_common(choices)}
     for name, unit, shown in (("pressure", "Pa", "bar"), ("contraction", "1", "%"), ("force", "N", "")):
         for end, points in (("long", first), ("short", last)):
             values = [round(getattr(each, name), 9) + 0.0 for each in points]  # slack to rounding
             columns[f"{name}, {end}"] = TableColumn(values, unit, shown)
-    columns["reserve"] = TableColumn([choice.design.reserve for choice in result.choices], "1", "%")
+    columns["reserve"] = TableColumn([choice.design.reserve for choice in choices], "1", "%")
     note = (
         "Long and short: the end points of each muscle. Reserve: force beyond the load at the largest working "
         "pressure. Rows of one product are different published laws of it."
@@ -107,27 +75,27 @@ def _end_points(result: SizingResult) -> Table:
     return Table("choices", "Choices, best first", columns, note)
 
 
-def _common(result: SizingResult) -> dict[str, Any]:
+def _common(choices: Sequence[MuscleChoice]) -> dict[str, Any]:
     return {
-        "muscle": [choice.entry.name for choice in result.choices],
-        "product": [product_of(choice) for choice in result.choices],
-        "number": [choice.total_count for choice in result.choices],
-        "nominal length": TableColumn([choice.length for choice in result.choices], "m", "mm"),
+        "muscle": [choice.entry.name for choice in choices],
+        "product": [product_of(choice) for choice in choices],
+        "number": [choice.total_count for choice in choices],
+        "nominal length": TableColumn([choice.length for choice in choices], "m", "mm"),
     }
 
 
-def _air(result: SizingResult) -> Table:
+def air_table(choices: Sequence[MuscleChoice]) -> Table:
     """Air and dimensions of all choices."""
-    choices, cycle = result.choices, result.conditions.cycle_time
+    cycle = choices[0].conditions.cycle_time
     volumes = [choice.reference_volume for choice in choices]
     columns: dict[str, Any] = {
-        **_common(result),
+        **_common(choices),
         "air a cycle": TableColumn(volumes, "m3 (ANR)", "l (ANR)"),
         "air a minute": TableColumn([v and 60.0 * v / cycle for v in volumes], "m3 (ANR)", "l (ANR)"),
         "energy of the air": TableColumn([choice.air_energy for choice in choices], "J"),
         "efficiency": TableColumn([choice.efficiency for choice in choices], "1", "%"),
         "diameter": TableColumn([choice.diameter for choice in choices], "m", "mm"),
-        **_radius(list(choices)),
+        **_radius(choices),
     }
     if choices[0].design.radii is not None:
         ends = [choice.design.radii or (None, None) for choice in choices]
@@ -141,10 +109,8 @@ def _air(result: SizingResult) -> Table:
     return Table("air", "Air and dimensions", columns, note)
 
 
-def _valves(choice: MuscleChoice | None) -> Table | None:
+def valve_table(choice: MuscleChoice) -> Table:
     """The valves of the library with the times in which one of them fills and discharges one muscle of a choice."""
-    if choice is None:
-        return None
     path, limit = air_path(choice), MOVING * choice.conditions.cycle_time
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", AirmuscleWarning)  # the table states them
@@ -170,41 +136,6 @@ def _valves(choice: MuscleChoice | None) -> Table | None:
     )
     title = f"Valves of the library that reach the cycle time with {choice.entry.name}, {1e3 * choice.length:.4g} mm"
     return Table("valves", title, columns, note, brief=min(SHORT_VALVES, len(suitable)))
-
-
-def _unsuitable(result: SizingResult) -> Table | None:
-    """The muscles that do not meet the requirement, with the reason."""
-    if not result.unsuitable:
-        return None
-    columns: dict[str, Any] = {
-        "muscle": [item.name for item in result.unsuitable],
-        "maximum number tried": TableColumn([item.count or None for item in result.unsuitable], short="number"),
-        "reason": [item.reason for item in result.unsuitable],
-    }
-    return Table("unsuitable", "Muscles that do not meet the requirement", columns, brief=SHORT_UNSUITABLE)
-
-
-def _settings(result: SizingResult) -> tuple[tuple[str, str, str], ...]:
-    conditions = result.conditions
-    rows = {
-        "safety_factor": ("safety factor on the load", f"{conditions.safety_factor:.4g}"),
-        "cycle_time": ("cycle time", f"{conditions.cycle_time:.4g} s"),
-        "min_pressure": ("minimum working pressure", f"{conditions.min_pressure / 1e5:.4g} bar"),
-        "max_count": ("maximum number in parallel", str(conditions.max_count)),
-    }
-    sources = {name: "chosen" if getattr(conditions, name) == getattr(SizingConditions, name) else "given"
-               for name in rows}  # fmt: skip
-    stated = (("supply pressure", f"{conditions.supply / 1e5:.4g} bar", "given"),)
-    return (*stated, *((*row, sources[name]) for name, row in rows.items()))
-
-
-def _valve_settings(simulated: MuscleChoice | None) -> tuple[tuple[str, str, str], ...]:
-    names = ("fill", "discharge")
-    source = f"ISO 6358, for {100 * MOVING:.4g} % of the cycle; this part and the critical pressure ratio are chosen"
-    return tuple(
-        (f"sonic conductance, {name} valve of each muscle", f"{1e8 * valve.conductance:.4g} dm3/(s bar)", source)
-        for name, valve in zip(names, scenario_valves(simulated), strict=False)
-    )
 
 
 def sizing_plot(choice: MuscleChoice) -> Plot:
