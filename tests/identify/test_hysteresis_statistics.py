@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+import pickle
 
 import numpy as np
 import pytest
@@ -30,7 +31,6 @@ from airmuscle.bench.identify.hysteresis import (
     agreement_of_run,
     data_limits,
     force_amplitude,
-    loop_chapter,
     parameters_on_bounds,
 )
 from airmuscle.bench.identify.hysteresis.creep import _drifts, _fit_elements
@@ -96,8 +96,17 @@ def test_too_few_independent_residuals_leave_aicc_undefined_and_are_no_nan():
     assert not fit.justified
     assert "AICc is not defined for so few independent residuals" in fit.verdict
     (found,) = find_loops([loop()])
-    table = loop_chapter(LoopFit(found, (fit,), {})).tables[0]
+    table = LoopFit(found, (fit,), {}).chapter().tables[0]
     assert list(table.columns["reduction of AICc"].values) == [None]
+
+
+def test_a_fitted_loop_is_shown_by_print_and_in_a_notebook_also_after_it_was_sent():
+    (found,) = find_loops([loop()])
+    fit = pickle.loads(pickle.dumps(LoopFit(found, (fitted(loop()),), {"Dahl": "no speed"})))
+    assert found.description in str(fit)
+    assert "Dahl was not fitted: no speed" in str(fit)
+    assert "<table" in fit._repr_html_()
+    assert len(repr(fit)) < 1000
 
 
 def test_the_repeatability_is_the_standard_deviation_of_two_runs():

@@ -30,7 +30,7 @@ from airmuscle.bench.identify.campaign import ValidationRow
 from airmuscle.bench.identify.campaign.campaign_chapters import _validation_table
 from airmuscle.bench.identify.dynamic.dynamic_chapter import dynamic_chapters
 from airmuscle.bench.identify.experiment_design import run_table
-from airmuscle.bench.identify.hysteresis.hysteresis_chapter import joint_friction_chapter, loop_chapter
+from airmuscle.bench.identify.hysteresis.hysteresis_chapter import joint_friction_chapter
 from airmuscle.bench.identify.prediction import prediction_chapters
 from airmuscle.bench.identify.static_fit_chapter import _rows
 from airmuscle.bench.identify.uncertainty_chapter import uncertainty_chapter
@@ -147,7 +147,7 @@ def test_the_friction_of_loops_is_in_newtons_and_deviations_in_per_cent():
     fits = [
         LoopFit(each, (fit_hysteresis(SLIP, each.recording, static_curve=each.static_curve),), {}) for each in loops
     ]
-    chapter, one = loop_chapter(fits[0]), fits[0].fits[0]
+    chapter, one = fits[0].chapter(), fits[0].fits[0]
     columns = table_of(chapter, "laws")
     names = ("rmse_without_friction", "rmse", "gap", "residual_gap", "aicc_reduction")
     headings = (

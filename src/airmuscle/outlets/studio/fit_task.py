@@ -19,7 +19,7 @@ import airmuscle as am
 
 from ...bench.identify.compare_chapter import LawSelection
 from ...bench.identify.hysteresis import LoopFit, find_loops, fit_jointly, fit_loop, loops_not_joined
-from ...bench.identify.hysteresis.hysteresis_chapter import hysteresis_chapters, joint_friction_chapter, loop_chapter
+from ...bench.identify.hysteresis.hysteresis_chapter import hysteresis_chapters, joint_friction_chapter
 from ...bench.identify.hysteresis.joint import select_friction
 from ...bench.identify.static_fit_chapter import band_curves, equation_section
 from ...bench.readers.constants import CONSTANT_QUANTITIES
@@ -147,7 +147,7 @@ def _loop(fit: LoopFit) -> dict[str, Any]:
     direction = motion_direction(fit.loop.friction_path.displacement(recording), recording.columns.get("time"))
     rows = slice(None, None, max(1, -(-len(recording) // MAX_POINTS)))
     return {
-        **_sheet(loop_chapter(fit)), "justified": fit.recommended is not None, "varied": varied,
+        **_sheet(fit.chapter()), "justified": fit.recommended is not None, "varied": varied,
         "x": recording[varied][rows], "force": recording["force"][rows], "direction": np.asarray(direction)[rows],
     }  # fmt: skip
 

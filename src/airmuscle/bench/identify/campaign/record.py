@@ -13,7 +13,8 @@ from ....recording import Recording
 from ...segment import Inspection, Mask, Sensor, estimate_sensors, inspect, inspect_all, quasi_static_rows
 from ...segment.interval import Interval, true_intervals
 from ...segment.runs import AT_REST, CONTRACTION_BAND, ISOBARIC, ISOMETRIC, ISOTONIC, RELATIVE_BAND, Run
-from ..hysteresis.loops import describe_run, rows_of
+from ..hysteresis.loop_result import describe_run
+from ..hysteresis.loops import rows_of
 from ..matched_rows import match_rows
 from .transient import MAX_RELEASE, MIN_STEP, PressureStep, find_motion, find_pressure_steps
 

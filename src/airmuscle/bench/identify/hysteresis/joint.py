@@ -16,7 +16,7 @@ from ....report.shown import parameter_table
 from ...segment.runs import RELATIVE_BAND
 from ..model_evidence import effective_sample_size, format_p_value
 from .loop_data import MILLIMETRES, DataLimits, combine_limits, limit_reservations
-from .loops import LoopFit
+from .loop_result import LoopFit
 from .result import SIGNIFICANCE_LEVEL, FrictionFit, HysteresisFit, Misfit, evidence, preferred_fit
 from .search import LoopSeries, search_parameters
 

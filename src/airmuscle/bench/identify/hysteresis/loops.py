@@ -1,4 +1,4 @@
-"""Hysteresis loops in recordings: kind, fitted rows and repeated runs, and the fit of all friction laws to a loop."""
+"""Hysteresis loops found in recordings, their rows and repeated runs, and the fit of all friction laws to one."""
 
 import dataclasses
 import warnings
@@ -6,69 +6,19 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from ....core import AirmuscleWarning, Array, Hint, HintedText, IdentificationError, ShortRepr, check_whole
+from ....core import AirmuscleWarning, Array, Hint, HintedText, IdentificationError, check_whole
 from ....physics import Characteristic, Friction, LoopScales
 from ....physics.muscle import friction as laws
 from ....recording import Recording
 from ... import segment
 from ...segment.runs import CONTRACTION_BAND, RELATIVE_BAND
-from ..data_checks import level_text
 from . import loop_data as data
-from .result import HysteresisFit, assess_fit, preferred_fit
-from .search import LoopSeries, free_parameters, search_parameters
+from .loop_result import HysteresisLoop, LoopFit
+from .result import HysteresisFit, assess_fit
+from .search import LoopSeries, free_parameters, make_loop_series, search_parameters
 
 CURVE_DEGREE = 5
 """Degree of the polynomial static curve of a loop, in `hysteresis` as in `campaign` (chosen)."""
-
-
-@dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class HysteresisLoop(ShortRepr):
-    """One run with a rising and a falling branch, the path of the friction, the static curve and the fitted rows."""
-
-    recording: Recording
-    run: segment.Run
-    friction_path: data.FrictionPath
-    static_curve: data.StaticCurve
-    fitted_rows: segment.Mask
-    transient_rows: int = 0
-    """Number of fitted rows in which the pressure changes quickly."""
-    repeat: tuple[Recording, segment.Mask] | None = None
-    """A second run of the same kind at the same level, for validation, and its fitted rows."""
-
-    @property
-    def description(self) -> str:
-        """Kind and level of the run, for example `isobaric at 300 kPa`."""
-        return describe_run(self.run)
-
-    def series(self, recording: Recording, fitted_rows: segment.Mask) -> LoopSeries:
-        """The arrays of a run of this loop for a fit of friction."""
-        return make_loop_series(recording, self.static_curve, self.friction_path, fitted_rows)
-
-
-def describe_run(run: segment.Run) -> str:
-    """Kind and level of a run, for example `isobaric at 300 kPa`."""
-    if run.constant_column is None or run.constant_value is None:
-        return run.kind.name
-    return f"{run.kind.name} at {level_text(run.constant_column, run.constant_value)}"
-
-
-@dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class LoopFit(ShortRepr):
-    """The friction laws fitted to one loop, lowest AICc first, and the reasons why others could not be fitted."""
-
-    loop: HysteresisLoop
-    fits: tuple[HysteresisFit, ...]
-    failed: Mapping[str, str]
-
-    @property
-    def recommended(self) -> HysteresisFit | None:
-        """The preferred law among those that the data justify, or None."""
-        return preferred_fit(self.fits)
-
-    @property
-    def usable_in_plant(self) -> bool:
-        """Whether the friction acts along the contraction; friction along pressure describes isometric loops only."""
-        return isinstance(self.loop.friction_path, data.ContractionPath)
 
 
 def find_loops(
@@ -233,27 +183,6 @@ def fit_series(friction: Friction, run: LoopSeries, second_run: LoopSeries | Non
         )
     fitted, undetermined = search_parameters(friction, (run,))
     return assess_fit(fitted, undetermined, run, second_run)
-
-
-def make_loop_series(
-    recording: Recording, static_curve: data.StaticCurve, friction_path: data.FrictionPath,
-    fitted_rows: segment.Mask | None,
-) -> LoopSeries:  # fmt: skip
-    """The arrays of a run for a fit of friction. Raises IdentificationError where a displacement is missing."""
-    target, matrix = recording["force"] - static_curve.known_force(recording), static_curve.design_matrix(recording)
-    finite = np.isfinite(target) & np.isfinite(matrix).all(axis=1)
-    rows = finite if fitted_rows is None else np.asarray(fitted_rows, dtype=bool) & finite
-    path, time = friction_path.displacement(recording), recording.columns.get("time")
-    if (gaps := np.flatnonzero(~np.isfinite(path))).size:
-        where = f"{recording.origin}, row {gaps[0] + 1}"
-        raise IdentificationError(f"{where}: the displacement is missing, along which friction acts. Remove such rows.")
-    limits = data.data_limits(recording["force"], path, time, rows)
-    series = LoopSeries(
-        recording.origin, path, time, target, matrix, rows, segment.motion_direction(path, time), limits,
-        recording.columns.get("pressure"), friction_path.axis,
-    )  # fmt: skip
-    stiffness = data.resolved_stiffness(path[rows], series.fitted_residuals(None))
-    return dataclasses.replace(series, limits=dataclasses.replace(series.limits, stiffness=stiffness))
 
 
 def fit_loop(

@@ -1,4 +1,4 @@
-"""Search for the parameters of a friction law in the loop series of one run or of several runs together."""
+"""Loop series of a run, and the search for the parameters of a friction law in those of one run or of several."""
 
 import dataclasses
 import functools
@@ -7,12 +7,22 @@ from typing import Any
 
 import numpy as np
 
-from ....core import Array, Leaf, tree
+from ....core import Array, IdentificationError, Leaf, tree
 from ....physics.muscle.friction import Friction, PressureScaledFriction
-from ...segment import Mask
+from ....recording import Recording
+from ...segment import Mask, motion_direction
 from ..identifiability import UndeterminedCombination, analyse_identifiability
 from ..model_evidence import effective_sample_size
-from .loop_data import MILLIMETRES, Axis, DataLimits, combine_limits
+from .loop_data import (
+    MILLIMETRES,
+    Axis,
+    DataLimits,
+    FrictionPath,
+    StaticCurve,
+    combine_limits,
+    data_limits,
+    resolved_stiffness,
+)
 
 BIN_COUNT = 24
 """Bins along the path in which branches are compared (chosen)."""
@@ -118,6 +128,27 @@ class LoopSeries:
 
 JACOBIAN_TOLERANCE = 1e-4
 """Relative singular value that counts as zero; the derivatives are differences of forward evaluations (chosen)."""
+
+
+def make_loop_series(
+    recording: Recording, static_curve: StaticCurve, friction_path: FrictionPath,
+    fitted_rows: Mask | None,
+) -> LoopSeries:  # fmt: skip
+    """The arrays of a run for a fit of friction. Raises IdentificationError where a displacement is missing."""
+    target, matrix = recording["force"] - static_curve.known_force(recording), static_curve.design_matrix(recording)
+    finite = np.isfinite(target) & np.isfinite(matrix).all(axis=1)
+    rows = finite if fitted_rows is None else np.asarray(fitted_rows, dtype=bool) & finite
+    path, time = friction_path.displacement(recording), recording.columns.get("time")
+    if (gaps := np.flatnonzero(~np.isfinite(path))).size:
+        where = f"{recording.origin}, row {gaps[0] + 1}"
+        raise IdentificationError(f"{where}: the displacement is missing, along which friction acts. Remove such rows.")
+    limits = data_limits(recording["force"], path, time, rows)
+    series = LoopSeries(
+        recording.origin, path, time, target, matrix, rows, motion_direction(path, time), limits,
+        recording.columns.get("pressure"), friction_path.axis,
+    )  # fmt: skip
+    stiffness = resolved_stiffness(path[rows], series.fitted_residuals(None))
+    return dataclasses.replace(series, limits=dataclasses.replace(series.limits, stiffness=stiffness))
 
 
 def free_parameters(friction: Friction) -> int:
