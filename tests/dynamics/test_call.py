@@ -25,6 +25,7 @@ from airmuscle.engine import (
     Schedule,
     advance,
     simulate,
+    simulate_batch,
     solve,
 )
 from airmuscle.engine.compile import compile_system
@@ -225,6 +226,15 @@ def test_a_signal_in_integers_is_the_signal_in_floats(loop):
     )
     assert usual["fill"].max() == 1.0
     assert all(np.array_equal(own[name], usual[name]) for name in usual)
+
+
+def test_a_batch_and_a_single_step_take_integers_as_floats():
+    plant, signals = lifting(), (Steps(), Schedule({"fill": ((2.0, 1.0), (3.0, 0.0))}))
+    start = plant.state_at(pressure=1e5)
+    own, usual = (simulate_batch(plant, {}, [each], duration=4.0, initial_states=start) for each in signals)
+    assert all(np.array_equal(own[name], usual[name]) for name in usual.columns)
+    own, usual = (advance(plant, start, each.segments(plant.inputs, 0.0, 4.0), 4.0) for each in signals)
+    assert own == usual
 
 
 # The initial state

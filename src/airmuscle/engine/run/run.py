@@ -224,7 +224,7 @@ def _segments(
     known = compiled.description
     if isinstance(inputs, PiecewiseLinear):
         inputs.check_shape(len(known.input_names), start, dt)
-        segments = inputs
+        segments = inputs.as_floats()
     elif isinstance(inputs, Mapping):
         hold = Schedule({name: ((start, value),) for name, value in inputs.items()})
         segments = hold.segments(known.input_names, start, dt)

@@ -165,8 +165,7 @@ def _segments(
         if not isinstance(one, InputSignal):
             raise ParameterError(f"inputs, row {row} is {one_line(one)}; give a Schedule or a SampledSignal.")
         try:
-            segments = one.segments(compiled.description.input_names, start, duration)
-            segments.check_shape(len(compiled.description.input_names), start, duration)
+            segments = one.checked_segments(compiled.description.input_names, start, duration)
             check_input_range(compiled, segments, start)
         except ParameterError as error:
             raise (error if isinstance(input, InputSignal) else error.located(f"inputs, row {row}")) from None
