@@ -25,7 +25,7 @@ from airmuscle.bench import (
 )
 from airmuscle.bench.identify.dynamic import DynamicProfile, cross_predict
 from airmuscle.core import StateVariable, System, model, parameter, tree
-from airmuscle.engine import Schedule, simulate
+from airmuscle.engine import InputSignal, PiecewiseLinear, Schedule, simulate
 from airmuscle.engine.run import BoundIntegrator
 from airmuscle.errors import IdentificationError, ParameterError
 from airmuscle.physics import (
@@ -616,3 +616,23 @@ def test_a_heavier_load_is_another_plant_of_the_same_structure():
     for found, expected in zip(fit.estimates[1:], (5.0, 8.0), strict=True):
         assert abs(found.value - expected) < 3.5 * found.stderr
     assert fit.plant(1).mechanism.mass == fit.estimates[2].value
+
+
+class InIntegers(InputSignal):
+    """The command of `rigid_fill` as a user's signal in integers."""
+
+    def segments(self, inputs, start, duration):
+        values = np.array([[int(name == "fill") for name in inputs]])
+        return PiecewiseLinear(np.array([start + duration]), values, 0 * values)
+
+
+def test_a_command_in_integers_is_that_in_floats():
+    plant = rigid_plant()
+    usual = rigid_fill(plant)
+    own, same = (
+        fit_dynamic(plant, [each], free=("circuit.fill.conductance",), observed={"pressure": 300.0})[
+            "circuit.fill.conductance"
+        ].value
+        for each in (dataclasses.replace(usual, command=InIntegers()), usual)
+    )
+    assert own == same

@@ -191,7 +191,7 @@ def make_time_grid(
     experiment's command that is an unknown, `columns` its sensitivity column."""
     elapsed = times - start_time
     rows = np.maximum(elapsed, 0.0)
-    segments = command.segments(inputs, 0.0, max(float(elapsed[-1]), MIN_DURATION))
+    segments = command.checked_segments(inputs, 0.0, max(float(elapsed[-1]), MIN_DURATION))
     at_rows = np.ascontiguousarray(segments.inputs_at(rows, 0.0))
     intervals = _split(segments, rows, {instants[instant]: column for instant, column in columns.items()})
     return TimeGrid(start_time, instants, rows, elapsed < 0, at_rows, intervals)
