@@ -166,6 +166,13 @@ def test_what_is_missing_in_a_recording_is_no_suspicious_value(missing: str, row
         check_bench([good, Recording(columns | {missing: gaps}, "gaps")])
 
 
+def test_a_code_next_to_missing_values_is_named():
+    force = 1.0 * FORCE
+    force[3:9], force[10] = np.nan, 1e30
+    with pytest.warns(AirmuscleWarning, match=r"gaps: the force is 1e\+30 in 1 row"):
+        check_bench([Recording({"pressure": 1e3 * PRESSURE, "force": force}, "gaps")])
+
+
 @pytest.mark.parametrize("save", [save_v5, save_v73])
 def test_matlab_vectors(tmp_path: Path, save):
     recording = only(read(save(tmp_path / "run.mat", mat_content()), ColumnMapping(units={"time": "s"})))

@@ -154,15 +154,16 @@ def without_missing_codes(recordings: Sequence[Recording]) -> list[Recording]:
 def _missing_codes(recording: Recording) -> Iterator[tuple[str, float, Array]]:
     """The known columns with a code for a missing value, the code in the unit of the file, and the mask of its rows."""
     for name, values in recording.columns.items():
-        quantity, unit = quantity_of(name), recording.units.get(name)
-        if quantity is None or name.rpartition(".")[2] == "time" or values.size < 3:
+        quantity, unit, known = quantity_of(name), recording.units.get(name), values[np.isfinite(values)]
+        if quantity is None or name.rpartition(".")[2] == "time" or known.size < 3:
             continue
         change = None if unit is None else file_conversion(unit, quantity.unit)
-        for extreme in (float(np.min(values)), float(np.max(values))):
+        for extreme in (float(np.min(known)), float(np.max(known))):
             written = extreme if change is None else float((extreme - change.offset) / change.factor)
-            rows = values == extreme
-            if np.mean(rows) <= MAX_SHARE and any(abs(abs(written) - code) <= 1e-6 * code for code in CODES):
-                others = values[~rows]
-                if float(np.min(np.abs(others - extreme))) > max(MIN_DISTANCE * float(np.ptp(others)), 0.0):
-                    yield name, written, rows
+            others = known[known != extreme]
+            is_code = any(abs(abs(written) - code) <= 1e-6 * code for code in CODES)
+            if is_code and others.size >= (1.0 - MAX_SHARE) * known.size:
+                distance = float(np.min(np.abs(others - extreme)))
+                if distance > max(MIN_DISTANCE * float(np.ptp(others)), 0.0):
+                    yield name, written, values == extreme
                     break
