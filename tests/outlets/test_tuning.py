@@ -7,6 +7,7 @@ worse than all that do not, an interruption keeps the best so far, and metrics a
 from __future__ import annotations
 
 import dataclasses
+import pickle
 from typing import ClassVar
 
 import numpy as np
@@ -434,3 +435,13 @@ def test_the_report_states_index_and_objective_in_words():
         str(RootMeanSquareError({"angle": 0.1}, begin=0.5))
         == "RootMeanSquareError, angle divided by 0.1 (SI), from 0.5 s"
     )
+
+
+def test_a_tuning_shows_its_gains_in_their_units_and_the_response_of_the_nominal_case():
+    tuning = pickle.loads(pickle.dumps(small(budget=16)))
+    (gains, *_) = tuning.chapter().tables
+    assert list(gains.columns["unit"].values) == ["1/Pa", "s"]
+    assert str(tuning).startswith(f"Tuning of {type(PRESSURE).__name__}\n16 loops were simulated")
+    assert "<img" in tuning._repr_html_()
+    (axis,) = tuning.chapter().plots[-1].draw().axes
+    assert [line.get_label() for line in axis.get_lines()] == ["present gains", "tuned gains", "set point"]

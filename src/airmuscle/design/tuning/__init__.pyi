@@ -1,5 +1,12 @@
 from .case import LoopCase as LoopCase
 from .case import with_gains as with_gains
+from .objective import CaseMetrics as CaseMetrics
+from .objective import IntegralAbsoluteError as IntegralAbsoluteError
+from .objective import IntegralTimeAbsoluteError as IntegralTimeAbsoluteError
+from .objective import RobustObjective as RobustObjective
+from .objective import RootMeanSquareError as RootMeanSquareError
+from .objective import TrackingIndex as TrackingIndex
+from .objective import TuningHistory as TuningHistory
 from .optimisation import tune as tune
 from .perturbations import Perturbations as Perturbations
 from .perturbations import PerturbedFamily as PerturbedFamily
@@ -10,14 +17,7 @@ from .process_models import UltimatePoint as UltimatePoint
 from .process_models import first_order_of_step as first_order_of_step
 from .process_models import integrator_of_step as integrator_of_step
 from .process_models import ultimate_point as ultimate_point
-from .result import CaseMetrics as CaseMetrics
-from .result import IntegralAbsoluteError as IntegralAbsoluteError
-from .result import IntegralTimeAbsoluteError as IntegralTimeAbsoluteError
-from .result import RobustObjective as RobustObjective
-from .result import RootMeanSquareError as RootMeanSquareError
-from .result import TrackingIndex as TrackingIndex
 from .result import Tuning as Tuning
-from .result import TuningHistory as TuningHistory
 from .rules import RuleSettings as RuleSettings
 from .rules import StepExperiment as StepExperiment
 from .rules import amigo_pi as amigo_pi

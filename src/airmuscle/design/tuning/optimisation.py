@@ -14,7 +14,8 @@ from ...engine.processes import Workers, process_pool
 from ...engine.run.integrators import Integrator
 from .case import GainRange, LoopCase, check_cases, gain_ranges, to_coordinates, to_gains
 from .evaluation import Evaluator, group_cases, joined_metrics
-from .result import CaseMetrics, Objective, RobustObjective, RootMeanSquareError, TrackingIndex, Tuning, TuningHistory
+from .objective import CaseMetrics, Objective, RobustObjective, RootMeanSquareError, TrackingIndex, TuningHistory
+from .result import Tuning
 
 FIRST_WIDTH = 0.25
 """Standard deviation of the first generation, in parts of the range (chosen)."""

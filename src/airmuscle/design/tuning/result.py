@@ -1,216 +1,36 @@
-"""Tracking index, metrics and objective of a tuning, and its result: gains and history of the search."""
+"""Result of a tuning with its chapter: best gains, cases, history of the search and response."""
 
-import abc
+import contextlib
 import dataclasses
-import math
-from collections.abc import Callable, Mapping, Sequence
-from typing import ClassVar
+from collections.abc import Mapping, Sequence
+from functools import partial
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from ...core import Array, ColumnError, ParameterError, Reference, ShortRepr, check_field_types, cite, published, within
-from ...core.errors import check_known, suggestion
-from ...engine.loop import SETPOINT, ControlLoop
-from .case import GainRange, LoopCase, loop_with_gains
+from ...bench.reported import Reported
+from ...core import AirmuscleError, Reference, cite, leaves, published
+from ...core.plotting import BLACK, BLUE, ORANGE, RED, SKY, legend_below, new_figure
+from ...engine.loop import SETPOINT, ControlLoop, parameter_units
+from ...engine.run import Integrator, simulate
+from ...files.scenario import signal_units
+from ...recording import Recording
+from ...report.chapter import BY_ROW, Chapter, NamedValue, Plot, Table, TableColumn
+from . import LoopCase, RuleSettings, TrackingIndex, TuningHistory
+from .case import GainRange, loop_with_gains
+from .objective import Objective
 
 HANSEN2016 = published("hansen-2016")
-
-
-@dataclasses.dataclass(frozen=True)
-class TrackingIndex(abc.ABC):
-    """An index of the control error e = r - y of a run, with set point r and controlled column y of the plant.
-
-    scales  column and the size [SI] by which its error is divided. Without scales the only set point that is a column
-            of the plant is used, and the index has its unit
-    begin   the error before this time [s] from the start of the run is not counted
-
-    With several columns, the magnitude of the error at one instant is sqrt(sum (e/scale)^2). The column y is the true
-    one, not that which a sensor delivers.
-    """
-
-    references: ClassVar[tuple[Reference, ...]] = ()
-
-    time_unit: ClassVar[str] = ""
-    """What an integral over time adds to the unit of the error."""
-    scales: Mapping[str, float] = dataclasses.field(default_factory=dict)
-    begin: float = 0.0
-
-    def __post_init__(self) -> None:
-        check_field_types(self)
-        for name, scale in self.scales.items():
-            if not 0 < scale < math.inf:
-                raise ParameterError(f"{type(self).__name__}: scale of '{name}' is {scale}; it must be positive.")
-        if not 0 <= self.begin < math.inf:
-            raise ParameterError(f"{type(self).__name__}: begin is {self.begin} s; it must be 0 or positive.")
-
-    def __str__(self) -> str:
-        scales = [f"{name} divided by {scale:.4g} (SI)" for name, scale in self.scales.items()]
-        begin = [f"from {self.begin:.4g} s"] if self.begin else []
-        return ", ".join([type(self).__name__, *scales, *begin])
-
-    def scales_for(self, setpoints: Sequence[str], columns: Sequence[str]) -> dict[str, float]:
-        """The controlled columns with their scales, for the set points of a loop and the columns of a plant."""
-        controlled = [name for name in setpoints if name in columns]
-        for name in self.scales:
-            if name not in controlled:
-                raise ParameterError(
-                    f"{type(self).__name__}: '{name}' is not both a set point and a column of the plant; "
-                    f"{', '.join(controlled) or 'none'} is.{suggestion(name, controlled)}"
-                )
-        if not self.scales and len(controlled) != 1:
-            what = " and ".join(controlled) or "no set point"
-            raise ParameterError(
-                f"{type(self).__name__}: {what} can be compared with columns of the plant; state scales, the columns "
-                'and the sizes by which their errors are divided: {"angle": 0.1}.'
-            )
-        return dict(self.scales) or {controlled[0]: 1.0}
-
-    def values(self, time: Array, columns: Mapping[str, Array], scales: Mapping[str, float]) -> Array:
-        """The index (N,) of N runs with rows at `time` (T,) [s] from the start; columns (N, T), with those of the set
-        points. NaN for a run that ended early."""
-        rows = time >= self.begin - 1e-12
-        if np.count_nonzero(rows) < 2:
-            raise ParameterError(
-                f"{type(self).__name__}: fewer than two samples follow begin, {self.begin:g} s; the run ends at "
-                f"{time[-1]:g} s."
-            )
-        squares = [
-            ((columns[f"{SETPOINT}{name}"] - columns[name])[:, rows] / scale) ** 2 for name, scale in scales.items()
-        ]
-        with np.errstate(over="ignore", invalid="ignore"):
-            return self.of_magnitude(time[rows], np.sqrt(np.sum(squares, axis=0)))
-
-    @abc.abstractmethod
-    def of_magnitude(self, time: Array, magnitude: Array) -> Array:
-        """The index (N,) of the magnitude (N, T) of the error at times (T,) [s]."""
-
-    def unit(self, column_unit: str) -> str:
-        """The unit of the index, given that of the error."""
-        return f"{column_unit} {self.time_unit}".strip().removeprefix("1 ")
-
-
-class RootMeanSquareError(TrackingIndex):
-    """Root mean square error (RMSE): sqrt((1/T) integral e^2 dt), trapezoidal rule between the samples."""
-
-    def of_magnitude(self, time: Array, magnitude: Array) -> Array:
-        return np.asarray(np.sqrt(np.trapezoid(magnitude**2, time, axis=1) / (time[-1] - time[0])))
-
-
-class IntegralAbsoluteError(TrackingIndex):
-    """Integral of the absolute error (IAE): integral |e| dt, trapezoidal rule between the samples."""
-
-    time_unit: ClassVar[str] = "s"
-
-    def of_magnitude(self, time: Array, magnitude: Array) -> Array:
-        return np.asarray(np.trapezoid(magnitude, time, axis=1))
-
-
-class IntegralTimeAbsoluteError(TrackingIndex):
-    """Integral of time-multiplied absolute error (ITAE): integral (t - t_begin) |e| dt; Graham and Lathrop (1953)."""
-
-    references: ClassVar[tuple[Reference, ...]] = (published("graham-lathrop-1953"),)
-    time_unit: ClassVar[str] = "s^2"
-
-    def of_magnitude(self, time: Array, magnitude: Array) -> Array:
-        return np.asarray(np.trapezoid((time - time[0]) * magnitude, time, axis=1))
+DISPLAY = {"Pa": (1e-5, "bar"), "m": (1e3, "mm"), "rad": (180 / np.pi, "deg")}
+"""Factor and unit in which the controlled column is displayed."""
+COSTS = {"air": (1e3, "mean air drawn [g/s]"), "travel": (1.0, "mean travel [strokes/s]")}
+"""Factor and axis label of the metrics that are compared with the error."""
+MAX_BRIEF = 10
+"""Rows of the brief view (chosen)."""
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class CaseMetrics(ShortRepr):
-    """Metrics (E, M) of E sets of gains in M cases.
-
-    index        tracking index; infinite where a run failed
-    air          air drawn by the muscles [kg/s]: sum of the increments of their air masses from sample to sample,
-                 divided by the duration. Air that passes through a leak is not in it
-    travel       travel of the commands in strokes, the ranges of their inputs, summed over the inputs [strokes/s]; an
-                 on/off valve makes one stroke at each opening and each closing
-    completed    whether the run reached its end with finite columns
-    """
-
-    index: Array
-    air: Array
-    travel: Array
-    completed: npt.NDArray[np.bool_]
-
-    def __len__(self) -> int:
-        return len(self.index)
-
-
-Objective = Callable[[CaseMetrics], npt.ArrayLike]
-
-
-@dataclasses.dataclass(frozen=True)
-class RobustObjective:
-    """J = mean_i I_i + w Q_q(I_i) + w_a mean_i A_i + w_s mean_i S_i over the cases i; smaller is better.
-
-    I tracking index, Q_q its q-quantile over the cases (linear interpolation; q = 1 is the worst case), A air drawn
-    [kg/s], S travel [strokes/s]. The mean judges the usual plant, the quantile protects against the worst; the defaults
-    w = 1 and q = 0.9 are chosen, and w_a = w_s = 0. J is infinite if a run of any case fails.
-    """
-
-    quantile: float = within(0, 1, default=0.9)
-    quantile_weight: float = 1.0
-    air_weight: float = 0.0
-    travel_weight: float = 0.0
-
-    def __post_init__(self) -> None:
-        check_field_types(self)
-        for name in ("quantile_weight", "air_weight", "travel_weight"):
-            if not 0 <= getattr(self, name) < math.inf:
-                raise ParameterError(f"RobustObjective: {name} is {getattr(self, name)}; it must be 0 or positive.")
-
-    def __str__(self) -> str:
-        weights = ((self.air_weight, "mean air drawn [kg/s]"), (self.travel_weight, "mean travel [strokes/s]"))
-        parts = [f" + {weight:.4g} x {what}" for weight, what in weights if weight]
-        return f"mean + {self.quantile_weight:.4g} x {self.quantile:.4g} quantile of the index{''.join(parts)}"
-
-    def __call__(self, metrics: CaseMetrics) -> Array:
-        """The objective (E,) of E sets of gains."""
-        values = np.full(len(metrics), np.inf)
-        complete = np.flatnonzero(np.isfinite(metrics.index).all(axis=1))
-        if complete.size:
-            index, air, travel = (each[complete] for each in (metrics.index, metrics.air, metrics.travel))
-            worst = np.quantile(index, self.quantile, axis=1)
-            values[complete] = index.mean(axis=1) + self.quantile_weight * worst
-            values[complete] += self.air_weight * air.mean(axis=1)
-            values[complete] += self.travel_weight * travel.mean(axis=1)
-        return values
-
-
-@dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class TuningHistory(ShortRepr):
-    """Every set of gains that was simulated, in order: gains (E, D) [SI], objective (E,) and metrics (E, M)."""
-
-    paths: tuple[str, ...]
-    gains: Array
-    objective: Array
-    metrics: CaseMetrics
-
-    def __len__(self) -> int:
-        return len(self.objective)
-
-    @property
-    def best_so_far(self) -> Array:
-        """The smallest objective (E,) up to each set of gains."""
-        return np.asarray(np.minimum.accumulate(self.objective))
-
-    def means(self, metric: str) -> Array:
-        """The mean (E,) of a metric over the cases: `index`, `air` or `travel`."""
-        check_known("history: no metric", metric, ("index", "air", "travel"), error=ColumnError)
-        return np.asarray(getattr(self.metrics, metric).mean(axis=1))
-
-    def pareto(self, metric: str) -> npt.NDArray[np.intp]:
-        """The sets of gains that no other one surpasses in both the mean index and another mean metric, by index."""
-        error, cost = self.means("index"), self.means(metric)
-        order = np.lexsort((cost, error))
-        order = order[np.isfinite(error[order]) & np.isfinite(cost[order])]
-        lowest = np.minimum.accumulate(np.append(np.inf, cost[order]))[:-1]
-        return np.asarray(order[cost[order] < lowest], dtype=np.intp)
-
-
-@dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class Tuning(ShortRepr):
+class Tuning(Reported):
     """The result of tuning: the gains with the smallest objective.
 
     cases, ranges    for which and within which the gains were sought
@@ -277,3 +97,170 @@ class Tuning(ShortRepr):
     def references(self) -> list[Reference]:
         """Sources of the optimiser, of the index, the controller and the plants."""
         return [HANSEN2016, *cite((self.index, *((case.loop.controller, case.plant) for case in self.cases)))]
+
+    def chapter(
+        self, title: str = "", notes: Sequence[str] = (), rules: Sequence[RuleSettings] = (),
+        integrator: Integrator | None = None,
+    ) -> Chapter:  # fmt: skip
+        """The description of the tuning: gains, cases, figures and settings.
+
+        title       that of the scenario; by default it names the controller
+        rules       settings of tuning rules that were among the starts
+        integrator  of the runs of the nominal case in the figure of the response
+        """
+        case = self.cases[0]
+        units = signal_units(case.plant, case.start())
+        units = {**units, **parameter_units(case.controller, units)}
+        error = "1" if self.index.scales else units.get(next(iter(self.scales))) or "1"
+        unit = self.index.unit(error)
+        captions = {
+            "convergence": "Objective over the budget; a failed set of gains is not drawn.",
+            "pareto": "Mean tracking index over the cases against mean air drawn and travel of commands, with Pareto "
+                      "fronts.",
+            "response": "Nominal case with present and tuned gains.",
+        }  # fmt: skip
+        figures = (self._convergence_figure, partial(self._pareto_figure, unit),
+                   partial(self._response_figure, error, integrator))  # fmt: skip
+        values = {
+            "objective": self.objective, "objective with the present gains": self.present_objective,
+            "simulated loops": self.simulated_loops, "sets of gains": len(self.history), "seed": self.seed,
+            "interrupted": self.interrupted,
+        }  # fmt: skip
+        bound = [f"'{path}' is on a bound of its range; a wider range may give a smaller objective"
+                 for path in self.on_bound]  # fmt: skip
+        tables = self._gain_table(units), self._case_table(unit), *([rule_table(rules)] if rules else [])
+        return Chapter(
+            "tuning", title or f"Tuning of {type(case.controller).__name__}", self._summary(), tables=tables,
+            values=tuple(NamedValue(name, value, brief=False) for name, value in values.items()),
+            plots=tuple(Plot(*item, figure) for item, figure in zip(captions.items(), figures, strict=True)),
+            notes=(*notes, *bound), references=(*self.references, *cite(tuple(rules))), chosen=self._settings(),
+        )  # fmt: skip
+
+    def _summary(self) -> str:
+        present = self.present_objective
+        before = "" if present is None else f"; with the present gains it is {present:.4g}"
+        parts = [
+            f"{self.simulated_loops} loops were simulated: {len(self.history)} sets of gains in "
+            f"{len(self.cases)} cases. The objective is {self.objective:.4g}{before}."
+        ]
+        failed = int(np.count_nonzero(~np.isfinite(self.history.objective)))
+        if failed:
+            parts.append(f"{failed} sets of gains failed in at least one case.")
+        if self.interrupted:
+            parts.append(f"The search was interrupted before its budget of {self.budget} loops was used.")
+        return " ".join(parts)
+
+    def _gain_table(self, units: Mapping[str, str]) -> Table:
+        """The gains before and after, with their ranges."""
+        present = {leaf.path: leaf.value for leaf in leaves(self.cases[0].controller)}
+        columns: dict[str, Any] = {
+            "gain": [each.path for each in self.ranges],
+            "minimum": TableColumn([each.low for each in self.ranges], BY_ROW),
+            "maximum": TableColumn([each.high for each in self.ranges], BY_ROW),
+            "present": TableColumn([present[each.path] for each in self.ranges], BY_ROW),
+            "tuned": TableColumn([self.gains[each.path] for each in self.ranges], BY_ROW),
+            "unit": [units.get(each.path, "") for each in self.ranges],
+        }
+        return Table("gains", "Gains", columns, brief=MAX_BRIEF)
+
+    def _case_table(self, unit: str) -> Table:
+        """The metrics of every case with the present gains, if these were simulated, and with the tuned gains."""
+        metrics, best = self.history.metrics, self.best
+        columns: dict[str, Any] = {"case": [case.name for case in self.cases]}
+        if self.start:
+            columns["index, present gains"] = TableColumn(metrics.index[0], unit)
+        columns["index, tuned gains"] = TableColumn(metrics.index[best], unit)
+        columns["air drawn"] = TableColumn(metrics.air[best], "kg/s", "g/s")
+        columns["travel"] = TableColumn(metrics.travel[best], "strokes/s")
+        return Table("cases", "Cases", columns, f"Index: {type(self.index).__name__}.", brief=MAX_BRIEF)
+
+    def _settings(self) -> tuple[tuple[str, str, str], ...]:
+        controller = self.cases[0].controller
+        return (
+            ("controller", type(controller).__name__, "scenario"),
+            ("index", str(self.index), "chosen"),
+            ("objective", str(self.criterion), "chosen"),
+            ("optimiser", f"CMA-ES, seed {self.seed}, budget {self.budget} loops", "chosen"),
+            ("duration of a run", f"{self.duration:g} s", "scenario"),
+        )
+
+    def _convergence_figure(self) -> Any:
+        """The objective of every set of gains, and the smallest so far, over the number of simulated loops."""
+        figure, axis = new_figure(height=3.0)
+        history = self.history
+        loops = np.arange(1, len(history) + 1) * len(self.cases)
+        finite = np.isfinite(history.objective)
+        axis.plot(loops[finite], history.objective[finite], "o", color=SKY, markersize=2.5, label="set of gains")
+        axis.plot(loops, history.best_so_far, color=BLUE, label="smallest so far")
+        if self.present_objective is not None and np.isfinite(self.present_objective):
+            axis.axhline(self.present_objective, color=RED, linestyle="--", linewidth=1.0, label="present gains")
+        axis.set(xlabel="simulated loops", ylabel="objective", yscale="log")
+        _plain_numbers(axis)
+        legend_below(figure, axis, columns=3)
+        return figure
+
+    def _pareto_figure(self, unit: str) -> Any:
+        """Mean index against mean air drawn and travel of the commands of all sets of gains, with the Pareto fronts."""
+        history = self.history
+        factor, shown = _display(unit)
+        costs = [name for name in COSTS if np.isfinite(history.means(name)).any()]
+        figure, axes = new_figure(1, len(costs), height=3.2, width=3.15 * max(len(costs), 1.4), squeeze=False)
+        error = history.means("index") * factor
+        for axis, name in zip(axes[0], costs, strict=True):
+            scale, label = COSTS[name]
+            cost, front = history.means(name) * scale, history.pareto(name)
+            axis.plot(cost, error, "o", color=SKY, markersize=2.5, label="set of gains")
+            axis.plot(cost[front], error[front], "o-", color=ORANGE, markersize=3, linewidth=1.0, label="Pareto front")
+            if self.start:
+                axis.plot(cost[0], error[0], "s", color=RED, markersize=6, label="present gains")
+            axis.plot(cost[self.best], error[self.best], "D", color=BLUE, markersize=6, label="tuned gains")
+            axis.set(xlabel=label, ylabel=f"mean index [{shown}]" if shown else "mean index", yscale="log")
+            _plain_numbers(axis)
+        legend_below(figure, axes[0, 0], columns=4)
+        return figure
+
+    def _response_figure(self, unit: str, integrator: Integrator | None) -> Any:
+        """The controlled column of the nominal case, with its set point; a run that fails is left out."""
+        case, column, (factor, shown) = self.cases[0], next(iter(self.scales)), _display(unit)
+        figure, axis = new_figure(height=3.0)
+        run: Recording | None = None
+        for name, gains, colour in (("present gains", {}, RED), ("tuned gains", self.gains, BLUE)):
+            loop = loop_with_gains(case, gains)
+            with contextlib.suppress(AirmuscleError):
+                run = simulate(
+                    case.plant, loop, duration=self.duration, start_time=self.start_time, initial_state=case.start(),
+                    output_times=loop.sample_time, integrator=integrator,
+                )  # fmt: skip
+                axis.plot(run["time"], run[column] * factor, color=colour, label=name)
+        if run is not None:
+            wanted, style = run[f"{SETPOINT}{column}"] * factor, {"drawstyle": "steps-post", "linestyle": "--"}
+            axis.plot(run["time"], wanted, color=BLACK, linewidth=0.9, label="set point", **style)
+        axis.set(xlabel="time [s]", ylabel=f"{column} [{shown}]" if shown else column)
+        legend_below(figure, axis, columns=4)
+        return figure
+
+
+def _plain_numbers(axis: Any) -> None:
+    """Numbers without powers on a logarithmic axis."""
+    axis.yaxis.set_major_formatter("{x:g}")
+    axis.yaxis.set_minor_formatter("{x:g}")
+
+
+def _display(unit: str) -> tuple[float, str]:
+    """Factor and unit in which a quantity that begins with an SI unit is displayed: Pa s in bar s."""
+    first, _, rest = ("" if unit == "1" else unit).partition(" ")
+    factor, shown = DISPLAY.get(first, (1.0, first))
+    return factor, f"{shown} {rest}".strip()
+
+
+def rule_table(rules: Sequence[RuleSettings]) -> Table:
+    """The settings of tuning rules."""
+    columns: dict[str, Any] = {
+        "rule": [each.rule for each in rules],
+        "gain": [each.gain for each in rules],
+        "integral time": TableColumn([each.integral_time for each in rules], "s"),
+        "derivative time": TableColumn([each.derivative_time for each in rules], "s"),
+        "set-point weight": [each.setpoint_weight for each in rules],
+    }
+    title = "Settings of tuning rules, among the starts"
+    return Table("rules", title, columns, "The gain is in SI units.", brief=len(rules))

@@ -6,15 +6,13 @@ from typing import Annotated, Any
 
 import typer
 
-from ...core import check_writable, leaves
+from ...core import check_writable
 from ...design import Perturbations, RobustObjective, Tuning
 from ...design.tuning import IntegralAbsoluteError, IntegralTimeAbsoluteError, RootMeanSquareError, TrackingIndex
 from ...design.tuning import tune as find_gains
-from ...design.tuning.chapter import history_table, tuning_chapter
 from ...design.tuning.rules import RuleSettings, rule_settings, rule_starts, step_experiment
 from ...design.tuning.scenario_loop import ScenarioLoop, load_scenario_loop
 from ...engine.processes import Workers
-from ...files.scenario.controller import signal_units
 from ...report.write import save_table
 from ..requests.declaration import RequestError, many, option, request
 from .delivery import Execution, deliver
@@ -116,11 +114,8 @@ def tune(
     writes = writes or execution.takes_over(out)
     if writes:
         loaded.save(tuning.gains, target)
-    scenario_, controller = loaded.scenario, loaded.loop.controller
-    units = signal_units(scenario_.plant, scenario_.initial_state)
-    units = {**units, **{leaf.path: loaded.unit(leaf) for leaf in leaves(controller)}}
-    chapter = tuning_chapter(tuning, scenario_.title, units, notes, rules, scenario_.problem.integrator)
-    files = {"history.csv": lambda path: save_table(history_table(tuning), path)}
+    chapter = tuning.chapter(loaded.scenario.title, notes, rules, loaded.scenario.problem.integrator)
+    files = {"history.csv": lambda path: save_table(tuning.history.table(), path)}
     if tuning.interrupted:
         echo("interrupted: the best gains so far are written", err=True)
     others = {"scenario": target}
