@@ -96,7 +96,7 @@ def allow_code() -> Iterator[None]:
 
 def model_name(cls: type[Any]) -> str:
     """The name of a class in a file; that of a user has its module before it."""
-    return cls.__name__ if cls.__module__.startswith("airmuscle.") else f"{cls.__module__}:{cls.__qualname__}"
+    return cls.__name__ if cls.__module__.startswith("airmuscle.") else f"{cls.__module__}:{cls.__name__}"
 
 
 def is_code_allowed() -> bool:
