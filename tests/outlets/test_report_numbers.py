@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
+import pickle
 import types
 from typing import Any
 
@@ -181,6 +182,9 @@ def test_a_prediction_has_rows_counted_from_1_shares_in_per_cent_and_display_uni
     assert (columns["rows"], columns["rows within the band [%]"]) == ([3], [pytest.approx(200 / 3)])
     assert columns["half width of the 95 % band"] == [2.0]
     assert "maximum error -5 kPa in row 3" in of_record.summary
+    assert table_of(record.chapter(), "predictions") == columns
+    assert "Prediction of a.csv" in str(pickle.loads(pickle.dumps(record)))
+    assert "<table" in record._repr_html_()
 
 
 def test_a_ranking_has_each_error_under_its_heading_and_the_criterion_from_the_lowest():

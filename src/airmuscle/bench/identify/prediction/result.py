@@ -12,7 +12,7 @@ from ....recording import Recording
 from ....recording.columns import display_scale, displayed
 from ....report.chapter import BY_ROW, Chapter, Plot, Table, TableColumn
 from ...baselines import ARX, PERSISTENCE, TimedRecord, baseline_errors, skill
-from ...reported import unit_column
+from ...reported import Reported, unit_column
 from ...segment import CONTRACTION_BAND, Mask
 from ..dynamic.dynamic_chapter import draw_residuals, residual_panels, running_extreme
 
@@ -70,7 +70,7 @@ class QuantityPrediction(ShortRepr):
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class RecordPrediction(ShortRepr):
+class RecordPrediction(Reported):
     """The prediction of one record: its recording, the predicted quantities, and notes on what limits them."""
 
     recording: Recording
@@ -85,6 +85,11 @@ class RecordPrediction(ShortRepr):
     def origin(self) -> str:
         """Name of the record."""
         return self.recording.origin
+
+    def chapter(self) -> Chapter:
+        """The description of the prediction: errors and shares within the bands, and the values at the rows."""
+        of_rows = _record(self)
+        return dataclasses.replace(of_rows, tables=(_error_table([self]), *of_rows.tables))
 
 
 def with_band_notes(prediction: RecordPrediction, differences: Sequence[str], usual: str) -> RecordPrediction:
@@ -123,10 +128,15 @@ STEADY_PRESSURE = 0.03
 def prediction_chapters(model: str, thing: Any, predictions: Sequence[RecordPrediction]) -> list[Chapter]:
     """Return the chapters of predicted records, the errors of all and one for each; `model` names the file of the
     muscle or plant `thing`, whose references are cited."""
-    return [_overview(model, thing, predictions), *(_record(i, each) for i, each in enumerate(predictions, 1))]
+    chapters = [_overview(model, thing, predictions)]
+    for i, each in enumerate(predictions, 1):
+        title = f"Record {i}: {each.origin}"
+        chapters.append(dataclasses.replace(_record(each).among(suffix=f"-{i}"), title=title, brief=False))
+    return chapters
 
 
-def _overview(model: str, thing: Any, predictions: Sequence[RecordPrediction]) -> Chapter:
+def _error_table(predictions: Sequence[RecordPrediction]) -> Table:
+    """Return the errors of every quantity of every record, beside those of the baselines."""
     quantities = [quantity for each in predictions for quantity in each.quantities]
     records = [each for each in predictions for _ in each.quantities]
     names = [quantity.name for quantity in quantities]
@@ -145,6 +155,12 @@ def _overview(model: str, thing: Any, predictions: Sequence[RecordPrediction]) -
         "band": TableColumn([quantity.band or NO_BAND for quantity in quantities], brief=False),
         "notes": TableColumn(["; ".join(each.notes) for each in records], brief=False),
     }
+    caption = "Errors: predicted minus measured." + (f" {BASELINES}" if "skill" in columns else "")
+    return Table("predictions", "Errors of the predicted values", columns, caption, brief=MAX_BRIEF)
+
+
+def _overview(model: str, thing: Any, predictions: Sequence[RecordPrediction]) -> Chapter:
+    quantities = [quantity for each in predictions for quantity in each.quantities]
     number = counted(len(predictions), "record")
     sentences = [f"{number} that {model} was not fitted to, predicted and compared with the measured values."]
     sources = list(filter(None, dict.fromkeys(q.band for q in quantities if q.half_width is not None)))
@@ -152,11 +168,10 @@ def _overview(model: str, thing: Any, predictions: Sequence[RecordPrediction]) -
     if not sources and all(quantity.share is None for quantity in quantities):
         reasons = dict.fromkeys(quantity.band or NO_BAND for quantity in quantities)
         sentences.append(f"No share of rows within a band is given: {'; '.join(reasons)}.")
-    caption = "Errors: predicted minus measured." + (f" {BASELINES}" if "skill" in columns else "")
-    table = Table("predictions", "Errors of the predicted values", columns, caption, brief=MAX_BRIEF)
     notes = tuple(f"{each.origin}: {note}" for each in predictions for note in each.notes)
     title, references = f"Prediction by {model}", tuple(cite(thing))
-    return Chapter("prediction", title, " ".join(sentences), tables=(table,), notes=notes, references=references)
+    tables = (_error_table(predictions),)
+    return Chapter("prediction", title, " ".join(sentences), tables=tables, notes=notes, references=references)
 
 
 def _baseline_columns(predictions: Sequence[RecordPrediction]) -> dict[str, Any]:
@@ -190,8 +205,8 @@ def _timed(prediction: RecordPrediction) -> TimedRecord | None:
     return TimedRecord(time, measured, prediction.inputs, compared)
 
 
-def _record(number: int, prediction: RecordPrediction) -> Chapter:
-    stem = f"prediction-{number}"
+def _record(prediction: RecordPrediction) -> Chapter:
+    """Return the description of one record without the table of its errors."""
     columns: dict[str, Any] = {}
     if "time" in prediction.recording:
         columns["time"] = TableColumn(prediction.recording["time"], "s")
@@ -210,10 +225,10 @@ def _record(number: int, prediction: RecordPrediction) -> Chapter:
         for quantity in prediction.quantities
     )
     caption = f"{prediction.origin}: measured and predicted values with the 95 % band, and errors."
-    title, summary = f"Record {number}: {prediction.origin}", f"{errors[:1].upper()}{errors[1:]}."
-    tables = (Table(stem, "Measured and predicted values", columns, series=True),)
-    plots = (Plot(stem, caption, partial(_figure, prediction)),)
-    return Chapter(stem, title, summary, tables=tables, plots=plots, notes=prediction.notes, brief=False)
+    title, summary = f"Prediction of {prediction.origin}", f"{errors[:1].upper()}{errors[1:]}."
+    tables = (Table("prediction", "Measured and predicted values", columns, series=True),)
+    plots = (Plot("prediction", caption, partial(_figure, prediction)),)
+    return Chapter("prediction", title, summary, tables=tables, plots=plots, notes=prediction.notes)
 
 
 def _figure(prediction: RecordPrediction) -> Any:
