@@ -26,7 +26,7 @@ from airmuscle.bench import (
     fit_hysteresis,
     fit_jointly,
 )
-from airmuscle.bench.identify import Uncertainty, VolumePoints, fit_volume, volume_chapter
+from airmuscle.bench.identify import Uncertainty, VolumePoints, fit_volume
 from airmuscle.bench.identify.campaign import ValidationRow
 from airmuscle.bench.identify.campaign.campaign_chapters import _validation_table
 from airmuscle.bench.identify.dynamic.dynamic_chapter import dynamic_chapters
@@ -122,7 +122,7 @@ def test_a_volume_is_in_cubic_centimetres_and_its_criterion_counts_from_the_best
     contraction = np.linspace(0.0, 0.25, 20)
     volume = BRAID.volume(contraction) + 3e-7 * np.random.default_rng(1).standard_normal(20)
     found = fit_volume(VolumePoints(contraction, np.asarray(volume), 0), LENGTH)
-    chapter = volume_chapter(found, "Volume")
+    chapter = found.chapter()
     columns = table_of(chapter, "volume")
     at = np.array(columns["contraction [%]"]) / 100
     assert columns["volume [cm3]"] == pytest.approx(1e6 * np.asarray(found.geometry.volume(at)))
@@ -132,6 +132,8 @@ def test_a_volume_is_in_cubic_centimetres_and_its_criterion_counts_from_the_best
     expected = [found.aicc[name] - lowest for name in compared["law"]]
     assert compared["AICc above the best"] == pytest.approx(expected)
     assert expected[0] == 0.0
+    assert found.summary in str(pickle.loads(pickle.dumps(found)))
+    assert "<table" in found._repr_html_()
 
 
 def isobaric(level: float, coulomb: float) -> Recording:

@@ -99,7 +99,6 @@ from .variable_projection import shortened_step as shortened_step
 from .variable_projection import solve_censored_least_squares as solve_censored_least_squares
 from .volume_fit import VolumePoints as VolumePoints
 from .volume_fit import fit_volume as fit_volume
-from .volume_fit import volume_chapter as volume_chapter
 from .volume_fit import volume_points as volume_points
 from .weighting import UNCENSORED as UNCENSORED
 from .weighting import Censoring as Censoring

@@ -20,6 +20,7 @@ from ...physics.pneumatics.gas import GAS_CONSTANT
 from ...recording import Recording
 from ...report.chapter import Chapter, NamedValue, Plot, Table, TableColumn
 from ...report.shown import parameter_table
+from ..reported import Reported
 from .model_evidence import EQUIVALENT, aicc
 
 HELD = 0.005
@@ -44,8 +45,8 @@ class VolumePoints(NamedTuple):
     fills: int
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class VolumeFit:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class VolumeFit(Reported):
     """Volume law of a muscle with its covariance, and the AICc of every law that was compared."""
 
     geometry: Geometry
@@ -65,6 +66,40 @@ class VolumeFit:
     def largest_deviation(self) -> float:
         """The greatest standard deviation of the volume [m3] at the measured contractions."""
         return float(self.standard_deviation(self.points.contraction).max())
+
+    @property
+    def summary(self) -> str:
+        """The law with its residual and its standard deviation."""
+        return (
+            f"{type(self.geometry).__name__}, rms residual {1e6 * self.rmse:.4g} cm3, standard deviation of the volume "
+            f"at most {1e6 * self.largest_deviation:.4g} cm3"
+        )
+
+    def chapter(
+        self, title: str = "Volume of the muscle", law: Characteristic | None = None,
+        validity_range: ValidityRange | None = None, defect: EnergyDefect | None = None,
+    ) -> Chapter:  # fmt: skip
+        """The description of the fit; with a force law also dF/dp against -dV/dL and the Maxwell defect."""
+        caption = "Measured volumes, and the law with two standard deviations."
+        plots = [Plot("volume", caption, partial(_volume_figure, self))]
+        if law is not None and validity_range is not None:
+            caption = (
+                "Reciprocity: dF/dp of the force law (lines, at several pressures) and -dV/dL of the volume law "
+                "(thick). They are equal if force and volume derive from one potential."
+            )
+            plots.append(Plot("reciprocity", caption, partial(_reciprocity_figure, self, law, validity_range)))
+        model = type(self.geometry).__name__
+        values = (
+            NamedValue("law", model, brief=False),
+            NamedValue("points", len(self.points.contraction), brief=False),
+            NamedValue("fills", self.points.fills, brief=False),
+            NamedValue("rms residual", self.rmse, "m3", "cm3", brief=False),
+            NamedValue("maximum standard deviation", self.largest_deviation, "m3", "cm3", brief=False),
+            *([] if defect is None else defect_values(defect)),
+        )
+        tables = (*_tables(self), parameter_table(self.geometry, "volume-parameters", f"Parameters of {model}"))
+        return Chapter("volume", title, f"{self.summary}.", values=values, tables=tables, plots=tuple(plots),
+                       references=tuple(cite(self.geometry)))  # fmt: skip
 
 
 def volume_points(recordings: Sequence[Recording], temperature: float = 293.15) -> VolumePoints:
@@ -189,49 +224,12 @@ def _chebyshev_terms(contraction: Array, low: float, high: float, degree: int) -
     return np.asarray(np.polynomial.chebyshev.chebvander(scaled, degree))
 
 
-def volume_chapter(
-    fit: VolumeFit, title: str, law: Characteristic | None = None, validity_range: ValidityRange | None = None,
-    defect: EnergyDefect | None = None,
-) -> Chapter:  # fmt: skip
-    """Return the chapter of a volume fit; with a force law also dF/dp against -dV/dL and the Maxwell defect."""
-    caption = "Measured volumes, and the law with two standard deviations."
-    plots = [Plot("volume", caption, partial(_volume_figure, fit))]
-    if law is not None and validity_range is not None:
-        caption = (
-            "Reciprocity: dF/dp of the force law (lines, at several pressures) and -dV/dL of the volume law (thick). "
-            "They are equal if force and volume derive from one potential."
-        )
-        plots.append(Plot("reciprocity", caption, partial(_reciprocity_figure, fit, law, validity_range)))
-    model = type(fit.geometry).__name__
-    return Chapter(
-        "volume", title, summary=f"{volume_summary(fit)}.",
-        values=(
-            NamedValue("law", model, brief=False),
-            NamedValue("points", len(fit.points.contraction), brief=False),
-            NamedValue("fills", fit.points.fills, brief=False),
-            NamedValue("rms residual", fit.rmse, "m3", "cm3", brief=False),
-            NamedValue("maximum standard deviation", fit.largest_deviation, "m3", "cm3", brief=False),
-            *([] if defect is None else defect_values(defect)),
-        ),
-        tables=(*_tables(fit), parameter_table(fit.geometry, "volume-parameters", f"Parameters of {model}")),
-        plots=tuple(plots), references=tuple(cite(fit.geometry)),
-    )  # fmt: skip
-
-
 def defect_values(defect: EnergyDefect) -> list[NamedValue]:
     """The Maxwell defect and its place; it is zero where force and volume derive from one potential."""
     return [
         NamedValue("Maxwell defect", defect.worst, defect.unit, remark=f"|dF/dp + dV/dL| {defect.place}"),
         NamedValue("relative Maxwell defect", defect.relative, "1", "%", remark="of the maximum of -dV/dL"),
     ]
-
-
-def volume_summary(fit: VolumeFit) -> str:
-    """The law with its residual and its standard deviation."""
-    return (
-        f"{type(fit.geometry).__name__}, rms residual {1e6 * fit.rmse:.4g} cm3, standard deviation of the volume at "
-        f"most {1e6 * fit.largest_deviation:.4g} cm3"
-    )
 
 
 def _tables(fit: VolumeFit) -> tuple[Table, Table]:

@@ -9,7 +9,7 @@ import typer
 
 from ...bench.identify import approximate as approximate_law
 from ...bench.identify.approximation import GRID_POINTS, sample_on_grid
-from ...bench.identify.volume_fit import fit_volume, volume_chapter, volume_points, volume_summary
+from ...bench.identify.volume_fit import fit_volume, volume_points
 from ...core import ParameterError, PhysicsError, check_writable
 from ...files.library import find_initial_law, list_files, load_law, part_toml, resting_lengths, save, to_toml
 from ...physics.muscle.characteristic import ValidityRange, maxwell_defect, validity_range_of
@@ -99,7 +99,7 @@ def fit_volume_command(
     length = float(own) if own is not None and not lengths else check_one_length(lengths, "a muscle")
     fit = fit_volume(points, length)
     if entry is None:
-        chapter = volume_chapter(fit, f"Volume fitted to {list_files([f.stem for f in files])}", None, None, None)
+        chapter = fit.chapter(f"Volume fitted to {list_files([f.stem for f in files])}")
         contents = {"geometry.toml": part_toml("geometry", fit.geometry)}
     else:
         law, limits, defect = entry.characteristic, None, None
@@ -109,8 +109,8 @@ def fit_volume_command(
             limits = ValidityRange(stated.min_pressure, stated.max_pressure, low, high) if low < high else None
         with contextlib.suppress(PhysicsError):  # slack everywhere
             defect = None if limits is None else maxwell_defect(law, fit.geometry, limits)
-        chapter = volume_chapter(fit, entry.title, None if limits is None else law, limits, defect)
-        note = f"Volume fitted to {list_files([f.name for f in files])}: {volume_summary(fit)}."
+        chapter = fit.chapter(entry.title, None if limits is None else law, limits, defect)
+        note = f"Volume fitted to {list_files([f.name for f in files])}: {fit.summary}."
         fitted = dataclasses.replace(entry, name="muscle", geometry=fit.geometry, provenance="fitted",
                                      note=" ".join(filter(None, (entry.note, note))), checks=())  # fmt: skip
         contents = {"muscle.toml": to_toml(fitted)}
