@@ -17,6 +17,7 @@ import importlib
 import io
 import multiprocessing
 import os
+import pickle
 import re
 import shutil
 import signal
@@ -34,7 +35,7 @@ from scenario_files import MUSCLE_FILE
 
 from airmuscle.core import tree
 from airmuscle.design import dask_cluster, load_study, process_pool, run_study
-from airmuscle.design.study import DESIGNS, METRICS, VARIATIONS, chunk, study_chapter, write_study
+from airmuscle.design.study import DESIGNS, METRICS, VARIATIONS, chunk, write_study
 from airmuscle.engine import simulate, solve
 from airmuscle.errors import AirmuscleError, ColumnError, FileError, InputError, SimulationError
 from airmuscle.files import load_scenario
@@ -633,14 +634,14 @@ def test_an_unknown_metric_is_an_error_with_the_nearest_name(folder: Path):
 def test_the_report_shows_design_statistics_and_figures(folder: Path):
     edited(folder, 'model = "MonteCarlo"\ncount = 22', 'model = "Saltelli"\ncount = 8')
     result = run(folder)
-    chapter = study_chapter(result)
+    chapter = result.chapter()
     assert [t.name for t in chapter.tables] == ["statistics", "sensitivities", "varied"]
     assert [p.name for p in chapter.plots] == [
         "histograms", "scatter-pressure", "scatter-reached", "sensitivities", "time-series-course",
     ]  # fmt: skip
-    (scatter,) = chapter.plots[1].figure.axes[0].lines
+    (scatter,) = chapter.plots[1].draw().axes[0].lines
     assert scatter.get_markersize() >= 5.0, "few points are drawn large"
-    assert all(tick == round(tick) for tick in chapter.plots[0].figure.axes[0].get_yticks())
+    assert all(tick == round(tick) for tick in chapter.plots[0].draw().axes[0].get_yticks())
     statistics = result.statistics().columns
     assert statistics["mean"][0] == pytest.approx(result["pressure"].mean())
     assert statistics["median"][1] == pytest.approx(np.median(result["reached"]))
@@ -649,6 +650,8 @@ def test_the_report_shows_design_statistics_and_figures(folder: Path):
     write_study(result, folder / "out")
     page = (folder / "out" / "report.html").read_text(encoding="utf-8")
     assert "Saltelli(count=8, seed=3)" in page
+    assert "Variance-based sensitivities (Sobol indices)" in str(pickle.loads(pickle.dumps(result)))
+    assert "<img" in result._repr_html_()
 
 
 def test_the_command_names_its_report_last(folder: Path):

@@ -1,8 +1,6 @@
 from ...engine.executors import dask_cluster as dask_cluster
 from ...engine.executors import shared_folder as shared_folder
 from ...engine.processes import process_pool as process_pool
-from .chapter import study_chapter as study_chapter
-from .chapter import write_study as write_study
 from .chunk import run_study as run_study
 from .design import DESIGNS as DESIGNS
 from .design import Grid as Grid
@@ -33,6 +31,7 @@ from .metrics import TimeSeries as TimeSeries
 from .metrics import TimeToReach as TimeToReach
 from .paths import read_difference as read_difference
 from .result import StudyResult as StudyResult
-from .result import sobol_indices as sobol_indices
+from .result import write_study as write_study
+from .sensitivity import sobol_indices as sobol_indices
 from .study import Study as Study
 from .study import load_study as load_study

@@ -1,89 +1,36 @@
-"""StudyResult: metrics, statistics and variance-based sensitivity indices of a study.
-
-First order   S_i = V(E(f | x_i)) / V(f)              fraction of the variance removed if x_i were known
-total         T_i = 1 - V(E(f | x_others)) / V(f)     fraction that remains if only x_i were unknown
-
-estimated from the runs A, B and A with column i from B (the design Saltelli), with f centred about its mean:
-    S_i = mean(f_B (f_ABi - f_A)) / V,   T_i = mean((f_A - f_ABi)^2) / (2 V),   V = variance of f_A and f_B together.
-The T_i are not negative, and their sum is at least 1; the sum of the S_i is at most 1; T_i - S_i is the contribution of
-the interactions of x_i with other parameters. Estimates of small S_i may be negative.
-
-References: Sobol, Math. and Computers in Simulation 55 (2001) 271-280; Jansen, Computer Physics Communications 117
-(1999) 35-43 (T_i); Saltelli et al., Computer Physics Communications 181 (2010) 259-270 (S_i, and the design).
-"""
+"""Result of a parameter study with its chapter, and its files: metrics, statistics, sensitivities and failures."""
 
 import dataclasses
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from ...core import Array, ColumnError, ShortRepr, check_known
-from ...report.chapter import BY_ROW, Table, TableColumn
+from ...bench.reported import Reported
+from ...core import Array, ColumnError, atomic_folder, check_known, cite
+from ...report.chapter import BY_ROW, Chapter, NamedValue, Plot, Table, TableColumn
+from ...report.write import save_table, write_into
 from . import Saltelli, Study
+from .figures import file_stem, histogram_figure, scatter_plot, time_series_figure
+from .sensitivity import SobolIndices, sensitivity_figure, sensitivity_table, sobol_indices
 
-CONFIDENCE = 0.95
-BOOTSTRAP_SAMPLES = 1000
-SAMPLES_PER_BATCH = 20
-
-
-@dataclasses.dataclass(frozen=True, eq=False)
-class SobolIndices:
-    """Sobol indices of one metric: first order and total (d,), each with its bootstrap interval (2, d).
-
-    `base_points` is the number of base points used, `excluded_points` the number of those excluded because the metric
-    is missing for one of their runs. All indices are NaN if the metric does not vary.
-    """
-
-    first: Array
-    total: Array
-    first_interval: Array
-    total_interval: Array
-    base_points: int
-    excluded_points: int
-
-
-def sobol_indices(metric: Array, parameters: int, seed: int = 0) -> SobolIndices:
-    """The indices of a metric (n (d + 2),) with respect to d parameters, from runs in the order of the design Saltelli.
-
-    The intervals are percentiles (95 %) of 1000 bootstrap samples of the base points, drawn with `seed`.
-    """
-    table = metric.reshape(-1, parameters + 2)
-    known = table[np.isfinite(table).all(axis=1)]
-    count, undefined = len(known), np.full(parameters, np.nan)
-    varies = len(known) and np.ptp(known) > 1e-12 * np.abs(known).max() and np.ptp(known[:, [0, -1]]) > 0
-    if not varies:  # by more than rounding errors
-        no_interval = np.tile(undefined, (2, 1))
-        return SobolIndices(undefined, undefined, no_interval, no_interval, count, len(table) - count)
-    centred = known - known[:, [0, -1]].mean()
-    a, mixed, b = centred[:, :1], centred[:, 1:-1], centred[:, -1:]
-    # what the estimators average, per base point (n, 2 d + 2); a bootstrap sample is a matrix product
-    terms = np.hstack([b * (mixed - a), 0.5 * (a - mixed) ** 2, 0.5 * (a + b), 0.5 * (a * a + b * b)])
-    first, total = _indices(terms.mean(axis=0)[None, :], parameters)
-    generator = np.random.default_rng(seed)
-    samples = []
-    for _ in range(BOOTSTRAP_SAMPLES // SAMPLES_PER_BATCH):  # in batches, to bound the memory
-        weights = generator.multinomial(count, np.full(count, 1.0 / count), size=SAMPLES_PER_BATCH)
-        samples.append(_indices(weights @ terms / count, parameters))
-    tails = [(1 - CONFIDENCE) / 2, (1 + CONFIDENCE) / 2]
-    intervals = [np.nanquantile(np.concatenate([pair[i] for pair in samples]), tails, axis=0) for i in (0, 1)]
-    return SobolIndices(first[0], total[0], intervals[0], intervals[1], count, len(table) - count)
-
-
-def _indices(means: Array, parameters: int) -> tuple[Array, Array]:
-    """First order and total (R, d) from the means (R, 2 d + 2); NaN for a sample of a single repeated point."""
-    variance = means[:, -1:] - means[:, -2:-1] ** 2
-    variance = np.where(variance > 0, variance, np.nan)
-    return means[:, :parameters] / variance, means[:, parameters : 2 * parameters] / variance
-
-
-BRIEF, MAX_BRIEF, MAX_SENSITIVITIES = ("mean", "standard deviation", "5 %", "95 %"), 8, 12
-"""Statistics, number of metrics and rows of sensitivities in the brief view (chosen)."""
+BRIEF, MAX_BRIEF, SHORT_LISTED = ("mean", "standard deviation", "5 %", "95 %"), 8, 4
+"""Statistics, number of metrics and of reasons of failed runs in the brief view (chosen)."""
+RESULTS_FILE, TIME_SERIES_FILE = "results.csv", "time_series.npz"
+MAX_LISTED_REASONS = 20
+HISTOGRAMS = "Histograms of the metrics over all runs; the dashed line is the nominal scenario."
+SENSITIVITIES = (
+    "Variance-based sensitivities with 95 % bootstrap confidence intervals: first order (the parameter alone) and "
+    "total (with its interactions)."
+)
 
 
 @dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class StudyResult(ShortRepr):
+class StudyResult(Reported):
     """The results of all runs of a study.
 
     scalars          scalar metrics (N, k), in the order of `study.scalars`; NaN if a run does not have the metric
@@ -117,15 +64,12 @@ class StudyResult(ShortRepr):
         inputs = {f"{p.path} [{p.unit}]": study.values[:, i] for i, p in enumerate(study.parameters)}
         metrics = {f"{name} [{study.units[name]}]": self[name] for name in study.scalars}
         status = ["failed" if reason else "done" for reason in self.failure_reasons]
-        runs: list[Any] = list(range(len(study)))
-        reasons = list(self.failure_reasons)
-        columns: dict[str, Any] = {"run": runs, **inputs, **metrics, "status": status, "reason": reasons}
-        return Table("results", "All runs", columns, series=True)
+        columns: dict[str, Any] = {"run": list(range(len(study))), **inputs, **metrics, "status": status}
+        return Table("results", "All runs", {**columns, "reason": list(self.failure_reasons)}, series=True)
 
     def statistics(self) -> Table:
         """The nominal value and the statistics over all runs of each scalar metric."""
-        names = list(self.study.scalars)
-        rows = [_statistics(self[name]) for name in names]
+        names, rows = list(self.study.scalars), [_statistics(self[name]) for name in self.study.scalars]
         columns: dict[str, Any] = {
             "metric": names,
             "nominal": TableColumn([self.nominal[name] for name in names], BY_ROW),
@@ -145,6 +89,66 @@ class StudyResult(ShortRepr):
             return {}
         return {name: sobol_indices(self[name], len(self.study.parameters), design.seed) for name in self.study.scalars}
 
+    def chapter(self, *, execution: str = "") -> Chapter:
+        """The description of the study: design, statistics, sensitivities and figures.
+
+        `execution` is a paragraph on the processes that have computed the runs.
+        """
+        study, indices = self.study, self.indices()
+        metrics, paths = {name: self[name] for name in study.scalars}, [each.path for each in study.parameters]
+        plots = (
+            [Plot("histograms", HISTOGRAMS, partial(histogram_figure, study, metrics, self.nominal))] if metrics else []
+        )
+        plots += [scatter_plot(study, name, values) for name, values in metrics.items()]
+        plots += [Plot("sensitivities", SENSITIVITIES, partial(sensitivity_figure, paths, indices))] if indices else []
+        for name, series in study.time_series.items():
+            caption = f"{name}: {series.column} over time, over all runs."
+            figure = partial(time_series_figure, study, name, self[name])
+            plots.append(Plot(f"time-series-{file_stem(name)}", caption, figure))
+        tables = [self.statistics()] if metrics else []
+        tables += [sensitivity_table(paths, indices)] if indices else []
+        tables += [self._failure_table()] if self.failed.size else []
+        summary = [f"{len(study)} runs, {study.design}. {RESULTS_FILE} contains one row per run."]
+        if study.time_series:
+            names = ", ".join(study.time_series)
+            summary.append(f"{TIME_SERIES_FILE} contains the time series ({names}), one row per run, and their times.")
+        counts = {"runs": len(study), "failed runs": int(self.failed.size)}
+        return Chapter(
+            "study", study.title, (*summary, execution), plots=tuple(plots), tables=(*tables, variation_table(study)),
+            values=tuple(NamedValue(name, count, brief=False) for name, count in counts.items()),
+            chosen=_settings(study), notes=tuple(self._notes(indices)),
+            references=tuple(cite(study.template.scenario.plant)),
+        )  # fmt: skip
+
+    def _notes(self, indices: dict[str, SobolIndices]) -> Iterator[str]:
+        """Failed runs and excluded base points."""
+        if self.failed.size:
+            yield f"Failed runs: {self.failed.size}. They are excluded from the statistics; the table has the reasons."
+        excluded = max((each.excluded_points for each in indices.values()), default=0)
+        if excluded:
+            yield f"Base points excluded from the sensitivities, because a metric is missing: {excluded}."
+
+    def _failure_table(self) -> Table:
+        """The reasons of failed runs, the most frequent first."""
+        counts = Counter(self.failure_reasons[i] for i in self.failed).most_common(MAX_LISTED_REASONS)
+        columns: dict[str, Any] = {
+            "runs": [count for _, count in counts],
+            "first run": [self.failure_reasons.index(reason) for reason, _ in counts],
+            "reason": [reason for reason, _ in counts],
+        }
+        note = f"At most {MAX_LISTED_REASONS} reasons are listed." if len(counts) == MAX_LISTED_REASONS else ""
+        return Table("failed", "Failed runs", columns, note, brief=SHORT_LISTED)
+
+
+def _settings(study: Study) -> tuple[tuple[str, str, str], ...]:
+    scenario = study.template.scenario
+    return (
+        ("scenario", scenario.title, str(study.path.name)), ("design", str(study.design), "study"),
+        *((f"metric {name}", str(metric), "study") for name, metric in study.metrics.items()),
+        ("integrator", str(scenario.problem.integrator), "scenario"),
+        ("input signal", str(scenario.problem.input), "scenario"),
+    )  # fmt: skip
+
 
 def _statistics(values: Array) -> dict[str, Any]:
     finite = values[np.isfinite(values)]
@@ -158,24 +162,33 @@ def _statistics(values: Array) -> dict[str, Any]:
     }
 
 
-def sensitivity_table(study: Study, indices: dict[str, SobolIndices]) -> Table:
-    """The Sobol indices of each metric with respect to each parameter, with their confidence intervals."""
-    paths, found = [parameter.path for parameter in study.parameters], indices.values()
-
-    def pairs(intervals: list[Array]) -> TableColumn:
-        return TableColumn(list(zip(*np.hstack(intervals).tolist(), strict=True)), digits=3, brief=False)
-
-    columns = {
-        "metric": [name for name in indices for _ in paths],
-        "parameter": paths * len(indices),
-        "first order": TableColumn(np.concatenate([each.first for each in found]), digits=3),
-        "first order, interval": pairs([each.first_interval for each in found]),
-        "total": TableColumn(np.concatenate([each.total for each in found]), digits=3),
-        "total, interval": pairs([each.total_interval for each in found]),
+def variation_table(study: Study) -> Table:
+    """The varied parameters with their distributions or levels and their sampled range."""
+    columns: dict[str, Any] = {
+        "parameter": [parameter.path for parameter in study.parameters],
+        "values": list(map(str, study.variations)),
+        "min": TableColumn(study.values.min(axis=0), BY_ROW),
+        "max": TableColumn(study.values.max(axis=0), BY_ROW),
+        "unit": [parameter.unit for parameter in study.parameters],
+        "also applied to": [
+            ", ".join(parameter.path for parameter, leader in study.follow if leader == i)
+            for i in range(len(study.parameters))
+        ],
     }
-    note = (
-        "Intervals: 95 % bootstrap confidence intervals. First order: fraction of the variance removed if the "
-        "parameter were known; total: fraction that remains if all other parameters were known."
-    )
-    title = "Variance-based sensitivities (Sobol indices)"
-    return Table("sensitivities", title, columns, note, brief=MAX_SENSITIVITIES)
+    return Table("varied", "Varied parameters", columns)
+
+
+def write_study(result: StudyResult, folder: Path | str, chapter: Chapter | None = None) -> Path:
+    """Write results.csv, time_series.npz (if the study has time series) and the report; return the path of its page.
+
+    The files are written atomically: all or none. `chapter` is that of the result, if it was made before. Raises
+    FileError if the folder cannot be written to.
+    """
+    study = result.study
+    with atomic_folder(folder) as place:
+        save_table(result.table(), place / RESULTS_FILE)
+        if study.time_series:
+            times = {f"{name}_time": course.times for name, course in study.time_series.items()}
+            np.savez(place / TIME_SERIES_FILE, **times, **result.time_series)  # type: ignore[arg-type]
+        write_into(place, [chapter or result.chapter()], title="Parameter study")
+    return Path(folder) / "report.html"

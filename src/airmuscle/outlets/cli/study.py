@@ -5,8 +5,8 @@ from typing import Annotated
 
 from ...core import AirmuscleError, SimulationError, new_figure
 from ...design.study import Study, StudyResult, load_study, run_study
-from ...design.study.chapter import RESULTS_FILE, study_chapter, write_study
 from ...design.study.chunk import count_finished_runs
+from ...design.study.result import RESULTS_FILE, write_study
 from ...engine.executors import SharedFolder
 from ...engine.processes import process_pool
 from ...report.write import REPORT_FILE
@@ -39,7 +39,7 @@ def study(file: StudyFile, execution: Execution, out: Folder = Path("study"), js
     result, shares = _run(loaded, out if execution.join is None else None, execution)
     writes = writes or execution.takes_over(out)
     if writes or json:
-        chapter = study_chapter(result, execution=shares)
+        chapter = result.chapter(execution=shares)
         page = write_study(result, out, chapter) if writes else out / REPORT_FILE
         print_result([chapter], {"results": out / RESULTS_FILE, "report": page}, json)
     if result.failed.size == len(result.study):
