@@ -23,7 +23,7 @@ from ...bench.identify.hysteresis.hysteresis_chapter import hysteresis_chapters,
 from ...bench.identify.hysteresis.joint import select_friction
 from ...bench.identify.static_fit_chapter import band_curves, equation_section
 from ...bench.readers.constants import CONSTANT_QUANTITIES
-from ...bench.segment import Inspection, Outlier, Run, check_contents, inspect_all, kept_rows, motion_direction
+from ...bench.segment import Inspection, Outlier, Run, check_contents, inspect_all, kept_rows
 from ...core import AirmuscleError, AirmuscleWarning, atomic_folder
 from ...files.library import missing_geometry, part_toml, resting_lengths, save
 from ...recording.columns import display_scale
@@ -142,13 +142,11 @@ def _sheet(chapter: Chapter) -> dict[str, Any]:
 
 
 def _loop(fit: LoopFit) -> dict[str, Any]:
-    recording = fit.loop.recording
-    varied = "contraction" if {"contraction", "length"} & set(fit.loop.run.swept_columns) else "pressure"
-    direction = motion_direction(fit.loop.friction_path.displacement(recording), recording.columns.get("time"))
+    recording, varied = fit.loop.recording, fit.loop.varied
     rows = slice(None, None, max(1, -(-len(recording) // MAX_POINTS)))
     return {
         **_sheet(fit.chapter()), "justified": fit.recommended is not None, "varied": varied,
-        "x": recording[varied][rows], "force": recording["force"][rows], "direction": np.asarray(direction)[rows],
+        "x": recording[varied][rows], "force": recording["force"][rows], "direction": fit.loop.direction[rows],
     }  # fmt: skip
 
 

@@ -22,12 +22,12 @@ from .loop_data import data_limits as data_limits
 from .loop_data import parameters_on_bounds as parameters_on_bounds
 from .loop_result import HysteresisLoop as HysteresisLoop
 from .loop_result import LoopFit as LoopFit
+from .loop_result import loop_path as loop_path
+from .loop_result import plot_loops as plot_loops
 from .loops import find_loops as find_loops
 from .loops import fit_hysteresis as fit_hysteresis
 from .loops import fit_loop as fit_loop
 from .loops import initial_friction_laws as initial_friction_laws
-from .minor_loops import loop_path as loop_path
-from .minor_loops import plot_loops as plot_loops
 from .result import HysteresisFit as HysteresisFit
 from .result import preferred_fit as preferred_fit
 from .search import branch_gap as branch_gap

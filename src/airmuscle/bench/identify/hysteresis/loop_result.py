@@ -1,13 +1,15 @@
-"""Friction laws of one loop with their chapter; the loop, its kind and level, and the tables of compared laws."""
+"""Friction laws of one loop with their chapter; the loop, its kind and level, tables of laws, and their minor loops."""
 
 import dataclasses
 import functools
+import itertools
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from ....core import BLACK, BLUE, RED, Reference, ShortRepr, leaves, legend_below, new_figure
+from ....core import BLACK, BLUE, DASHES, LINES, RED, Array, Reference, ShortRepr, leaves, legend_below, new_figure
+from ....physics.muscle.friction import Friction
 from ....recording import Recording
 from ....recording.columns import display_scale
 from ....report.chapter import BY_ROW, Chapter, NamedValue, Plot, Table, TableColumn
@@ -15,8 +17,7 @@ from ....report.formatting import P_VALUE
 from ...reported import Reported
 from ...segment import Mask, Run, motion_direction
 from ..data_checks import level_text
-from .loop_data import ContractionPath, FrictionPath, StaticCurve
-from .minor_loops import plot_loops
+from .loop_data import MILLIMETRES, Axis, ContractionPath, FrictionPath, StaticCurve
 from .result import FrictionFit, HysteresisFit, preferred_fit
 from .search import LoopSeries, make_loop_series
 
@@ -44,12 +45,20 @@ class HysteresisLoop(ShortRepr):
         """The arrays of a run of this loop for a fit of friction."""
         return make_loop_series(recording, self.static_curve, self.friction_path, fitted_rows)
 
+    @property
+    def varied(self) -> str:
+        """Name of the varied quantity: contraction or pressure."""
+        return "contraction" if {"contraction", "length"} & set(self.run.swept_columns) else "pressure"
+
+    @property
+    def direction(self) -> Array:
+        """Direction of the motion at the rows, 1 on the rising branch, -1 on the falling one, shape (N,)."""
+        return motion_direction(self.friction_path.displacement(self.recording), self.recording.columns.get("time"))
+
     def plot(self) -> Any:
         """A figure of the force over the varied quantity, by branch; rows that are not used are light."""
-        recording = self.recording
-        name = "contraction" if {"contraction", "length"} & set(self.run.swept_columns) else "pressure"
+        recording, name, direction = self.recording, self.varied, self.direction
         factor, unit = display_scale(name)
-        direction = motion_direction(self.friction_path.displacement(recording), recording.columns.get("time"))
         figure, axes = new_figure(width=6.0, height=3.9)
         axes.plot(recording[name] * factor, recording["force"], color=BLACK, linewidth=0.5, alpha=0.3)
         for sign, colour, branch in ((1, BLUE, "rising"), (-1, RED, "falling")):
@@ -118,8 +127,7 @@ class LoopFit(Reported):
 
 def _summary(loop_fit: LoopFit, shown: HysteresisFit | None) -> list[str]:
     loop = loop_fit.loop
-    direction = motion_direction(loop.friction_path.displacement(loop.recording), loop.recording.columns.get("time"))
-    up, down = (int(np.count_nonzero((direction == sign) & loop.fitted_rows)) for sign in (1, -1))
+    up, down = (int(np.count_nonzero((loop.direction == sign) & loop.fitted_rows)) for sign in (1, -1))
     rows = f"{up} rows of the rising branch and {down} of the falling branch are used, of {len(loop.recording)}."
     if shown is None:
         return [rows]
@@ -140,16 +148,12 @@ def _notes(loop_fit: LoopFit) -> list[str]:
 
 
 def _law_table(loop_fit: LoopFit) -> Table:
-    fits = loop_fit.fits
-    columns: dict[str, Any] = {}
-    if loop_fit.loop.repeat is not None:
-        columns |= {
-            "rms error on second run": TableColumn([f.repeat_rmse for f in fits], "N", digits=3, short="on second run"),
-            "rms error on second run without friction": TableColumn(
-                [f.repeat_rmse_without_friction for f in fits], "N", digits=3, brief=False
-            ),
-            "repeatability": TableColumn([f.repeatability for f in fits], "N", digits=3, brief=False),
-        }
+    fits, repeat = loop_fit.fits, "rms error on second run"
+    columns: dict[str, Any] = {} if loop_fit.loop.repeat is None else {
+        repeat: TableColumn([f.repeat_rmse for f in fits], "N", digits=3, short="on second run"),
+        f"{repeat} without friction": TableColumn([f.repeat_rmse_without_friction for f in fits], "N", "", 3, False),
+        "repeatability": TableColumn([f.repeatability for f in fits], "N", digits=3, brief=False),
+    }  # fmt: skip
     columns |= {
         "branch gap without friction": TableColumn([f.gap for f in fits], "N", brief=False),
         "remaining branch gap": TableColumn([f.residual_gap for f in fits], "N", digits=3),
@@ -175,3 +179,35 @@ def compared_laws(name: str, title: str, fits: Sequence[FrictionFit], own: dict[
 def friction_tables(chapter: Chapter) -> list[Table]:
     """Return the tables of the chapter of a friction, as parts of another one."""
     return [dataclasses.replace(table, name=f"friction-{table.name}", brief=0) for table in chapter.tables]
+
+
+TURNING_POINTS, ROWS_PER_LEG = (2.0, -2.0, -0.6, -1.1, -0.6, 0.5, -0.3, 0.5, 2.0), 200
+"""Turning points of the path of `plot_loops`, as multiples of the presliding distance of the law, and rows between two
+of them (chosen)."""
+INNER_LOOPS = ((3, 5), (6, 8))
+"""Legs of the path that form the inner loops, first and last plus one."""
+
+
+def loop_path(distance: float) -> Array:
+    """A path [m] from rest around an outer loop with two inner loops, scaled by a distance [m]."""
+    turning_points = itertools.pairwise((0.0, *TURNING_POINTS))
+    legs = [np.linspace(a, b, ROWS_PER_LEG, endpoint=False) for a, b in turning_points]
+    return distance * np.concatenate([*legs, [TURNING_POINTS[-1]]])
+
+
+def plot_loops(friction: Friction, axis: Axis = MILLIMETRES) -> Any:
+    """Friction force over displacement: from rest, around the outer loop, through two inner loops. Returns a Matplotlib
+    figure."""
+    path = loop_path(friction.presliding_distance or 1e-3)
+    force = friction.force_along(path)
+    outer, parts = force.copy(), [(force, 0, 1, "from rest", 1)]
+    for (a, b), name in zip(INNER_LOOPS, ("inner loops", ""), strict=True):
+        outer[a * ROWS_PER_LEG + 1 : b * ROWS_PER_LEG] = np.nan
+        parts.append((force, a, b, name, 2))
+    figure, axes = new_figure(width=5.6, height=3.9)
+    for values, a, b, name, style in [(outer, 1, len(TURNING_POINTS), "outer loop", 0), *parts]:
+        rows, label = slice(a * ROWS_PER_LEG, b * ROWS_PER_LEG + 1), name or None
+        axes.plot(path[rows] * axis.factor, values[rows], color=LINES[style], linestyle=DASHES[style], label=label)
+    axes.set(xlabel=axis.label, ylabel="friction [N]", title=type(friction).__name__)
+    legend_below(figure, axes, 3)
+    return figure

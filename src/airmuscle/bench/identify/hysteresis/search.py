@@ -13,16 +13,8 @@ from ....recording import Recording
 from ...segment import Mask, motion_direction
 from ..identifiability import UndeterminedCombination, analyse_identifiability
 from ..model_evidence import effective_sample_size
-from .loop_data import (
-    MILLIMETRES,
-    Axis,
-    DataLimits,
-    FrictionPath,
-    StaticCurve,
-    combine_limits,
-    data_limits,
-    resolved_stiffness,
-)
+from . import loop_data as data
+from .loop_data import MILLIMETRES, Axis, DataLimits, combine_limits
 
 BIN_COUNT = 24
 """Bins along the path in which branches are compared (chosen)."""
@@ -131,7 +123,7 @@ JACOBIAN_TOLERANCE = 1e-4
 
 
 def make_loop_series(
-    recording: Recording, static_curve: StaticCurve, friction_path: FrictionPath,
+    recording: Recording, static_curve: data.StaticCurve, friction_path: data.FrictionPath,
     fitted_rows: Mask | None,
 ) -> LoopSeries:  # fmt: skip
     """The arrays of a run for a fit of friction. Raises IdentificationError where a displacement is missing."""
@@ -142,12 +134,12 @@ def make_loop_series(
     if (gaps := np.flatnonzero(~np.isfinite(path))).size:
         where = f"{recording.origin}, row {gaps[0] + 1}"
         raise IdentificationError(f"{where}: the displacement is missing, along which friction acts. Remove such rows.")
-    limits = data_limits(recording["force"], path, time, rows)
+    limits = data.data_limits(recording["force"], path, time, rows)
     series = LoopSeries(
         recording.origin, path, time, target, matrix, rows, motion_direction(path, time), limits,
         recording.columns.get("pressure"), friction_path.axis,
     )  # fmt: skip
-    stiffness = resolved_stiffness(path[rows], series.fitted_residuals(None))
+    stiffness = data.resolved_stiffness(path[rows], series.fitted_residuals(None))
     return dataclasses.replace(series, limits=dataclasses.replace(series.limits, stiffness=stiffness))
 
 

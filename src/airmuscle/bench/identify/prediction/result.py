@@ -128,11 +128,9 @@ STEADY_PRESSURE = 0.03
 def prediction_chapters(model: str, thing: Any, predictions: Sequence[RecordPrediction]) -> list[Chapter]:
     """Return the chapters of predicted records, the errors of all and one for each; `model` names the file of the
     muscle or plant `thing`, whose references are cited."""
-    chapters = [_overview(model, thing, predictions)]
-    for i, each in enumerate(predictions, 1):
-        title = f"Record {i}: {each.origin}"
-        chapters.append(dataclasses.replace(_record(each).among(suffix=f"-{i}"), title=title, brief=False))
-    return chapters
+    records = [dataclasses.replace(_record(each).among(suffix=f"-{i}"), title=f"Record {i}: {each.origin}", brief=False)
+               for i, each in enumerate(predictions, 1)]  # fmt: skip
+    return [_overview(model, thing, predictions), *records]
 
 
 def _error_table(predictions: Sequence[RecordPrediction]) -> Table:
