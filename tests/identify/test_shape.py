@@ -6,6 +6,8 @@ surface breaks them the place is named. A conversion of one law into another say
 
 from __future__ import annotations
 
+import pickle
+
 import numpy as np
 import pytest
 
@@ -40,6 +42,14 @@ def test_few_and_noisy_points_bend_a_free_surface_and_not_a_shaped_one():
         return float(np.sqrt(np.mean((law.force(*grid) - MUSCLE.force(*grid)) ** 2)))
 
     assert distance(found.model) < distance(fit(blank_surface(4), data).model)
+
+
+def test_a_shaped_surface_is_shown_by_print_and_in_a_notebook_also_after_it_was_sent():
+    found = pickle.loads(pickle.dumps(fit_shape_constrained(blank_surface(4), points(40, 60.0))))
+    text = " ".join(str(found).split())
+    assert f"{found.rmse:.4g} N with constraints, {found.unconstrained_rmse:.4g} N without" in text
+    assert str(found.unconstrained_violations[0])[:40] in text
+    assert "<img" in found._repr_html_()
 
 
 def test_conditions_that_hold_anyway_change_nothing():

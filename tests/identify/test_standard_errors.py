@@ -18,7 +18,6 @@ from scipy.stats import t as student
 
 from airmuscle.bench import Fit, RunSplit, bootstrap, confidence_band, fit, profile, write
 from airmuscle.bench.identify import NORMAL_QUANTILE, RELIABLE_GROUPS, Uncertainty, blank_surface
-from airmuscle.bench.identify.uncertainty_chapter import uncertainty_chapter
 from airmuscle.physics import Braid, TonduLopez2000
 from airmuscle.recording import Recording
 
@@ -245,7 +244,7 @@ def test_a_bootstrap_of_few_runs_is_refused_or_has_its_caution():
     assert drawn.group_count < RELIABLE_GROUPS
     assert "hold less often than stated" in drawn.caution
     uncertainty = Uncertainty(found, drawn)
-    assert drawn.caution in uncertainty_chapter(uncertainty).paragraphs[0]
+    assert drawn.caution in uncertainty.chapter().paragraphs[0]
     halves = [run.rows(slice(start, None, 2)) for run in runs for start in (0, 1)]
     many = bootstrap(fit(blank_surface(1, 4000), halves), halves, by=RunSplit(), refits=50)
     assert (many.group_count, many.caution) == (RELIABLE_GROUPS, "")

@@ -26,7 +26,7 @@ from airmuscle.bench import (
     fit_hysteresis,
     fit_jointly,
 )
-from airmuscle.bench.identify import Uncertainty, VolumePoints, fit_volume
+from airmuscle.bench.identify import VolumePoints, fit_volume
 from airmuscle.bench.identify.campaign import ValidationRow
 from airmuscle.bench.identify.campaign.campaign_chapters import _validation_table
 from airmuscle.bench.identify.dynamic.dynamic_chapter import dynamic_chapters
@@ -34,7 +34,6 @@ from airmuscle.bench.identify.experiment_design import run_table
 from airmuscle.bench.identify.hysteresis.hysteresis_chapter import joint_friction_chapter
 from airmuscle.bench.identify.prediction import prediction_chapters
 from airmuscle.bench.identify.static_fit_chapter import _rows
-from airmuscle.bench.identify.uncertainty_chapter import uncertainty_chapter
 from airmuscle.design import LiftRequirement, SizingConditions, size_muscles
 from airmuscle.design.sizing import scenario_valves
 from airmuscle.design.sizing.result import _valve_settings
@@ -211,7 +210,7 @@ def test_the_intervals_of_a_fit_are_those_of_its_standard_errors_and_of_its_boot
                       "force": np.asarray(law.force(3e5, contraction)) + noise}, "a", {"resting_length": LENGTH})  # fmt: skip
     found = fit(law, data)
     draws = Bootstrap(found, found.values * np.linspace(0.9, 1.2, 101)[:, None], 5, 0)
-    chapter = uncertainty_chapter(Uncertainty(found, draws))
+    chapter = draws.chapter()
     columns = chapter.tables[0].columns
     low, high = np.transpose(columns["by standard error"].values)
     assert low == pytest.approx(found.values - 1.96 * found.standard_errors)
@@ -219,6 +218,8 @@ def test_the_intervals_of_a_fit_are_those_of_its_standard_errors_and_of_its_boot
     low, high = np.transpose(columns["by bootstrap"].values)
     assert low == pytest.approx(found.values * 0.9075)
     assert high == pytest.approx(found.values * 1.1925)
+    assert "Bootstrap: 101 refits" in str(pickle.loads(pickle.dumps(draws)))
+    assert "<table" in draws._repr_html_()
     rows = _rows(found).columns
     assert np.array(rows["residual"]) == pytest.approx(np.array(rows["modelled force"]) - data["force"])
 

@@ -1,16 +1,14 @@
 """Bootstrap of a fit: refits to resampled groups of rows (runs, levels or specimens)."""
 
 import contextlib
-import dataclasses
 from collections.abc import Callable, Sequence
 
 import numpy as np
 import numpy.typing as npt
 
-from ...core import Array, Hint, IdentificationError, ShortRepr, check_whole, tree
+from ...core import Array, Hint, IdentificationError, check_whole
 from ...engine.distribution import DistributedCalls
 from ...engine.processes import Workers, check_running, process_pool
-from ...physics.muscle.characteristic.base import Characteristic
 from ...recording import Recording
 from .cross_validation import GroupSplit, LevelSplit, default_split
 from .fit_points import FitPoints
@@ -18,57 +16,13 @@ from .group_refits import GroupRefits, KnownMinima, RowIndices
 from .problem import FitProblem
 from .result import Fit
 from .solver import design_matrix, is_linear, solve_iteratively, solve_least_squares
+from .uncertainty import MIN_GROUPS, RELIABLE_GROUPS, Bootstrap
 from .weighting import LeastSquares
 
-MIN_GROUPS = 5
-"""Minimum number of groups. G groups give (2G - 1)!/(G! (G - 1)!) different samples, 35 with G = 4; an end of a 95 %
-interval needs 40. Reference: Hall (1992), The Bootstrap and Edgeworth Expansion, Springer, appendix I."""
-RELIABLE_GROUPS = 12
-"""Number of groups from which the intervals need no caution (chosen: in a study of errors that a run shares, 95 %
-intervals of a plane held 59 % with 3 runs, 84 % with 5, 89 % with 8, 91 % with 12 and 92 % with 24)."""
 REFITS_OF_A_TASK = 100
 """Refits of a law that is not linear in its parameters, that are computed one after the other (chosen)."""
 _MIN_EIGENVALUE = 1e-10
 """Minimum eigenvalue of the normal matrix of a refit, in the basis in which that of all rows is 1 (chosen)."""
-
-
-@dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class Bootstrap(ShortRepr):
-    """Parameters of every refit, shape (refits, P); a row of NaN where the drawn groups do not determine them."""
-
-    fit: Fit
-    values: Array
-    group_count: int
-    seed: int
-
-    @property
-    def standard_errors(self) -> Array:
-        """Standard deviation of every parameter over the refits, shape (P,)."""
-        return np.asarray(np.nanstd(self.values, axis=0, ddof=1))
-
-    @property
-    def caution(self) -> str:
-        """What limits the intervals, as a phrase; empty with enough groups."""
-        if self.group_count >= RELIABLE_GROUPS:
-            return ""
-        return (
-            f"with fewer than {RELIABLE_GROUPS} groups the intervals hold less often than stated (84 % instead of 95 % "
-            f"with {MIN_GROUPS} in a study); the standard errors of the fit contain the small number"
-        )
-
-    @property
-    def failed_refits(self) -> int:
-        """Number of refits whose groups do not determine the parameters."""
-        return int(np.isnan(self.values).any(axis=1).sum())
-
-    def intervals(self, level: float = 0.95) -> Array:
-        """Percentile confidence interval of each parameter, lower and upper limit, shape (P, 2)."""
-        return np.asarray(np.nanquantile(self.values, [(1 - level) / 2, (1 + level) / 2], axis=0).T)
-
-    def model(self, refit: int) -> Characteristic:
-        """The law with the parameters of one refit."""
-        law: Characteristic = tree.unflatten(self.fit.problem.law, self.fit.problem.leaf_values(self.values[refit]))
-        return law
 
 
 def bootstrap(

@@ -6,13 +6,14 @@ The shortening L_0 - L of a specimen is taken as measured, and its resting lengt
 
 import dataclasses
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from ...core import IdentificationError, ParameterError, ShortRepr
 from ...physics.muscle.characteristic.base import Characteristic
 from ...recording import Recording
+from ...report.chapter import Chapter, Table, TableColumn
 from .candidates import blank_surface
 from .cross_validation import specimen_name
 from .fit_points import FitPoints
@@ -202,3 +203,21 @@ def _newton_step(
         change=-(gradient + variance * offset / prior_std**2) / curvature,
         standard_error=float(np.sqrt(variance / curvature)),
     )
+
+
+def length_error_chapter(errors: Sequence[LengthError]) -> Chapter:
+    """Return the chapter of the estimated errors of recorded resting lengths."""
+    columns: dict[str, Any] = {
+        "specimen": [each.specimen for each in errors],
+        "resting length": TableColumn([each.resting_length for each in errors], "m", "mm"),
+        "offset": TableColumn([each.offset for each in errors], "m", "mm", digits=2),
+        "standard error": TableColumn([each.standard_error for each in errors], "m", "mm", digits=1),
+        "rms residual before": [each.rmse_before for each in errors],
+        "rms residual after": [each.rmse_after for each in errors],
+    }
+    return Chapter(
+        "length-errors", "Errors of recorded resting lengths",
+        summary=f"As if {', or '.join(map(str, errors))}. Normal prior with a standard deviation of "
+        f"{PRIOR_STD * 1e3:g} mm (chosen).",
+        tables=(Table("resting-lengths", "Resting lengths", columns, "Residuals in SI units.", brief=len(errors)),),
+    )  # fmt: skip

@@ -23,8 +23,7 @@ from . import Band, Fit, confidence_band
 from .candidates import evaluate_force
 from .cross_validation import LEVEL_TOLERANCE, MAX_LEVEL_WIDTH, held_levels, is_pressure_ramp, levels_of
 from .problem import with_length
-from .surface.shape import shape_violations_of_fit
-from .uncertainty_chapter import violation_table
+from .surface.violations import shape_violations_of_fit, violation_table
 from .volume_fit import defect_values
 
 MAX_ISOBARS, MAX_CURVES = 8, 5

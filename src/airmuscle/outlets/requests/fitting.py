@@ -9,11 +9,13 @@ import numpy as np
 from ...bench.identify import UNCENSORED, Fit, bootstrap, estimate_length_error, fit, profile, weakly_determined
 from ...bench.identify.candidates import Candidate, standard_candidates
 from ...bench.identify.compare_chapter import LawSelection, compare_chapters, select_law
+from ...bench.identify.length_errors import length_error_chapter
 from ...bench.identify.problem import fitted_quantity_of
 from ...bench.identify.specimen_errors import odd_specimen_notes, ranked_specimen_errors, specimen_errors
 from ...bench.identify.static_fit_chapter import fit_chapter
-from ...bench.identify.surface.shape import fit_shape_constrained, shape_violations_of_fit
-from ...bench.identify.uncertainty_chapter import Uncertainty, length_error_chapter, shape_chapter, uncertainty_chapter
+from ...bench.identify.surface.shape import fit_shape_constrained
+from ...bench.identify.surface.violations import shape_violations_of_fit
+from ...bench.identify.uncertainty import Uncertainty
 from ...core import ParameterError
 from ...engine.processes import Workers
 from ...files.library import Entry, find_initial_law, missing_geometry, resting_lengths
@@ -128,13 +130,13 @@ def _more(
             pressure, contraction = np.array(request.free_contraction).T
             free = Recording({"pressure": pressure, "contraction": contraction}, "--free-contraction")
         shaped = fit_shape_constrained(found.model, recordings, free=free)
-        chapters.append(shape_chapter(shaped, found, len(request.free_contraction)))
+        chapters.append(shaped.chapter(found))
         note = f"{entry.note} With shape constraints: rms error {shaped.rmse:.4g} N."
         entry = dataclasses.replace(entry, characteristic=shaped.model, note=note, error_band=None)
     else:
         notes = list(map(str, shape_violations_of_fit(found)))
     if uncertainty.requested:
-        chapters.append(uncertainty_chapter(uncertainty))
+        chapters.append(uncertainty.chapter())
     if request.length_error:
         errors = [estimate_length_error(found.model, recordings, name) for name in request.length_error]
         chapters.append(length_error_chapter(errors))

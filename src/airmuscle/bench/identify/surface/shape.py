@@ -11,19 +11,23 @@ import dataclasses
 import itertools
 import math
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.polynomial import chebyshev, polynomial
 
-from ....core import Array, IdentificationError, ShortRepr, autodiff, check_whole
-from ....physics.muscle.characteristic import ContractileSurface, ForceLaw, ValidityRange, exponents
-from ....physics.muscle.characteristic.base import ContractionLaw
+from ....core import DASHES, LINES, Array, IdentificationError, legend_outside, new_figure
+from ....physics.muscle.characteristic import ContractileSurface, ForceLaw, exponents
 from ....recording import Recording
+from ....report.chapter import Chapter, NamedValue, Plot
+from ...reported import Reported
+from ..cross_validation import levels_of
 from ..result import Fit
 from ..static_fit import fit
 from ..variable_projection import shortened_step
-from .exponential import LoadRange, SurfaceFit, SurfaceProblem
+from .exponential import SurfaceFit, SurfaceProblem
+from .violations import MonotonicityViolation, find_shape_violations, violation_table
 
 Columns = Callable[[Array, int], Any]
 """Values (N, degree + 1) at N points of the polynomials of a basis up to a degree, or of their slopes."""
@@ -76,88 +80,9 @@ def solve_constrained_least_squares(matrix: Array, right: Array, rows: Array, mi
     return np.asarray(solve_triangular(r, -residual[:-1] / residual[-1] + unconstrained))
 
 
-_ROUNDING, MIN_SLOPE = 1e-9, 1e-9
-"""Slopes below this fraction of the maximum slope are rounding errors, and minimum slope of v, and of a force surface
-by its maximum force, on the validity range scaled to -1..1, so that rounding cannot change the sign; chosen."""
-
-
-@dataclasses.dataclass(frozen=True)
-class MonotonicityRule:
-    """A forbidden sign of the slope of the `quantity` that a law gives, with respect to one of its arguments."""
-
-    description: str
-    """A violation of the rule in words."""
-    quantity: str
-    argument: int
-    """0 pressure, 1 the second argument."""
-    sign: float
-    """Sign of a slope that violates the rule."""
-
-
-@dataclasses.dataclass(frozen=True)
-class MonotonicityViolation:
-    """One connected region of a validity range where a law violates a rule."""
-
-    rule: MonotonicityRule
-    pressure: tuple[float, float]
-    """Limits of the region in gauge pressure [Pa]."""
-    second_argument: tuple[float, float]
-    """Limits of the region in contraction [1], or in force [N] for a law that gives contraction."""
-    area_fraction: float
-    """Fraction of the validity range that the region covers [1]."""
-    worst_point: tuple[float, float]
-    """Gauge pressure [Pa] and second argument at the maximum violation."""
-    worst_slope: float
-    """The slope there [SI]."""
-
-    def __str__(self) -> str:
-        (p0, p1), (low, high) = self.pressure, (self._format_second(v) for v in self.second_argument)
-        share = f"{100 * self.area_fraction:.1f} %" if self.area_fraction >= 5e-4 else "less than 0.1 %"
-        return (
-            f"{self.rule.description} between {p0 / 1e3:.4g} and {p1 / 1e3:.4g} kPa, {low} and {high} "
-            f"({share} of the validity range), most at {self.worst_point[0] / 1e3:.4g} kPa and "
-            f"{self._format_second(self.worst_point[1])}"
-        )
-
-    def _format_second(self, value: float) -> str:
-        return f"{100 * value:.2f} %" if self.rule.quantity == "force" else f"{value:.0f} N"
-
-
-def find_violations(
-    law: Any, rules: Sequence[MonotonicityRule], pressure: Array, second_argument: Array
-) -> tuple[MonotonicityViolation, ...]:
-    """The regions where exact slopes at grid points violate one of the rules, largest first. `pressure` [Pa] and
-    `second_argument` (contraction [1] or force [N]) are grids, shape (N, M) each."""
-    from scipy import ndimage
-
-    violations: list[MonotonicityViolation] = []
-    for rule in rules:
-        slope = np.asarray(autodiff.derivative(law, rule.quantity, pressure, second_argument, wrt=rule.argument))
-        excess = rule.sign * slope
-        labels, count = ndimage.label((excess > 0.0) & (excess > _ROUNDING * np.abs(excess).max()))
-        for inside in (labels == label for label in range(1, count + 1)):
-            worst = np.unravel_index(int(np.argmax(np.where(inside, excess, -np.inf))), excess.shape)
-            arguments = pressure, second_argument
-            first, second = ((float(values[inside].min()), float(values[inside].max())) for values in arguments)
-            point, share = (float(pressure[worst]), float(second_argument[worst])), float(inside.mean())
-            violations.append(MonotonicityViolation(rule, first, second, share, point, float(slope[worst])))
-    return tuple(sorted(violations, key=lambda v: -v.area_fraction))
-
-
-RISES_WITH_FORCE = MonotonicityRule("contraction rises with force", "contraction", 1, 1.0)
-CONTRACTION_FALLS = MonotonicityRule("contraction falls with pressure", "contraction", 0, -1.0)
-RISES_WITH_CONTRACTION = MonotonicityRule("force rises with contraction", "force", 1, 1.0)
-FORCE_FALLS = MonotonicityRule("force falls with pressure", "force", 0, -1.0)
-
-
-def find_monotonicity_violations(
-    law: ContractionLaw, validity_range: LoadRange | None = None, points: tuple[int, int] = (201, 201)
-) -> tuple[MonotonicityViolation, ...]:
-    """The regions of a validity range where k rises with F or falls with p, largest first. `validity_range` is by
-    default that of the law. Exact slopes are evaluated on an even grid of `points` pressures and forces, edges
-    included."""
-    validity_range = validity_range or LoadRange.from_law(law)
-    return find_violations(law, (RISES_WITH_FORCE, CONTRACTION_FALLS), *validity_range.grid(*points))
+MIN_SLOPE = 1e-9
+"""Minimum slope of v, and of a force surface by its maximum force, on the validity range scaled to -1..1, so that
+rounding cannot change the sign (chosen)."""
 
 
 def fit_monotone(
@@ -201,40 +126,63 @@ def slope_constraints(pressure_degree: int, force_degree: int, cells: tuple[int,
     return np.vstack([-by_pressure, by_force])
 
 
-LEAST_SHARE = 1e-3
-"""Share of the validity range below which a region that violates the shape of a fitted law is not named (chosen)."""
+MAX_CURVES, POINTS = 5, 161
+"""Maximum number of pressures in the figure, and points of a curve (chosen)."""
 
 
-def find_shape_violations(
-    law: ForceLaw, validity_range: ValidityRange, *, points: int = 101
-) -> tuple[MonotonicityViolation, ...]:
-    """The regions of a validity range where a force falls with pressure or rises with contraction, largest first. Exact
-    slopes are evaluated on an even grid of `points` pressures and contractions."""
-    check_whole("find_shape_violations", "points", points, 2)
-    sides = (np.linspace(*validity_range.pressure, points), np.linspace(*validity_range.contraction, points))
-    return find_violations(law, (FORCE_FALLS, RISES_WITH_CONTRACTION), *np.meshgrid(*sides, indexing="ij"))
-
-
-def shape_violations_of_fit(fit: Fit) -> tuple[MonotonicityViolation, ...]:
-    """The shape violations of a fitted law in the range of its data; none for laws that are no closed-form force."""
-    law, varies = fit.model, all(low < high for low, high in fit.data_ranges.values())
-    if not isinstance(law, ForceLaw) or not law.traceable or not varies:
-        return ()
-    found = find_shape_violations(law, fit.validity_range)
-    return tuple(each for each in found if each.area_fraction >= LEAST_SHARE)
-
-
-@dataclasses.dataclass(frozen=True, repr=False)
-class ShapeConstrainedFit(ShortRepr):
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class ShapeConstrainedFit(Reported):
     """A shape-constrained surface and its error, with the error and the violations of the unconstrained surface."""
 
     model: ContractileSurface
     rmse: float
     """Root mean square error over the fitted rows [N]."""
-    unconstrained_rmse: float
-    """The same without constraints [N]."""
+    unconstrained: Fit
     unconstrained_violations: tuple[MonotonicityViolation, ...]
     """The regions where the unconstrained surface violates a rule."""
+    free_points: int = 0
+    """Number of points of free contraction."""
+
+    @property
+    def unconstrained_rmse(self) -> float:
+        """Root mean square error without constraints [N]."""
+        return self.unconstrained.rmse
+
+    def chapter(self, fit: Fit | None = None) -> Chapter:
+        """The description of the surface and the cost of its constraints. `fit` is the fit without constraints that the
+        figure compares, such as one with weights; by default that of the same rows."""
+        zero = f", and it is zero at {self.free_points} points of free contraction" if self.free_points else ""
+        violations, compared = self.unconstrained_violations, fit or self.unconstrained
+        verdict = "violates them in the regions of the table" if violations else "satisfies these constraints too"
+        title = "Monotonicity violations of the unconstrained surface"
+        figure = partial(_surface_figure, self.model, compared)
+        return Chapter(
+            "shape", "Shape-constrained surface",
+            summary=(
+                f"Rms error {self.rmse:.4g} N with constraints, {self.unconstrained_rmse:.4g} N without.",
+                "The muscle file contains the constrained surface: within its validity range the force does not "
+                f"decrease with pressure and does not increase with contraction{zero}. The unconstrained surface "
+                f"{verdict}. The uncertainties and bands are those of the unconstrained surface.",
+            ),
+            values=(NamedValue("rms error", self.rmse, "N", brief=False),
+                    NamedValue("rms error without constraints", self.unconstrained_rmse, "N", brief=False)),
+            tables=(violation_table(violations, "shape-loose", title),) if violations else (),
+            plots=(Plot("shaped", "Solid: constrained. Dashed: unconstrained.", figure),),
+            notes=tuple(f"unconstrained: {each}" for each in violations),
+        )  # fmt: skip
+
+
+def _surface_figure(shaped: ForceLaw, unconstrained: Fit) -> Any:
+    figure, axes = new_figure(width=6.6, height=3.9)
+    contraction = np.linspace(*unconstrained.data_ranges["contraction"], POINTS)
+    for i, pressure in enumerate(levels_of(unconstrained.recording["pressure"], MAX_CURVES)):
+        colour, rows = LINES[i % len(LINES)], np.full(POINTS, pressure)
+        solid, dashed = {"label": f"{pressure / 1e3:.4g} kPa"}, {"linestyle": DASHES[1]}
+        for law, style in ((shaped, solid), (unconstrained.model, dashed)):
+            axes.plot(100 * contraction, law.force(rows, contraction), color=colour, **style)
+    axes.set(xlabel="contraction [%]", ylabel="force [N]")
+    legend_outside(axes, title="gauge pressure")
+    return figure
 
 
 def fit_shape_constrained(
@@ -260,7 +208,7 @@ def fit_shape_constrained(
     model = dataclasses.replace(surface, coefficients=tuple((scale * scaled).tolist()))
     rmse = float(np.sqrt(np.mean((matrix @ (scale * scaled) - target) ** 2)))
     violations = find_shape_violations(surface, surface.validity_range)
-    return ShapeConstrainedFit(model, rmse, unconstrained.rmse, violations)
+    return ShapeConstrainedFit(model, rmse, unconstrained, violations, 0 if free is None else len(free))
 
 
 def _free_contraction_basis(law: ContractileSurface, free: Recording | None) -> Array:
