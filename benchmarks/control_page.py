@@ -13,14 +13,8 @@ from typing import Any
 import numpy as np
 
 from airmuscle.design import SEALED_SEED, BenchmarkResult, Group, LearningCurve
-from airmuscle.design.control_benchmark.chapter import (
-    error_table,
-    order_table,
-    ranking_table,
-    search_table,
-    truth_table,
-)
 from airmuscle.design.control_benchmark.commissioning import SEARCH_SPREAD
+from airmuscle.design.control_benchmark.tables import search_table, truth_table
 from airmuscle.report import Table, shown_columns
 
 SINES = {0.5: 0.25, 1.0: 0.45, 2.0: 0.9, 3.0: 1.3}
@@ -65,13 +59,13 @@ def introduction(results: Mapping[str, BenchmarkResult], settings: Any, cpu: flo
         "",
         *(f"* {kind} valves: {convergence(each)}" for kind, each in results.items()),
         "",
-        *table(truth_table(result)),
+        *table(truth_table(result.joint)),
     ]
 
 
 def convergence(result: BenchmarkResult) -> str:
     """How many searches have converged, and the controllers whose searches differ by more than the stated spread."""
-    found = search_table(result)
+    found = search_table(result.joint, result.results)
     if found is None:
         return "nothing was tuned."
     ended = [list(map(int, str(each).split(" of "))) for each in found.columns["converged"]]
@@ -98,21 +92,21 @@ def part(result: BenchmarkResult) -> list[str]:
     """The tables of one joint."""
     lines = []
     for group in result.groups:
-        lines += [f"### {sentence(group)[:-1]}", "", *table(ranking_table(result, group))]
-        lines += table(order_table(result, group)) if len(result.truths) > 1 else []
-        lines += table(error_table(result, "rmse", group))
+        lines += [f"### {sentence(group)[:-1]}", "", *table(result.ranking_table(group))]
+        lines += table(result.order_table(group)) if len(result.truths) > 1 else []
+        lines += table(result.error_table("rmse", group))
         for metric in FURTHER:
-            lines += table(error_table(result, metric, group), digits=3)
-    searched = search_table(result)
+            lines += table(result.error_table(metric, group), digits=3)
+    searched = search_table(result.joint, result.results)
     return [*lines, *(["### Searches", "", *table(searched)] if searched else [])]
 
 
 def sealed(result: BenchmarkResult) -> list[str]:
     """Ranking and errors of both groups on the truth that no tuning has seen."""
     alone = on(result, ["sealed truth"])
-    lines = table(truth_table(alone))
+    lines = table(truth_table(alone.joint))
     for group in alone.groups:
-        lines += [*table(ranking_table(alone, group)), *table(error_table(alone, "rmse", group))]
+        lines += [*table(alone.ranking_table(group)), *table(alone.error_table("rmse", group))]
     return lines
 
 

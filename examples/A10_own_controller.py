@@ -15,7 +15,6 @@ from airmuscle.design import (
     benchmark_controllers,
     find_tasks,
     proportional_joint,
-    run_plot,
     standard_contenders,
 )
 from airmuscle.engine import ControlLaw
@@ -71,5 +70,5 @@ for name, score in result.scores().items():
         f"{task} {error.median:.2f} ({error.low:.2f} to {error.high:.2f}) degrees" for task, error in errors
     )
     print(f"{name}: score {score.median:.2f}; rms error {texts}")
-plotting.save(run_plot(result, [task.name for task in tasks]).figure, "own_controller.png")
+plotting.save(result.run_plot([task.name for task in tasks]).draw(), "own_controller.png")
 print("wrote own_controller.png")

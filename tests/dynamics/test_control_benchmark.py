@@ -7,6 +7,7 @@ that sees the truth is counted in the group `commissioned` alone. Equal seeds gi
 from __future__ import annotations
 
 import math
+import pickle
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -79,6 +80,13 @@ def only(result: BenchmarkResult, contender: str, task: str, group=Group.MODELS)
 def result():
     contenders = (*chosen("PID", "feed-forward + PID"), MINE)
     return untuned(contenders, (SHORT, STEP))
+
+
+def test_the_result_is_printed_with_the_ranking_of_its_controllers(result):
+    text = str(pickle.loads(pickle.dumps(result)))
+    assert text.startswith(f"Control of an antagonistic joint with {JOINT.name}\n3 controllers, 2 tasks")
+    assert f"Smallest score, {Group.MODELS}: {next(iter(result.scores()))}." in text
+    assert "<img" in result._repr_html_()
 
 
 # The truths

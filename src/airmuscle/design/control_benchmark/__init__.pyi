@@ -1,13 +1,9 @@
-from .benchmark import BenchmarkResult as BenchmarkResult
 from .benchmark import BenchmarkRun as BenchmarkRun
 from .benchmark import ContenderResult as ContenderResult
 from .benchmark import Group as Group
 from .benchmark import RunKey as RunKey
-from .benchmark import Spread as Spread
 from .benchmark import benchmark_contender as benchmark_contender
-from .benchmark import benchmark_controllers as benchmark_controllers
 from .benchmark import run_task as run_task
-from .chapter import benchmark_chapter as benchmark_chapter
 from .commissioning import SEARCH_SPREAD as SEARCH_SPREAD
 from .commissioning import Commissioning as Commissioning
 from .commissioning import alike as alike
@@ -28,10 +24,11 @@ from .joints import on_off_joint as on_off_joint
 from .joints import proportional_joint as proportional_joint
 from .learning import LearningCurve as LearningCurve
 from .learning import learn as learn
-from .plots import error_plot as error_plot
 from .plots import line_style as line_style
 from .plots import marker_style as marker_style
-from .plots import run_plot as run_plot
+from .result import BenchmarkResult as BenchmarkResult
+from .result import Spread as Spread
+from .result import benchmark_controllers as benchmark_controllers
 from .signals import RATED_STROKES as RATED_STROKES
 from .signals import TrackingMetrics as TrackingMetrics
 from .signals import angular_acceleration as angular_acceleration

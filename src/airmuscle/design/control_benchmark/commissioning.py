@@ -20,7 +20,8 @@ from .signals import task_loop, task_signals, valve_travel
 from .tasks import DEGREE, TUNING_BEGIN, ControlTask
 from .truths import BenchmarkTruth
 
-SETS_PER_GAIN, COMMISSIONING_RUNS = 300, 60
+SETS_PER_GAIN: int = 300
+COMMISSIONING_RUNS: int = 60
 """Most sets of gains for each gain of a search, and most runs of a commissioning (chosen)."""
 TUNING_INTEGRATOR = RungeKutta4(5e-4)
 """Integrator of the searches (chosen); the median tracking index differs by less than 1e-6 from Rodas4(1e-6)."""

@@ -1,27 +1,12 @@
 """Figures of the control benchmark: errors of all tasks, runs of some tasks, learning curves."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from ...core import BLACK, DASHES, LINES, MARKERS, legend_below, new_figure
-from ...report.chapter import Plot
-from . import BenchmarkResult, Group, LearningCurve, RunKey
-
-MAX_PANELS = 4
-DRAWN = ("step", "sine 2 Hz", "minimum jerk", "load change", "torque disturbance", "sine 1 Hz", "valve stuck", "hold")
-"""Tasks that are drawn over time, the first four that the benchmark contains."""
-
-
-def benchmark_plots(result: BenchmarkResult, curves: Sequence[LearningCurve] = ()) -> tuple[Plot, ...]:
-    """All figures of a benchmark; the runs are those of the group with more knowledge."""
-    groups = result.groups
-    names = [task.name for task in result.tasks]
-    drawn = [name for name in (*DRAWN, *names) if name in names]
-    plots = [error_plot(result, group) for group in groups]
-    plots += [run_plot(result, list(dict.fromkeys(drawn))[:MAX_PANELS], groups[-1])]
-    return (*plots, *([learning_plot(curves)] if curves else []))
+from ...core import BLACK, DASHES, LINES, MARKERS, Array, legend_below, new_figure
+from . import ContenderResult, ControlTask, Group, LearningCurve, RunKey
 
 
 def marker_style(number: int) -> dict[str, Any]:
@@ -37,14 +22,12 @@ def line_style(number: int) -> dict[str, Any]:
     return {"color": LINES[place], "linestyle": DASHES[(place + 3 * turn) % len(DASHES)], "linewidth": 1.0}
 
 
-def error_plot(result: BenchmarkResult, group: Group = Group.MODELS) -> Plot:
-    """The rms error of every controller of a group in every task: median and range over searches and truths."""
-    names, contenders = [task.name for task in result.tasks], result.contenders(group)
+def error_figure(names: Sequence[str], errors: Mapping[str, Array]) -> Any:
+    """The rms error of every controller in every task (tasks, 3): median, smallest and largest."""
     figure, axis = new_figure(height=1.2 + 0.32 * len(names))
     rows = np.arange(len(names))
-    for i, contender in enumerate(contenders):
-        found = np.array([result.metric(contender, name, "rmse", group) for name in names])
-        style, shift = marker_style(i), 0.08 * (i - (len(contenders) - 1) / 2)
+    for i, (contender, found) in enumerate(errors.items()):
+        style, shift = marker_style(i), 0.08 * (i - (len(errors) - 1) / 2)
         axis.plot(found[:, 0], rows + shift, linestyle="none", label=contender, **style)
         axis.hlines(rows + shift, found[:, 1], found[:, 2], color=style["color"], linewidth=0.7)
     axis.set(xscale="log", xlabel="rms error [degree]")
@@ -53,25 +36,18 @@ def error_plot(result: BenchmarkResult, group: Group = Group.MODELS) -> Plot:
     for which in (axis.xaxis.set_major_formatter, axis.xaxis.set_minor_formatter):
         which(lambda value, _: f"{value:g}" if f"{value:.0e}"[0] in "125" else "")
     legend_below(figure, axis, columns=3)
-    caption = (
-        f"Error in each task with {result.joint.name}, {group}: median and range over {result.extent}; "
-        f"{result.joint.valve}."
-    )
-    return Plot(f"errors_{group.name.lower()}", caption, figure)
+    return figure
 
 
-def run_plot(result: BenchmarkResult, names: Sequence[str], group: Group = Group.MODELS) -> Plot:
-    """Angle and error over time of some tasks on the first truth, one column for each."""
-    count, truth, contenders = len(names), result.truths[0], result.contenders(group)
-    shown = [next(each for each in result.results if each.name == name) for name in contenders]
+def run_figure(results: Sequence[ContenderResult], tasks: Sequence[ControlTask], group: Group, truth: str) -> Any:
+    """Angle and error over time of some tasks on a truth, one column for each."""
+    count = len(tasks)
     figure, axes = new_figure(2, count, width=2.4 * max(count, 2), height=4.4, squeeze=False, sharex="col")
-    for column, name in enumerate(names):
-        upper, lower = axes[:, column]
-        task = next(task for task in result.tasks if task.name == name)
+    for (upper, lower), task in zip(axes.T, tasks, strict=True):
         first = task.begin if task.event is None else min(task.begin, task.event)
         limit, begin = 0.0, max(0.0, first - 0.2)  # a little before the event and what is judged
-        for i, each in enumerate(shown):
-            run = each.runs[RunKey(group, truth, name)]
+        for i, each in enumerate(results):
+            run = each.runs[RunKey(group, truth, task.name)]
             if run.recording is None or run.metrics is None:
                 continue
             time = np.asarray(run.recording["time"])
@@ -82,15 +58,15 @@ def run_plot(result: BenchmarkResult, names: Sequence[str], group: Group = Group
             limit = max(limit, run.metrics.rmse)
         time = np.linspace(begin, task.duration, 500)
         upper.plot(time, np.degrees(task.motion.at(time)[0]), color=BLACK, linewidth=0.7, label="set point")
-        upper.set_title(name)
+        upper.set_title(task.name)
         lower.set(xlabel="time [s]", ylim=(-2.5 * limit - 1e-3, 2.5 * limit + 1e-3))
     axes[0, 0].set_ylabel("angle [degree]")
     axes[1, 0].set_ylabel("error [degree]")
     legend_below(figure, axes[0, 0], columns=3)
-    return Plot("runs", f"Angle and error over time, {group}, {truth}, first search.", figure)
+    return figure
 
 
-def learning_plot(curves: Sequence[LearningCurve]) -> Plot:
+def learning_figure(curves: Sequence[LearningCurve]) -> Any:
     """The rms error of repeated trials."""
     figure, axis = new_figure(height=2.8)
     for i, curve in enumerate(curves):
@@ -99,4 +75,4 @@ def learning_plot(curves: Sequence[LearningCurve]) -> Plot:
         axis.semilogy(trials, curve.errors, marker=MARKERS[i % len(MARKERS)], color=LINES[i % len(LINES)], label=label)
     axis.set(xlabel="trial", ylabel="rms error [degree]")
     legend_below(figure, axis)
-    return Plot("learning", "Iterative learning: rms error of repeated trials on a truth.", figure)
+    return figure

@@ -138,8 +138,8 @@ class SizingResult(Reported):
         }
         sources = {name: "chosen" if getattr(conditions, name) == getattr(SizingConditions, name) else "given"
                    for name in rows}  # fmt: skip
-        stated = (("supply pressure", f"{conditions.supply / 1e5:.4g} bar", "given"),)
-        return (*stated, *((*row, sources[name]) for name, row in rows.items()))
+        supply = "supply pressure", f"{conditions.supply / 1e5:.4g} bar", "given"
+        return (supply, *((*row, sources[name]) for name, row in rows.items()))
 
 
 def catalogue() -> tuple[Entry, ...]:
@@ -157,12 +157,9 @@ def load_quietly(name: str) -> Entry:
 
 
 def size_muscles(
-    requirement: Requirement,
-    conditions: SizingConditions,
-    muscles: Iterable[Entry] | None = None,
-    sort: SortKey = by_air,
-    progress: Callable[[float], None] | None = None,
-) -> SizingResult:
+    requirement: Requirement, conditions: SizingConditions, muscles: Iterable[Entry] | None = None,
+    sort: SortKey = by_air, progress: Callable[[float], None] | None = None,
+) -> SizingResult:  # fmt: skip
     """The muscles that meet a requirement, each at its shortest length, and the others with the reason.
 
     `muscles` are library entries; by default those of `catalogue`. Each is tried with `conditions.min_count` to
@@ -206,12 +203,9 @@ def _choices_of(
             reason = str(error).removeprefix(f"{entry.name}: ").rstrip(".")
             failed = UnsuitableMuscle(entry.name, count if isinstance(error, SolveError) else 0, reason)
         else:
-            is_dominated = any(
-                other.length <= choice.length * (1.0 + 1e-9)
-                and (choice.air is None or other.air is None or other.air <= choice.air)
-                for other in choices
-            )
-            choices += [] if is_dominated else [choice]
+            shorter = [other for other in choices if other.length <= choice.length * (1.0 + 1e-9)]
+            if all(choice.air is not None and other.air is not None and other.air > choice.air for other in shorter):
+                choices.append(choice)
     return choices, failed
 
 

@@ -34,18 +34,15 @@ def product_table(choices: Sequence[MuscleChoice]) -> Table:
     first, cycle = [group[0] for group in groups.values()], choices[0].conditions.cycle_time
     volumes = [choice.reference_volume for choice in first]
     lengths = [sorted(choice.length for choice in group) for group in groups.values()]
+    designs, several = [choice.design for choice in first], any(len(each) > 1 for each in lengths)
     columns: dict[str, Any] = {
         "product": [product for product, _ in groups],
         "number": [number for _, number in groups],
         "nominal length": TableColumn([choice.length for choice in first], "m", "mm"),
-        "length by all laws": TableColumn(
-            [(each[0], each[-1]) for each in lengths], "m", "mm", brief=any(len(each) > 1 for each in lengths)
-        ),
+        "length by all laws": TableColumn([(each[0], each[-1]) for each in lengths], "m", "mm", brief=several),
         **_radius(first, short="radius"),
-        "pressure": TableColumn(
-            [(c.design.extended.pressure, c.design.contracted.pressure) for c in first], "Pa", "bar", 3
-        ),
-        "reserve": TableColumn([choice.design.reserve for choice in first], "1", "%", 3),
+        "pressure": TableColumn([(c.extended.pressure, c.contracted.pressure) for c in designs], "Pa", "bar", 3),
+        "reserve": TableColumn([each.reserve for each in designs], "1", "%", 3),
         "air a minute": TableColumn([v and 60.0 * v / cycle for v in volumes], "m3 (ANR)", "l (ANR)", 3),
         "law": TableColumn([choice.entry.name for choice in first], brief=False),
     }

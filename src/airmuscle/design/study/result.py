@@ -74,12 +74,10 @@ class StudyResult(Reported):
             "metric": names,
             "nominal": TableColumn([self.nominal[name] for name in names], BY_ROW),
             "runs": TableColumn([row.pop("runs") for row in rows], brief=False),
-            **{
-                key: TableColumn([row[key] for row in rows], BY_ROW, brief=key in BRIEF)
-                for key in (rows[0] if rows else ())
-            },
+            **{key: TableColumn([row[key] for row in rows], BY_ROW, brief=key in BRIEF)
+               for key in (rows[0] if rows else ())},
             "unit": [self.study.units[name] for name in names],
-        }
+        }  # fmt: skip
         return Table("statistics", "Metrics", columns, "Statistics of all runs that have the metric.", brief=MAX_BRIEF)
 
     def indices(self) -> dict[str, SobolIndices]:
@@ -170,11 +168,9 @@ def variation_table(study: Study) -> Table:
         "min": TableColumn(study.values.min(axis=0), BY_ROW),
         "max": TableColumn(study.values.max(axis=0), BY_ROW),
         "unit": [parameter.unit for parameter in study.parameters],
-        "also applied to": [
-            ", ".join(parameter.path for parameter, leader in study.follow if leader == i)
-            for i in range(len(study.parameters))
-        ],
-    }
+        "also applied to": [", ".join(parameter.path for parameter, leader in study.follow if leader == i)
+                            for i in range(len(study.parameters))],
+    }  # fmt: skip
     return Table("varied", "Varied parameters", columns)
 
 

@@ -5,10 +5,10 @@ from pathlib import Path
 
 from ...core import InputError, SimulationError, check_known
 from ...design import TRUTH_SEEDS
-from ...design.control_benchmark import benchmark_chapter, find_tasks, learn, scenario_contender, standard_contenders
-from ...design.control_benchmark.benchmark import benchmark_controllers
+from ...design.control_benchmark import find_tasks, learn, scenario_contender, standard_contenders
 from ...design.control_benchmark.commissioning import COMMISSIONING_RUNS
 from ...design.control_benchmark.joints import BenchmarkJoint, on_off_joint, proportional_joint
+from ...design.control_benchmark.result import benchmark_controllers
 from ...files.library.files import is_path
 from ..requests.declaration import many, option, request
 from .delivery import Execution, deliver
@@ -83,7 +83,7 @@ def benchmark(
     if trials:
         tuned = next(each for each in result.results if each.name == LEARNED)
         curves = [learn(result.joint, tuned, find_tasks(("sine 2 Hz",))[0], trials=trials, seed=request.seed)]
-    chapter = benchmark_chapter(result, curves)
+    chapter = result.chapter(curves)
     writes = writes or execution.takes_over(out)
     deliver("benchmark", [chapter], json=json, out=out, title="Control benchmark", writes=writes)
     found = [run for each in result.results for run in each.runs.values()]

@@ -1,0 +1,128 @@
+"""Tables of the control benchmark: searches, gains, truths, all metrics, learning and failed runs."""
+
+import dataclasses
+import math
+from collections.abc import Sequence
+from typing import Any
+
+from ...core import conversion
+from ...report.chapter import Table, TableColumn
+from . import BenchmarkJoint, ContenderResult, LearningCurve
+from .commissioning import RESTARTS, SEARCH_SPREAD
+from .signals import METRICS, RATED_STROKES, SETTLING_BAND, STEADY_TIME
+
+ANR = " (ANR)"
+"""End of the unit of a volume of air at the reference atmosphere of ISO 8778."""
+
+
+def metric_column(metric: str, values: Sequence[float], **declared: Any) -> TableColumn:
+    """The column of a metric."""
+    _, unit, shown = METRICS[metric]
+    factor = 1.0 if unit == shown else conversion(shown.removesuffix(ANR), unit.removesuffix(ANR)).factor
+    return TableColumn([factor * value for value in values], unit, shown, **declared)
+
+
+def search_table(joint: BenchmarkJoint, results: Sequence[ContenderResult]) -> Table | None:
+    """The searches for the models: sets of gains, agreement of their descents, objective and its spread."""
+    tuned = [each for each in results if each.tuning is not None and each.contender.tuned_as is None]
+    names = list(dict.fromkeys(each.name for each in tuned))
+    if not names:
+        return None
+    searches = {name: [each.tuning for each in tuned if each.name == name and each.tuning] for name in names}
+    seeds = ", ".join(dict.fromkeys(str(each.seed) for each in results))
+    best = {name: [tuning.objective for tuning in found] for name, found in searches.items()}
+    columns: dict[str, Any] = {
+        "controller": names,
+        "gains": [len(found[0].ranges) for found in searches.values()],
+        "sets of gains": [max(len(each.history) for each in found) for found in searches.values()],
+        "converged": [f"{sum(each.converged for each in found)} of {len(found)}" for found in searches.values()],
+        "restarts": [sum(each.restarts for each in tuned if each.name == name) for name in names],
+        "objective": metric_column("rmse", [sorted(values)[len(values) // 2] for values in best.values()]),
+        "spread": TableColumn([max(v) / min(v) - 1.0 if v[1:] else None for v in best.values()], "1", "%"),
+    }
+    return Table(
+        "searches", "Searches", columns,
+        f"For {len(joint.family)} models, none of which is a truth; seeds {seeds}. "
+        f"Objective: {joint.objective}, median over the seeds; spread: largest over smallest. A search has "
+        f"converged where its two best descents agree. Where two seeds differ by more than {100 * SEARCH_SPREAD:g} %, "
+        f"the worst one is restarted, at most {RESTARTS} times.",
+    )  # fmt: skip
+
+
+def gains_table(results: Sequence[ContenderResult]) -> Table | None:
+    """The gains of the searches and of the commissionings, in SI units."""
+    rows = [(each.name, each.seed, "models", path, value, "on a bound" if path in each.tuning.on_bound else "")
+            for each in results if each.tuning is not None for path, value in each.tuning.gains.items()]  # fmt: skip
+    rows += [(each.name, each.seed, truth, path, value, f"{found.runs} runs") for each in results
+             for truth, found in each.commissionings.items() for path, value in found.gains.items()]  # fmt: skip
+    names = ("controller", "seed", "found on", "gain", "value [SI]", "remark")
+    return _rows("gains", "Gains", names, rows, shown=False)
+
+
+def truth_table(joint: BenchmarkJoint) -> Table:
+    """The truths."""
+    truths = joint.truths
+    columns: dict[str, Any] = {"truth": [truth.name for truth in truths]}
+    described = [joint.describe(truth) for truth in truths]
+    columns |= {key: [each[key] for each in described] for key in described[0]}
+    return Table("truths", "Truths", columns, "Flow, inertia, weight and offset relative to the model.")
+
+
+def metrics_table(results: Sequence[ContenderResult]) -> Table:
+    """All metrics, one row for each run."""
+    keys = [(each, key) for each in results for key in each.runs]
+    columns: dict[str, Any] = {
+        "controller": [each.name for each, _ in keys],
+        "seed": [each.seed for each, _ in keys],
+        "group": [str(key.group) for _, key in keys],
+        "truth": [key.truth for _, key in keys],
+        "task": [key.task for _, key in keys],
+    }
+    found = [each.runs[key].metrics for each, key in keys]
+    for field, (title, _, _) in METRICS.items():
+        columns[title] = metric_column(field, [math.nan if m is None else float(getattr(m, field)) for m in found])
+    return Table(
+        "metrics", "All metrics", columns,
+        f"Settling: until the error remains within {SETTLING_BAND:g} degrees. Steady-state error: mean of the last "
+        f"{STEADY_TIME:g} s. Valve life: of the busiest valve at {RATED_STROKES:g} openings (chosen). Stiffness error: "
+        "of the true stiffness of the muscles against that wanted.",
+        shown=False,
+    )  # fmt: skip
+
+
+def learning_table(curves: Sequence[LearningCurve]) -> Table:
+    """The rms errors of repeated trials."""
+    columns: dict[str, Any] = {"trial": list(range(1, max(c.errors.size for c in curves) + 1))}
+    columns |= {f"{each.contender}, {each.task.name}": metric_column("rmse", each.errors.tolist()) for each in curves}
+    return Table("learning", "Iterative learning", columns, "rms error of each trial; the first is without learning.")
+
+
+def failure_table(results: Sequence[ContenderResult]) -> Table | None:
+    """The runs that ended early, with their reasons; None if there are none."""
+    rows = [(each.name, each.seed, *key, run.reason) for each in results for key, run in each.runs.items()
+            if run.metrics is None]  # fmt: skip
+    return _rows("failed", "Runs that ended early", ("controller", "seed", "group", "truth", "task", "reason"), rows)
+
+
+def _rows(
+    key: str, title: str, names: Sequence[str], rows: Sequence[tuple[object, ...]], shown: bool = True
+) -> Table | None:
+    """A table of rows; None if there are none."""
+    columns = {name: [row[i] for row in rows] for i, name in enumerate(names)}
+    return Table(key, title, columns, shown=shown) if rows else None
+
+
+def settings_of(joint: BenchmarkJoint) -> tuple[tuple[str, str, str], ...]:
+    """The settings of the joint."""
+    sensors = list[tuple[str, str, str]]()
+    for sensor in joint.sensors:
+        known = {f.name: getattr(sensor, f.name) for f in dataclasses.fields(sensor) if f.name != "column"}
+        text = ", ".join(f"{name} {value:.4g}" for name, value in known.items() if value)
+        sensors.append((f"sensor of {sensor.column}", text, "chosen"))
+    return (
+        ("valves", joint.valve, "chosen"),
+        ("mean pressure", f"{joint.mean_pressure / 1e5:g} bar", "chosen"),
+        ("family of models", ", ".join(joint.family), "chosen"),
+        ("objective of tuning", str(joint.objective), "chosen"),
+        *sensors,
+    )
