@@ -82,28 +82,21 @@ class Uncertainty(Reported):
     none_weak: bool = False
     """Whether profiles of the weakly determined parameters were requested and there are none."""
 
-    @property
-    def requested(self) -> bool:
-        """Whether a bootstrap or a profile was requested."""
-        return self.bootstrap is not None or bool(self.profiles) or self.none_weak
-
     def chapter(self) -> Chapter:
         """The description: 95 % intervals of every parameter by each requested method."""
         sentences = [
             f"95 % intervals. Standard errors are estimated {self.fit.error_basis}. They hold for a law that is "
             "nearly linear in its parameters."
         ]
-        values: tuple[NamedValue, ...] = ()
+        counts = dict[str, int]()
         if (bootstrap := self.bootstrap) is not None:
             refits, groups, failed = len(bootstrap.values), bootstrap.group_count, bootstrap.failed_refits
             text = f"Bootstrap: {refits} refits, {groups} blocks resampled, seed {bootstrap.seed}"
             text += f"; {failed} of them did not determine the parameters" if failed else ""
             if failed > MAX_FAILED_SHARE * refits:
                 text += ", so the intervals are not reliable: add runs, or use a law with fewer parameters"
-            text += f"; {bootstrap.caution}" if bootstrap.caution else ""
-            sentences.insert(0, f"{text}.")
+            sentences.insert(0, "; ".join(filter(None, (text, bootstrap.caution))) + ".")
             counts = {"refits": refits, "resampled groups": groups, "failed refits": failed, "seed": bootstrap.seed}
-            values = tuple(NamedValue(name, count, brief=False) for name, count in counts.items())
         if self.profiles:
             sentences.append(
                 "A profile fixes one parameter and estimates all others again; an interval is unbounded where the data "
@@ -111,7 +104,8 @@ class Uncertainty(Reported):
             )
         caption = "95 % intervals in units of the standard error; an arrow marks an interval beyond the axis."
         return Chapter(
-            "uncertainty", "Uncertainty of the parameters", summary=tuple(sentences), values=values,
+            "uncertainty", "Uncertainty of the parameters", tuple(sentences),
+            values=tuple(NamedValue(name, count, brief=False) for name, count in counts.items()),
             tables=(_table(self),), plots=(Plot("intervals", caption, partial(_figure, self)),),
             notes=("no parameter is weakly determined; the standard errors are valid",) if self.none_weak else (),
         )  # fmt: skip

@@ -135,7 +135,7 @@ def _more(
         entry = dataclasses.replace(entry, characteristic=shaped.model, note=note, error_band=None)
     else:
         notes = list(map(str, shape_violations_of_fit(found)))
-    if uncertainty.requested:
+    if sample is not None or profiles or uncertainty.none_weak:
         chapters.append(uncertainty.chapter())
     if request.length_error:
         errors = [estimate_length_error(found.model, recordings, name) for name in request.length_error]
