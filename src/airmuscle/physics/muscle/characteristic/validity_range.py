@@ -84,7 +84,7 @@ class DataScales:
             return data
         runs, names = [data] if isinstance(data, Recording) else list(data), ("force", "pressure", "contraction")
         columns = [[run[name] for run in runs if not np.isnan(run[name]).all()] for name in names]
-        if not all(columns):
+        if runs and not all(columns):  # without recordings, the call that lacks them is named
             refuse_guess("the recordings have no value of the pressure, of the contraction or of the force")
         force, pressure, contraction = (max(float(np.nanmax(values)) for values in column) for column in columns)
         lengths = [run.constants.get("resting_length") for run in runs]
