@@ -6,6 +6,7 @@ The truth is computed by a muscle that differs in kind from every law of the lib
 from __future__ import annotations
 
 import dataclasses
+import pickle
 
 import numpy as np
 import pytest
@@ -350,6 +351,13 @@ def isobaric_records():
         finished=lambda name, _: ended.append(name),
     )
     return campaign, fractions, ended
+
+
+def test_a_campaign_is_shown_by_print_and_in_a_notebook_also_after_it_was_sent(isobaric_records):
+    campaign = pickle.loads(pickle.dumps(isobaric_records[0]))
+    assert "3 of 3 records are used. Not identified: creep, fills and volume, release." in str(campaign)
+    assert "<table" in campaign._repr_html_()
+    assert len(repr(campaign)) < 1000
 
 
 def test_stages_without_records_state_what_to_measure(isobaric_records):

@@ -28,7 +28,7 @@ from airmuscle.bench import (
 )
 from airmuscle.bench.identify import VolumePoints, fit_volume
 from airmuscle.bench.identify.campaign import ValidationRow
-from airmuscle.bench.identify.campaign.campaign_chapters import _validation_table
+from airmuscle.bench.identify.campaign.result import _validation_table
 from airmuscle.bench.identify.dynamic.dynamic_chapter import dynamic_chapters
 from airmuscle.bench.identify.experiment_design import run_table
 from airmuscle.bench.identify.hysteresis.hysteresis_chapter import joint_friction_chapter

@@ -160,13 +160,8 @@ class FitProblem:
 
     def rows(self, selection: npt.NDArray[Any]) -> "FitProblem":
         """The problem of these rows, a mask or indices."""
-        return dataclasses.replace(
-            self,
-            data=self.data.rows(selection),
-            target=self.target[selection],
-            censoring=self.censoring[selection],
-            weights=self.weights[selection],
-        )
+        chosen: dict[str, Any] = {name: getattr(self, name)[selection] for name in ("target", "censoring", "weights")}
+        return dataclasses.replace(self, data=self.data.rows(selection), **chosen)
 
     def repeated(self, counts: Array) -> "FitProblem":
         """The problem in which each row counts this many times (N,)."""

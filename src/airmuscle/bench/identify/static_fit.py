@@ -114,18 +114,12 @@ def _fit_law(
     measured = uncensored_rank(problem, solution.jacobian[:, inside]) if problem.censoring.any() else statistics["rank"]
     model = tree.with_parameters(problem.law, problem.leaf_values(solution.values))
     return Fit(
-        model=model,
-        rows_censored=int(np.count_nonzero(problem.censoring)),
-        rows_dropped=points.dropped,
-        recording=data,
-        fitted_quantity=quantity,
-        censoring=problem.censoring,
+        model=model, recording=data, fitted_quantity=quantity, loss=loss, censoring=problem.censoring,
+        rows_censored=int(np.count_nonzero(problem.censoring)), rows_dropped=points.dropped,
         problem=dataclasses.replace(problem, law=model, leaves=tuple(tree.leaves(model))),
-        loss=loss,
-        remarks=partial(examine, points, problem, solution.modelled, measured, by_recording),
-        **statistics,
+        remarks=partial(examine, points, problem, solution.modelled, measured, by_recording), **statistics,
         **goodness_of_fit(problem, evaluate(model, quantity.name, quantity.arguments, data), data),
-    )
+    )  # fmt: skip
 
 
 def refit(

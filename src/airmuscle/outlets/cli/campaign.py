@@ -15,8 +15,8 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from ...bench.identify.campaign import STAGES, Campaign, LeftOutStage, StaticStage, identify_campaign
-from ...bench.identify.campaign.campaign_chapters import ValidationRow, campaign_chapters, stage_data
+from ...bench.identify.campaign import STAGES, Campaign, LeftOutStage, StaticStage, ValidationRow, identify_campaign
+from ...bench.identify.campaign.campaign_chapters import campaign_chapters, stage_data
 from ...bench.readers import ColumnMapping
 from ...bench.readers.reader import complete_bench, find_files, read_file
 from ...core import atomic_file, atomic_folder, program_fingerprint
@@ -135,7 +135,7 @@ def campaign(
     validation = [row for recording in aside for row in _validation(result, recording)]
     scenarios, entry = campaign_scenarios(result), _entry(result)
     named = [(s.record, f"{SCENARIOS}/{s.name}" if s.text else s.reason) for s in scenarios]
-    chapters, notes = campaign_chapters(result, entry, unread=unread, scenarios=named, validation=validation), []
+    chapters, notes = [result.chapter(unread, named, validation), *campaign_chapters(result, entry)], []
     if entry is None and isinstance(result.static, LeftOutStage):
         reason = f"{result.static.reason}; {result.static.remedy}"
         notes.append(f"muscle: not written, because it needs a static law: {reason}")

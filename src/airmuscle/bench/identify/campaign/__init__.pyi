@@ -1,10 +1,4 @@
-from .campaign import STAGES as STAGES
-from .campaign import Campaign as Campaign
-from .campaign import NextExperiment as NextExperiment
-from .campaign import Prediction as Prediction
 from .campaign import identify_campaign as identify_campaign
-from .campaign_chapters import ValidationRow as ValidationRow
-from .campaign_chapters import stage_result as stage_result
 from .creep_stage import CreepStage as CreepStage
 from .creep_stage import HeldCreep as HeldCreep
 from .creep_stage import HeldRows as HeldRows
@@ -26,6 +20,12 @@ from .record import CampaignRecord as CampaignRecord
 from .record import RecordKind as RecordKind
 from .record import check_one_rig as check_one_rig
 from .record import classify_records as classify_records
+from .result import STAGES as STAGES
+from .result import Campaign as Campaign
+from .result import NextExperiment as NextExperiment
+from .result import Prediction as Prediction
+from .result import ValidationRow as ValidationRow
+from .result import stage_result as stage_result
 from .static_stage import ErrorBand as ErrorBand
 from .static_stage import StaticStage as StaticStage
 from .static_stage import VolumeChange as VolumeChange

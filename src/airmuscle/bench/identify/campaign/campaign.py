@@ -1,141 +1,29 @@
-"""Campaign: the identification of one muscle from all records of a rig, stage by stage, and the next experiments."""
+"""Identification of one muscle from all records of a rig, stage by stage, and the next experiments."""
 
 import dataclasses
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, TypeVar
 
-import numpy as np
-
-from ....core import AirmuscleError, Array, IdentificationError, ShortRepr
+from ....core import AirmuscleError, IdentificationError
 from ....engine.processes import Workers, process_pool
-from ....physics import CreepElements, ForceLaw, Friction, Geometry, LinearDamper, Muscle, NoFriction, ValidityRange
+from ....physics import CreepElements, Geometry, NoFriction, ValidityRange
 from ....recording import Recording
-from ..compared_points import law_of_length
 from ..data_checks import level_text
 from ..dynamic import rank_records
 from ..dynamic.record_ranking import MIN_GAIN
-from ..experiment_design import BenchLimits, ExperimentPlan, PlannedRun, optimal_design
+from ..experiment_design import BenchLimits, PlannedRun, optimal_design
 from .creep_stage import CreepStage, fit_creep_stage
 from .fill_stage import FillStage, fit_fill_stage
-from .friction_and_release import FrictionStage, ReleaseStage, fit_friction_stage, fit_release_stage, predicted_force
+from .friction_and_release import FrictionStage, fit_friction_stage, fit_release_stage
 from .record import CampaignRecord, RecordKind, check_one_rig, classify_records
-from .static_stage import StaticStage, fit_static_stage, force_limit
+from .result import STAGES, Campaign, NextExperiment, main_length
+from .static_stage import StaticStage, fit_static_stage
 from .transient import LeftOutStage, named
 
-STAGES = ("records", "creep", "hysteresis", "static characteristic", "fills and volume", "release", "plan")
-"""The stages in their order; each is fitted with the results of those before it."""
 T = TypeVar("T")
-StageResult = CreepStage | FrictionStage | StaticStage | FillStage | ReleaseStage | LeftOutStage
 _WEIGHTS = (0.05, 0.05, 0.35, 0.3, 0.15, 0.08, 0.02)
 """Shares of the stages in the computing time (chosen)."""
-
-
-class Prediction(NamedTuple):
-    """Predicted force and the limits of its 95 % band at the rows of a record [N]; shape (N,) each."""
-
-    force: Array
-    low: Array
-    high: Array
-
-
-@dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class NextExperiment(ShortRepr):
-    """An experiment that would improve the muscle: what to measure, and why; `plan` has the runs of a static one."""
-
-    measure: str
-    purpose: str
-    plan: ExperimentPlan | None = None
-
-
-@dataclasses.dataclass(frozen=True, eq=False, repr=False)
-class Campaign(ShortRepr):
-    """The records of a rig with their use, the result of each stage, and the next experiments."""
-
-    records: tuple[CampaignRecord, ...]
-    creep: CreepStage | LeftOutStage
-    hysteresis: FrictionStage | LeftOutStage
-    static: StaticStage | LeftOutStage
-    fills: FillStage | LeftOutStage
-    release: ReleaseStage | LeftOutStage
-    next_experiments: tuple[NextExperiment, ...]
-    given_geometry: Geometry | None = None
-    """The geometry that was given; it is that of the muscle also without fills."""
-
-    @property
-    def stages(self) -> tuple[tuple[str, StageResult], ...]:
-        """The name and the result of each stage."""
-        results = (self.creep, self.hysteresis, self.static, self.fills, self.release)
-        return tuple(zip(STAGES[1:-1], results, strict=True))
-
-    @property
-    def friction(self) -> Friction:
-        """The friction of the muscle."""
-        return self.hysteresis.friction if isinstance(self.hysteresis, FrictionStage) else NoFriction()
-
-    @property
-    def creep_elements(self) -> CreepElements:
-        """The creep elements of the muscle."""
-        return self.creep.elements if isinstance(self.creep, CreepStage) else CreepElements()
-
-    @property
-    def resting_length(self) -> float | None:
-        """Resting length of the muscle that is written [m]: that of the fills, else the longest of the static runs."""
-        return _main_length(self.records)
-
-    def law(self, resting_length: float | None = None) -> ForceLaw | None:
-        """The static law of a muscle of a resting length [m], by default the one that is written."""
-        if not isinstance(self.static, StaticStage):
-            return None
-        law = law_of_length(self.static.fit.model, resting_length or self.resting_length)
-        return law if isinstance(law, ForceLaw) else None
-
-    def geometry(self, resting_length: float | None = None) -> Geometry | None:
-        """The given geometry or that of the fills, for a resting length [m] with a volume in proportion; None without
-        one."""
-        own = self.fills.geometry if isinstance(self.fills, FillStage) else self.given_geometry
-        if own is None:
-            return None
-        length = resting_length or self.resting_length
-        if length is None or abs(length - own.resting_length) < 1e-6:
-            return own
-        change = self.static.volume_change(length) if isinstance(self.static, StaticStage) else None
-        at_rest = float(own.volume(0.0)) * length / own.resting_length
-        return None if change is None else change.geometry(at_rest)
-
-    def muscle(self, resting_length: float | None = None) -> Muscle | None:
-        """The muscle of a resting length [m] with all identified parts; None without a static law or a volume."""
-        law, geometry = self.law(resting_length), self.geometry(resting_length)
-        if law is None or geometry is None:
-            return None
-        assert isinstance(self.static, StaticStage)
-        damper = self.release.damper if isinstance(self.release, ReleaseStage) else LinearDamper(0.0)
-        return Muscle(
-            law, geometry, damper=damper, friction=self.friction, creep=self.creep_elements,
-            validity_range=self.static.fit.validity_range,
-        )  # fmt: skip
-
-    def predict(self, recording: Recording) -> Prediction:
-        """The force along the pressure and the motion of a recording, with its 95 % band. The band is that of further
-        runs for a resting length of the records, and that of other lengths otherwise. Raises IdentificationError
-        without a static law, ColumnError without pressure and contraction."""
-        if not isinstance(self.static, StaticStage):
-            raise IdentificationError(f"the campaign has no static characteristic: {self.static.reason}.")
-        length = recording.constants.get("resting_length")
-        law = law_of_length(self.static.fit.model, None if length is None else float(length))
-        force = predicted_force(law, recording, self.friction, self.creep_elements, force_limit(self.static.points))
-        known = {r.resting_length for r in self.records if r.kind.is_static}
-        measured = length is None or any(abs(float(length) - k) < 1e-6 for k in known if k)
-        half = self.static.half_width(recording, measured)
-        return Prediction(np.maximum(force, 0.0), force - half, force + half)
-
-
-def _main_length(records: Sequence[CampaignRecord]) -> float | None:
-    for kinds in ((RecordKind.FILL,), (RecordKind.RELEASE,), tuple(RecordKind)):
-        lengths = [r.resting_length for r in records if r.kind in kinds and r.resting_length is not None]
-        if lengths:
-            return max(lengths, key=lambda length: (lengths.count(length), length))
-    return None
 
 
 def identify_campaign(
@@ -176,7 +64,7 @@ def identify_campaign(
         static = steps.fit(
             "static characteristic", lambda show: fit_static_stage(records, friction, elements, show, executor)
         )
-    filled, main = of_kind[RecordKind.FILL], _main_length(of_kind[RecordKind.FILL])
+    filled, main = of_kind[RecordKind.FILL], main_length(of_kind[RecordKind.FILL])
     if len({r.resting_length for r in filled} - {None}) > 1:  # one muscle, that of the most records
         filled = [r for r in filled if r.resting_length == main]
     change = static.volume_change(main) if isinstance(static, StaticStage) and main is not None else None

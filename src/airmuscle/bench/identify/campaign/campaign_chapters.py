@@ -1,85 +1,36 @@
-"""Report chapters of a campaign: an overview of records, stages and next experiments, then one part for each stage."""
+"""Report chapters of a campaign beside its overview: next experiments, muscle, and a part for each stage."""
 
 import dataclasses
 from collections.abc import Sequence
 from typing import Any
 
-from ....core import Array, counted
+import numpy as np
+
+from ....core import BLACK, BLUE, DASHES, LINES, RED, AirmuscleError, Array, legend_below, new_figure
 from ....physics import CreepElements
-from ....report import Chapter, Table, TableColumn, as_data
+from ....report import Chapter, Plot, Table, TableColumn, as_data
+from ...segment import level_intervals
 from ..compare_chapter import compare_chapter
-from ..dynamic.dynamic_chapter import dynamic_chapters
+from ..data_checks import level_text
+from ..dynamic.dynamic_chapter import draw_residuals, dynamic_chapters, residual_panels, running_extreme
 from ..experiment_design import run_table
 from ..hysteresis import loops_not_joined
 from ..hysteresis.hysteresis_chapter import hysteresis_chapters, joint_friction_chapter
 from ..static_fit_chapter import MuscleDescription, fit_chapter
 from . import Campaign, CreepStage, FillStage, FrictionStage, LeftOutStage, RecordKind, ReleaseStage, StaticStage
-from .campaign_plots import characteristic_plot, creep_plot, fill_plot, prediction_plot, residual_plot
-
-USES = {kind: "static characteristic" if kind.is_static else kind.value for kind in RecordKind} | {
-    RecordKind.ISOBARIC: "static characteristic, hysteresis",
-    RecordKind.FILL: "fills and volume",
-    RecordKind.UNUSED: "nothing",
-}
-"""Stages for which the records of each kind are used."""
+from .result import MAX_NEXT
+from .transient import thinned_rows
 
 
-def stage_result(stage: CreepStage | FrictionStage | StaticStage | FillStage | ReleaseStage | LeftOutStage) -> str:
-    """Return the result of a stage in one sentence."""
-    if isinstance(stage, FrictionStage) and stage.selected is not None:
-        fit, amplitudes = stage.selected, [run.joint_amplitude for run in stage.selected.agreement]
-        return (
-            f"{fit.name}, {min(amplitudes):.3g} to {max(amplitudes):.3g} N in {len(amplitudes)} loops; rms error "
-            f"{fit.rmse_without_friction:.3g} N without and {fit.rmse:.3g} N with friction."
-        )
-    if isinstance(stage, FrictionStage) and stage.joint:
-        return "The loops justify no friction that holds for all of them."
-    if isinstance(stage, StaticStage):
-        best = stage.comparison.recommended
-        return (
-            f"{best.candidate.name[:1].upper()}{best.candidate.name[1:]} with {best.parameter_count} parameters, rms "
-            f"error {best.cross_validated_rmse:.3g} N in cross-validation."
-        )
-    if isinstance(stage, FillStage):
-        cross, conductance = stage.cross_rms, getattr(stage.circuit.fill, "conductance", None)
-        text = f"Each fill is predicted from the others within {max(cross) / 1e3:.3g} kPa (rms). " if cross else ""
-        text += f"Conductance {conductance:.3g} m3/(s Pa), " if conductance is not None else ""
-        volume = f"{text}volume at zero contraction {1e6 * float(stage.geometry.volume(0.0)):.3g} cm3."
-        return f"{volume} {stage.misfit}".rstrip()
-    if isinstance(stage, ReleaseStage):
-        damping = stage.fit["muscle.damper.damping"]
-        return f"Damping {damping.value:.3g} N s/m (2 standard errors {damping.format_interval()})."
-    return stage.verdict
-
-
-MAX_NEXT = 4
-"""Rows of unused records and of further experiments in the brief view (chosen)."""
-
-
-@dataclasses.dataclass(frozen=True)
-class ValidationRow:
-    """A record that was kept aside, its error [N] and the share of its rows within the 95 % band."""
-
-    record: str
-    rmse: float
-    half_width: float
-    share: float
-    rows: int
-
-
-def campaign_chapters(
-    campaign: Campaign, entry: MuscleDescription | None, *, unread: Sequence[tuple[str, str]] = (),
-    scenarios: Sequence[tuple[str, str]] = (), validation: Sequence[ValidationRow] = (),
-) -> list[Chapter]:  # fmt: skip
-    """Return the chapters of a campaign. `unread` are pairs of a file that could not be read and the reason,
-    `scenarios` of a record and its scenario file or the reason."""
+def campaign_chapters(campaign: Campaign, entry: MuscleDescription | None) -> list[Chapter]:
+    """Return the chapters that follow the overview, the `chapter()` of the campaign."""
     plots = (plot(campaign) for plot in (characteristic_plot, prediction_plot, residual_plot, fill_plot))
     summary = "The predicted force is that of the static law minus friction and creep along the recorded motion."
     muscle = Chapter("campaign-muscle", "Muscle and prediction error", summary, plots=tuple(filter(None, plots)))
     stages = sorted((stage for _, stage in campaign.stages), key=lambda stage: not isinstance(stage, StaticStage))
     chapters = [muscle, *(chapter for stage in stages for chapter in stage_chapters(stage, entry))]
     parts = [dataclasses.replace(chapter, brief=False) for chapter in chapters]
-    return [_overview(campaign, unread, dict(scenarios), validation), _next(campaign), *parts]
+    return [_next(campaign), *parts]
 
 
 def stage_chapters(stage: object, entry: MuscleDescription | None = None) -> list[Chapter]:
@@ -110,35 +61,6 @@ def stage_data(name: str, stage: object) -> dict[str, Any]:
     return data | {"identified": True, **as_data(stage_chapters(stage))}
 
 
-def _overview(
-    campaign: Campaign, unread: Sequence[tuple[str, str]], scenarios: dict[str, str],
-    validation: Sequence[ValidationRow],
-) -> Chapter:  # fmt: skip
-    """Return the chapter of the stages, the bands and the records."""
-    stages, records = campaign.stages, campaign.records
-    used = sum(record.kind is not RecordKind.UNUSED for record in records)
-    left_out = [(name, stage) for name, stage in stages if isinstance(stage, LeftOutStage)]
-    sentences = [f"{used} of {len(records)} records are used."]
-    sentences += [f"{counted(len(unread), 'file')} could not be read."] if unread else []
-    names = ", ".join(name for name, _ in left_out)
-    sentences.append(f"Not identified: {names}." if left_out else "All stages are identified.")
-    notes = list(campaign.static.data_notes) if isinstance(campaign.static, StaticStage) else []
-    notes += [f"{name}: {stage.reason}; {stage.remedy}" for name, stage in left_out]
-    columns: dict[str, Any] = {
-        "stage": [name for name, _ in stages],
-        "records": [sum(name in USES[record.kind] for record in records) for name, _ in stages],
-        "identified": TableColumn([not isinstance(stage, LeftOutStage) for _, stage in stages], brief=False),
-        "result": [stage_result(stage) for _, stage in stages],
-    }
-    files = {"file": [name for name, _ in unread], "reason": [reason for _, reason in unread]}
-    tables = (
-        Table("campaign-stages", "Stages", columns, brief=len(stages), key="stages"), _band_table(campaign),
-        _validation_table(validation), _record_table(campaign, scenarios),
-        Table("campaign-unread", "Files that could not be read", files, brief=MAX_NEXT, key="unread"),
-    )  # fmt: skip
-    return Chapter("campaign", "Overview", " ".join(sentences), tables=tuple(filter(len, tables)), notes=tuple(notes))
-
-
 def _next(campaign: Campaign) -> Chapter:
     """Return the chapter of the next experiments."""
     experiments = campaign.next_experiments
@@ -154,48 +76,6 @@ def _next(campaign: Campaign) -> Chapter:
     return Chapter("campaign-next", "What to measure next", summary, tables=tuple(tables))
 
 
-def _half_widths(rows: Sequence[Any]) -> TableColumn:
-    return TableColumn([row.half_width for row in rows], "N", digits=3, short="95 % band ±")
-
-
-def _band_table(campaign: Campaign) -> Table:
-    bands = campaign.static.all_bands if isinstance(campaign.static, StaticStage) else ()
-    columns: dict[str, Any] = {
-        "prediction of": [band.purpose for band in bands],
-        "half width of the 95 % band": _half_widths(bands),
-        "rms error": TableColumn([band.rmse for band in bands], "N", digits=3),
-        "groups left out": TableColumn([band.groups for band in bands], brief=False),
-        "rows": TableColumn([band.rows for band in bands], brief=False),
-    }
-    return Table("campaign-bands", "Error of the predicted force", columns, brief=len(bands), key="bands")
-
-
-def _validation_table(rows: Sequence[ValidationRow]) -> Table:
-    columns: dict[str, Any] = {
-        "record": [row.record for row in rows],
-        "rms error": TableColumn([row.rmse for row in rows], "N"),
-        "half width of the 95 % band": _half_widths(rows),
-        "rows within the band": TableColumn([row.share for row in rows], "1", "%", digits=3, short="within"),
-        "rows": [row.rows for row in rows],
-    }
-    return Table("campaign-validation", "Records that were kept aside", columns, brief=len(rows), key="validation")
-
-
-def _record_table(campaign: Campaign, scenarios: dict[str, str]) -> Table:
-    records = campaign.records
-    columns: dict[str, Any] = {
-        "record": [record.origin for record in records],
-        "kind": [record.kind.value for record in records],
-        "resting length": TableColumn([record.resting_length for record in records], "m", "mm", brief=False),
-        "rows": TableColumn([len(record.recording) for record in records], brief=False),
-        "reason": [record.reason for record in records],
-        "used for": TableColumn([USES[record.kind] for record in records], brief=False),
-        "scenario": TableColumn([scenarios.get(record.origin, "") for record in records], brief=False),
-    }
-    unused = [i for i, record in enumerate(records) if record.kind is RecordKind.UNUSED]
-    return Table("campaign-records", "Records and their use", columns, brief=unused[:MAX_NEXT], key="records")
-
-
 def creep_chapter(verdict: str, sentences: Sequence[str], elements: CreepElements, standard_errors: Array) -> Chapter:
     """Return the chapter of creep: the verdict, a sentence on each hold, and the Maxwell elements with the standard
     errors of their stiffnesses [N/m], then of their relaxation times [s]."""
@@ -208,3 +88,141 @@ def creep_chapter(verdict: str, sentences: Sequence[str], elements: CreepElement
     }
     table = Table("creep-elements", "Maxwell elements", columns, brief=count)
     return Chapter("creep", "Creep", (verdict, *sentences), tables=(table,) if count else ())
+
+
+MAX_LOOPS, MAX_PANELS = 6, 6
+"""Maximum number of loops in a figure, and of panels of fills (chosen)."""
+CURVE_POINTS = 161
+LEVEL_TOLERANCE = 0.03
+"""Maximum relative difference of two pressures that have one curve (chosen)."""
+POINT_TOLERANCE = 0.005
+"""Maximum difference of the pressure of a point from that of its curve, relative to the maximum (chosen)."""
+
+
+def characteristic_plot(campaign: Campaign) -> Plot | None:
+    """Return the isobars of the muscle with the 95 % band and the measured points, freed of friction and creep."""
+    stage, law = campaign.static, campaign.law()
+    if not isinstance(stage, StaticStage) or law is None:
+        return None
+    length = campaign.resting_length
+    figure, axes = new_figure(width=6.6, height=4.0)
+    runs = [run for run in stage.points if length is None or run.constants.get("resting_length") in (length, None)]
+    isobaric = [r for r in campaign.records if r.kind is RecordKind.ISOBARIC and r.resting_length in (length, None)]
+    levels = sorted(record.level[1] for record in isobaric if record.level)
+    band = LEVEL_TOLERANCE * max(levels, default=0.0)
+    distinct = [levels[interval.start] for interval in level_intervals(np.array(levels), band)]
+    evenly = np.linspace(*stage.fit.data_ranges["pressure"], 6)[1:].tolist()
+    pressures = distinct[:: max(1, -(-len(distinct) // 7))] or evenly
+    low, high = stage.fit.data_ranges["contraction"]
+    eps = np.linspace(low, high, CURVE_POINTS)
+    for i, pressure in enumerate(pressures):
+        colour, force = LINES[i % len(LINES)], np.asarray(law.force(np.full(eps.size, pressure), eps), dtype=float)
+        force = np.where(force > 0.0, force, np.nan)
+        label = f"{pressure / 1e3:.3g} kPa"
+        axes.plot(100 * eps, force, color=colour, linestyle=DASHES[i % 5], label=label, zorder=3)
+        half = stage.band.half_width
+        axes.fill_between(100 * eps, np.maximum(force - half, 0), force + half, color=colour, alpha=0.18, linewidth=0)
+        for run in runs:
+            rows = np.abs(run["pressure"] - pressure) <= POINT_TOLERANCE * max(pressures)
+            style = {"color": colour, "linestyle": "none", "marker": ".", "markersize": 2.5, "alpha": 0.7}
+            axes.plot(100 * run["contraction"][rows], run["force"][rows], **style)
+    axes.set(xlabel="contraction [%]", ylabel="force [N]", ylim=(0.0, None))
+    axes.legend(title="gauge pressure", loc="upper right", fontsize=8, title_fontsize=8)
+    text = "" if length is None else f" of the muscle of {1e3 * length:.4g} mm"
+    contents = "fitted law with its 95 % band, and measured points freed of friction and creep"
+    return Plot("campaign-characteristic", f"Static characteristic{text}: {contents}.", figure)
+
+
+def prediction_plot(campaign: Campaign) -> Plot | None:
+    """Return measured loops, the force predicted with friction and creep, and its 95 % band."""
+    static = [record for record in campaign.records if record.kind.is_static]
+    usable = [record for record in static if record.kind is RecordKind.ISOBARIC] or static
+    if not usable or not isinstance(campaign.static, StaticStage):
+        return None
+    ordered = sorted(usable, key=lambda r: (r.resting_length or 0.0, r.level[1] if r.level else 0.0))
+    shown = [ordered[i] for i in thinned_rows(len(ordered), MAX_LOOPS)]
+    columns = min(3, len(shown))
+    rows = -(-len(shown) // columns)
+    figure, panels = new_figure(rows, columns, width=7.4, height=2.3 * rows + 0.4, squeeze=False)
+    for axes, record in zip(panels.ravel(), shown, strict=False):
+        recording, prediction = record.recording, campaign.predict(record.recording)
+        is_ramp = record.kind is RecordKind.ISOMETRIC
+        x = 1e-3 * recording["pressure"] if is_ramp else 100.0 * recording["contraction"]
+        dots = {"linestyle": "none", "marker": ".", "markersize": 2, "color": BLUE, "alpha": 0.6}
+        axes.plot(x, recording["force"], label="measured", **dots)
+        order = np.argsort(x, kind="stable")
+        low = running_extreme(prediction.low[order], np.minimum)
+        high = running_extreme(prediction.high[order], np.maximum)
+        axes.fill_between(x[order], low, high, color=RED, alpha=0.15, linewidth=0, label="95 % band")
+        axes.plot(x, prediction.force, color=RED, linewidth=0.9, label="predicted")
+        axes.set_xlabel("pressure [kPa]" if is_ramp else "contraction [%]")
+        length = "" if record.resting_length is None else f", {1e3 * record.resting_length:.4g} mm"
+        axes.set_title("" if record.level is None else f"{level_text(*record.level)}{length}", fontsize=8)
+    for axes in panels.ravel()[len(shown) :]:
+        axes.set_visible(False)
+    for axes in panels[:, 0]:
+        axes.set_ylabel("force [N]")
+    legend_below(figure, panels[0, 0], columns=3)
+    force = "static law minus friction and creep along the recorded motion"
+    return Plot("campaign-loops", f"Slow records with the predicted force: {force}. Shaded: 95 % band.", figure)
+
+
+def residual_plot(campaign: Campaign) -> Plot | None:
+    """Return the residuals of all slow records over pressure, contraction and time in the record."""
+    if not isinstance(campaign.static, StaticStage):
+        return None
+    figure, panels = new_figure(1, 3, width=7.4, height=2.7, sharey=True)
+    half = campaign.static.band.half_width
+    for record in campaign.records:
+        if not record.kind.is_static:
+            continue
+        try:
+            prediction = campaign.predict(record.recording)
+        except AirmuscleError:
+            continue
+        recording = record.recording
+        rows = recording["force"] > 0.0
+        error = (prediction.force - recording["force"])[rows]
+        share = np.linspace(0.0, 100.0, len(recording))[rows]
+        columns = (1e-3 * recording["pressure"][rows], 100.0 * recording["contraction"][rows], share)
+        for axes, x in zip(panels, columns, strict=True):
+            axes.plot(x, error, linestyle="none", marker=".", markersize=1.0, color=BLUE, alpha=0.35, rasterized=True)
+    for axes, text in zip(panels, ("pressure [kPa]", "contraction [%]", "rows of the record [%]"), strict=True):
+        for limit, colour, dashes in ((0.0, BLACK, "-"), (-half, RED, "--"), (half, RED, "--")):
+            axes.axhline(limit, color=colour, linewidth=0.8, linestyle=dashes)
+        axes.set_xlabel(text)
+    panels[0].set_ylabel("predicted - measured force [N]")
+    caption = "Residuals of all slow records. Dashed: limits of the 95 % band for further runs."
+    return Plot("campaign-residuals", caption, figure)
+
+
+def fill_plot(campaign: Campaign) -> Plot | None:
+    """Return the pressures of all fills with the joint fit, and the residuals below."""
+    stage = campaign.fills
+    if not isinstance(stage, FillStage):
+        return None
+    shown = min(len(stage.records), MAX_PANELS)
+    figure, panels = residual_panels(shown, width=min(7.6, 2.6 + 1.9 * shown), height=3.9, sharey="row")
+    for i, column in enumerate(panels.T):
+        recording, sensor = stage.experiments[i].recording, stage.fit.problem.record_models[i].names[0]
+        measured, modelled = 1e-3 * recording["pressure"], 1e-3 * stage.fit.modelled(i)[sensor]
+        draw_residuals(column, recording["time"], measured, modelled, "joint fit")
+        column[0].set_title(f"contraction {level_text('contraction', float(stage.contractions[i]))}", fontsize=8)
+        column[1].set_xlabel("time [s]")
+    panels[0, 0].set_ylabel("pressure [kPa]")
+    panels[1, 0].set_ylabel("residual [kPa]")
+    legend_below(figure, panels[0, 0])
+    return Plot("campaign-fills", "Fills and discharges with the joint fit of valves and volume.", figure)
+
+
+def creep_plot(stage: CreepStage) -> Plot:
+    """Return the change of the force in the holds with the Maxwell elements."""
+    figure, axes = new_figure(width=6.3, height=3.0)
+    rows = zip(stage.holds, stage.times, stage.measured, stage.modelled, strict=True)
+    for i, ((origin, _), time, measured, modelled) in enumerate(rows):
+        colour, start = LINES[i % len(LINES)], modelled[0]
+        axes.plot(time, measured - start, linestyle="none", marker=".", markersize=2, color=colour, alpha=0.5)
+        axes.plot(time, modelled - start, color=colour, linestyle=DASHES[i % 5], label=origin)
+    axes.set(xlabel="time after the motion [s]", ylabel="change of the force [N]")
+    legend_below(figure, axes)
+    return Plot("campaign-creep", "Force after the motion of each hold, with the common Maxwell elements.", figure)
