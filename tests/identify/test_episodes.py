@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -346,6 +347,11 @@ def test_an_inspection_finds_the_muscles_of_each_joint_and_that_the_sensors_lag(
     assert inspect_episodes(two).delay > inspect_episodes(made_episodes(30, joints=2)).delay
     assert not found.errors
     assert "pressure 1 lowers angle 2 (t = " in str(found)
+    (table,) = pickle.loads(pickle.dumps(found)).chapter().tables
+    angles = np.quantile(two.rows("angle"), (0.01, 0.99), axis=0).T
+    assert np.array(table.columns["range of 98 %"].values[:2]) == pytest.approx(angles)
+    assert "<td" in found._repr_html_()
+    assert ">deg<" in found._repr_html_()
 
 
 def test_pressures_without_an_effect_are_not_assigned():

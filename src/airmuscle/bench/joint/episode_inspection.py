@@ -6,6 +6,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...core import Array, IdentificationError, counted
+from ...report.chapter import BY_ROW, Chapter, Table, TableColumn
+from ..reported import Reported
 from .episodes import HISTORY, ROWS, Episodes, Windows, long_enough, speed_of
 
 MAX_DELAY = 8
@@ -51,8 +53,8 @@ class PressureAction:
         return f"pressure {self.muscle} {way} angle {self.joint} ({t})"
 
 
-@dataclasses.dataclass(frozen=True, eq=False)
-class EpisodeInspection:
+@dataclasses.dataclass(frozen=True, eq=False, repr=False)
+class EpisodeInspection(Reported):
     """Findings on episodes; `print` it. `errors` forbid a fit, `remarks` do not; `delay` of the pressures [rows]."""
 
     episodes: Episodes
@@ -78,18 +80,36 @@ class EpisodeInspection:
             found.append((up[0], down[0]))
         return tuple(found)
 
-    def __str__(self) -> str:
-        e = self.episodes
-        lengths = [len(run) for run in e.runs]
+    def chapter(self) -> Chapter:
+        """The description: ranges of the readings, which pressure acts on which angle, and findings."""
+        e, lengths = self.episodes, [len(run) for run in self.episodes.runs]
         total, rows = sum(lengths) * e.sample_time, " to ".join(dict.fromkeys(map(str, (min(lengths), max(lengths)))))
-        lines = [
+        contents = (
             f"{counted(len(e), 'episode')} of {rows} rows at {1 / e.sample_time:.4g} Hz, {total:.4g} s; "
             f"{counted(e.joints, 'joint')}, {counted(e.muscles, 'pressure')} with a lag of "
-            f"{counted(self.delay, 'row')} ({1e3 * self.delay * e.sample_time:.3g} ms) behind the motion",
-            *e.notes,
+            f"{counted(self.delay, 'row')} ({1e3 * self.delay * e.sample_time:.3g} ms) behind the motion"
+        )
+        counts = (e.joints, e.muscles)
+        names = [f"{kind} {i + 1}" for kind, n in zip(("angle", "pressure"), counts, strict=True) for i in range(n)]
+        readings = np.concatenate([e.rows("angle"), e.rows("pressure")], axis=1)
+        low, middle, high = np.quantile(readings, (0.01, 0.5, 0.99), axis=0).tolist()
+        units, shown = (np.repeat(each, counts).tolist() for each in (("rad", "Pa"), ("deg", "kPa")))
+        columns = {
+            "reading": names, "range of 98 %": TableColumn(list(zip(low, high, strict=True)), BY_ROW),
+            "median": TableColumn(middle, BY_ROW), "unit": TableColumn(units, shown=shown),
+        }  # fmt: skip
+        return Chapter(
+            "episodes", "Episodes", (contents, *e.notes, *map(str, self.actions)), problems=self.errors,
+            tables=(Table("readings", "Readings", columns, brief=len(names)),), notes=self.remarks,
+        )  # fmt: skip
+
+    def __str__(self) -> str:
+        e, said = self.episodes, self.chapter().paragraphs
+        lines = [
+            *said[: 1 + len(e.notes)],
             *(_range_line(f"angle {i}", np.degrees(x), "deg") for i, x in enumerate(e.rows("angle").T, 1)),
             *(_range_line(f"pressure {i}", x / 1e3, "kPa") for i, x in enumerate(e.rows("pressure").T, 1)),
-            *map(str, self.actions),
+            *said[1 + len(e.notes) :],
             *(f"remark: {each}" for each in self.remarks),
             *(f"error: {each}" for each in self.errors),
         ]
