@@ -49,11 +49,9 @@ class ModelApproximation(Reported):
         """The description of the approximation: its errors, also in intervals of pressure, and its parameters."""
         limits, model = self.validity_range, type(self.model).__name__
         return Chapter(
-            name="approximation",
-            title=f"{model} over {quantity_text(limits.min_pressure, 'Pa', 'kPa')} to "
+            "approximation", f"{model} over {quantity_text(limits.min_pressure, 'Pa', 'kPa')} to "
             f"{quantity_text(limits.max_pressure, 'Pa', 'kPa')} and {contraction_text(limits.min_contraction)} to "
-            f"{contraction_text(limits.max_contraction)}",
-            summary=f"{self.summary}.",
+            f"{contraction_text(limits.max_contraction)}", f"{self.summary}.",
             values=(
                 NamedValue("model", model, brief=False),
                 NamedValue("pressure range", limits.pressure, "Pa", "kPa", brief=False),
@@ -64,7 +62,7 @@ class ModelApproximation(Reported):
                 NamedValue("contraction of the maximum error", self.max_error.contraction, "1", "%", brief=False),
             ),
             tables=(self._band_table(), parameter_table(self.model, "parameters", f"Parameters of {model}")),
-        )
+        )  # fmt: skip
 
     def _band_table(self) -> Table:
         """The errors in intervals of pressure; the maximum force is that of the original."""

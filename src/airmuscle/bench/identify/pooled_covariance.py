@@ -173,15 +173,10 @@ def estimate_pooled_covariance(
     by_rows = np.block([[population, np.zeros(projected.shape)], [-shrunk @ projected.T, shrunk]])
     values, vectors = np.linalg.eigh(by_rows @ total.moments @ by_rows.T)
     independent = PooledCovariance(
-        by_effects=deviation * np.vstack([projected, smoother - np.eye(len(smoother))]),
-        freedom=freedom,
-        by_rows=by_rows,
-        moments=total.moments[None],
-        shifts=(vectors * np.sqrt(ratio * np.maximum(values, 0.0))).T * deviation,
-        unit=rows_of.ROWS,
-        run_count=run_count,
-        rows=int(total.rows),
-    )
+        by_effects=deviation * np.vstack([projected, smoother - np.eye(len(smoother))]), by_rows=by_rows,
+        shifts=(vectors * np.sqrt(ratio * np.maximum(values, 0.0))).T * deviation, moments=total.moments[None],
+        freedom=freedom, unit=rows_of.ROWS, run_count=run_count, rows=int(total.rows),
+    )  # fmt: skip
     found = _by_groups(independent, rows, ratio, runs.run, rows_of.RUNS) if min(counts) >= rows_of.MIN_GROUPS else None
     parts, in_order = 2, runs.in_time or rows_of.is_correlated(rows.residuals, runs.run)
     while found is None and in_order and run_count * parts * rows_of.MIN_GROUP_ROWS <= len(rows.member):

@@ -189,15 +189,11 @@ def pool(law: PooledLengthLaw, population: Fit, points: FitPoints) -> Fit:
     modelled = evaluate(model, "force", population.fitted_quantity.arguments, data)
     estimates = zip(population.estimates, covariance.standard_errors[:count].tolist(), strict=True)
     return dataclasses.replace(
-        population,
-        model=model,
+        population, model=model, recording=data, effects=effects, sigma=effects.sigma,
         estimates=tuple(dataclasses.replace(each, stderr=error) for each, error in estimates),
         correlations=normalised(covariance.matrix[:count, :count]),
-        sigma=effects.sigma,
-        recording=data,
-        effects=effects,
         **goodness_of_fit(population.problem, modelled, data),
-    )
+    )  # fmt: skip
 
 
 def pooled_band(fit: Fit, points: Recording, jacobian: Array, level: float) -> tuple[Array, Array]:

@@ -206,18 +206,11 @@ class Fit(Reported):
     def chapter(self) -> Chapter:
         """The description of the fit: goodness of fit, estimates, residuals, remarks on the data."""
         correlations = {"parameter": list(self.names), **dict(zip(self.names, self.correlations.T, strict=True))}
-        return Chapter(
-            name="fit",
-            title=self._title,
-            summary=f"Standard errors {self.error_basis}.",
-            values=self.goodness(),
-            tables=(
-                estimate_table(self.estimates, "parameters", "Parameters", brief=MAX_ROWS),
-                Table("correlations", "Correlations", correlations, shown=False),
-            ),
-            plots=(Plot("errors", "Modelled against measured values, and residuals.", self.plot),),
-            notes=self.notes,
-        )
+        estimates = estimate_table(self.estimates, "parameters", "Parameters", brief=MAX_ROWS)
+        tables = (estimates, Table("correlations", "Correlations", correlations, shown=False))
+        plots = (Plot("errors", "Modelled against measured values, and residuals.", self.plot),)
+        return Chapter("fit", self._title, f"Standard errors {self.error_basis}.", values=self.goodness(),
+                       tables=tables, plots=plots, notes=self.notes)  # fmt: skip
 
     def goodness(self) -> tuple[NamedValue, ...]:
         """The goodness of fit."""

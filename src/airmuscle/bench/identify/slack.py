@@ -166,16 +166,13 @@ def with_slack_bounds(problem: FitProblem, points: FitPoints) -> BoundedProblem:
     *columns, source, shares = bounds
     names = (*POINT_COLUMNS, RESTING_LENGTH)
     joined = {n: np.concatenate([problem.data[n], column]) for n, column in zip(names, columns, strict=True)}
-    return BoundedProblem(
-        dataclasses.replace(
-            problem,
-            data=Recording(joined, problem.data.origin),
-            target=np.concatenate([problem.target, np.zeros(source.size)]),
-            censoring=np.concatenate([problem.censoring, np.ones(source.size)]),
-            weights=np.concatenate([problem.weights, np.sqrt(float(np.mean(problem.weights**2)) * shares)]),
-        ),
-        source.astype(np.intp),
-    )
+    bounded = dataclasses.replace(
+        problem, data=Recording(joined, problem.data.origin),
+        target=np.concatenate([problem.target, np.zeros(source.size)]),
+        censoring=np.concatenate([problem.censoring, np.ones(source.size)]),
+        weights=np.concatenate([problem.weights, np.sqrt(float(np.mean(problem.weights**2)) * shares)]),
+    )  # fmt: skip
+    return BoundedProblem(bounded, source.astype(np.intp))
 
 
 def solve_bounded(

@@ -73,16 +73,11 @@ def fit_chapter(
         with contextlib.suppress(AirmuscleError):  # slack everywhere, or contractions outside the geometry
             consistency = defect_values(maxwell_defect(fit.model, entry.geometry, entry.validity_range))
     return dataclasses.replace(
-        chapter,
-        title=entry.title,
-        summary=(*chapter.paragraphs, entry.note, *of_recordings),
+        chapter, title=entry.title, summary=(*chapter.paragraphs, entry.note, *of_recordings), equations=equations,
         values=(*chapter.values, *(dataclasses.replace(each, brief=False) for each in consistency)),
-        equations=equations,
-        tables=(*symbols, parameters, *broken, correlations, _rows(fit)),
-        plots=tuple(plot for plot in plots if plot is not None),
-        notes=(*chapter.notes, *notes),
-        references=tuple(cite(entry)),
-    )
+        tables=(*symbols, parameters, *broken, correlations, _rows(fit)), plots=tuple(filter(None, plots)),
+        notes=(*chapter.notes, *notes), references=tuple(cite(entry)),
+    )  # fmt: skip
 
 
 def _rows(fit: Fit) -> Table:

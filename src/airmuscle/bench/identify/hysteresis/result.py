@@ -129,15 +129,11 @@ def evidence(friction: Friction, runs: Sequence[LoopSeries], repeats: Sequence[L
     fitted, plain = (Misfit.of(each, runs) for each in (friction, None))
     again = [mean_square([run.fitted_residuals(each) for run in repeats]) for each in (friction, None)]
     return {
-        "friction": friction,
-        "rmse": float(np.sqrt(fitted.mean_square)),
-        "rmse_without_friction": float(np.sqrt(plain.mean_square)),
-        "effective_sample_size": fitted.sample_size,
+        "friction": friction, "rmse": float(np.sqrt(fitted.mean_square)), "repeat_rmse": float(np.sqrt(again[0])),
+        "rmse_without_friction": float(np.sqrt(plain.mean_square)), "p_value": fitted.p_value(plain),
+        "repeat_rmse_without_friction": float(np.sqrt(again[1])), "effective_sample_size": fitted.sample_size,
         "aicc_reduction": fitted.reduction_of_aicc(plain),
-        "p_value": fitted.p_value(plain),
-        "repeat_rmse": float(np.sqrt(again[0])),
-        "repeat_rmse_without_friction": float(np.sqrt(again[1])),
-    }
+    }  # fmt: skip
 
 
 AnyFit = TypeVar("AnyFit", bound=FrictionFit)
