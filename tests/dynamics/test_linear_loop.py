@@ -121,6 +121,15 @@ def test_margins_do_not_depend_on_how_the_grid_is_scanned(monkeypatch):
         assert dataclasses.astuple(ours) == pytest.approx(dataclasses.astuple(loop.margins()), rel=1e-9, nan_ok=True)
 
 
+def test_the_chapter_of_margins_has_them_in_si_units_with_their_frequencies():
+    found = our_loop().margins()
+    stated = {each.name: each for each in found.chapter().values}
+    assert [each.value for each in stated.values()] == [found.gain, found.phase, found.delay, found.peak]
+    assert stated["phase margin"].remark == f"at {found.phase_frequency:.4g} Hz"
+    without = dataclasses.replace(found, gain=np.inf, gain_frequency=np.nan)
+    assert without.chapter().values[0].remark == ""
+
+
 def test_a_loop_is_stable_up_to_its_margins():
     """A gain raised by the gain margin, and a delay by the delay margin, put a pole on the unit circle."""
     margins = our_loop().margins()

@@ -12,6 +12,7 @@ from ...core import Array, ParameterError, System, check_known
 from ...engine.loop import ControlLaw, ControlLoop, ControlLoopState, designed_loop
 from ...physics.analysis import LinearModel, linearise
 from ...physics.analysis.sampled_model import SampledModel, bode_figure, checked_frequencies, nyquist_figure, sampled
+from ...report.chapter import Chapter, NamedValue
 from .linear_law import LinearLaw, Point, linearise_law
 
 POINTS, DECADES = 4000, 6
@@ -45,6 +46,19 @@ class Margins:
     delay: float
     peak: float
     peak_frequency: float
+
+    def chapter(self) -> Chapter:
+        """The description of the margins, each with the frequency at which it stands."""
+        frequencies = (self.gain_frequency, self.phase_frequency, self.peak_frequency)
+        of_gain, of_phase, of_peak = (f"at {f:.4g} Hz" if math.isfinite(f) else "" for f in frequencies)
+        values = (
+            NamedValue("gain margin", self.gain, remark=of_gain),
+            NamedValue("phase margin", self.phase, "rad", "deg", remark=of_phase),
+            NamedValue("delay margin", self.delay, "s", "ms"),
+            NamedValue("sensitivity peak", self.peak, remark=of_peak),
+        )
+        lower = (f"the gain may fall to {100 * self.lower_gain:.3g} %",) if self.lower_gain > 0.0 else ()
+        return Chapter("margins", "Margins", "Distances of the loop from instability.", values=values, notes=lower)
 
 
 def frequency_grid(model: SampledModel) -> Array:

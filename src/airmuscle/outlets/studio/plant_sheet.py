@@ -13,7 +13,7 @@ from ...core import AirmuscleError, ParameterError, cite, leaves, plotting
 from ...files.library import Location, part_toml, tables_toml
 from ...files.scenario.scenario import TABLES, Scenario, build_scenario, initial_pressure
 from ...recording.columns import display_scale
-from ...report.formatting import format_number
+from ...report.shown import value_cells
 from ..export.write import make_run
 from .law_sheet import parameter_row, sampled_outline, toml_template, with_script
 
@@ -145,17 +145,13 @@ def _loop_row(scenario: Scenario) -> dict[str, Any] | None:
                          (f"where its run ends, with valves open by {OPENED:g}", {"inputs": opened})):  # fmt: skip
         try:
             linear = am.control.linearise_loop(scenario.plant, loop, done.final_state, **given)
-            found = linear.margins()
+            values = linear.margins().chapter().values
         except AirmuscleError as error:
             reason = str(error)
             continue
-        rows = [
-            ("gain margin", found.gain, ""), ("phase margin", np.degrees(found.phase), "deg"),
-            ("delay margin", 1e3 * found.delay, "ms"), ("sensitivity peak", found.peak, ""),
-        ]  # fmt: skip
-        texts = [(name, format_number(value), unit) for name, value, unit in rows]
+        rows = [(each.name, *value_cells(each)) for each in values]
         text = f"Open loop at {linear.law.measured[0]}, linearised {where}."
-        return {"text": text, "rows": texts, "figures": [svg_uri(linear.bode()), svg_uri(linear.nyquist())]}
+        return {"text": text, "rows": rows, "figures": [svg_uri(linear.bode()), svg_uri(linear.nyquist())]}
     return {"text": f"There are no margins: {reason}", "rows": [], "figures": []}
 
 
