@@ -13,7 +13,7 @@ from types import MappingProxyType
 from typing import Any
 
 from ..core import check_writable
-from ..engine.processes import process_pool
+from ..design.study import process_pool
 from ..files.library.files import complete_name
 from ..report.chapter import Chapter, Plot, Table
 from ..report.claims import AtLeast, AtMost, Claim, ClaimRow, Equal, Kind, PublishedValue
