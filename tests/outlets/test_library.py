@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import dataclasses
 import re
+import subprocess
+import sys
 import warnings
 from pathlib import Path
 
@@ -412,3 +414,16 @@ def test_a_column_of_a_file_that_is_not_there(tmp_path: Path):
 @pytest.mark.parametrize("name", model_names())
 def test_every_model_that_a_file_may_name_is_there(name: str):
     assert dataclasses.is_dataclass(model_class(name, "here"))
+
+
+def test_a_table_without_a_model_is_of_the_only_class_unless_a_file_may_name_a_subclass():
+    models = [model_class(name, "test") for name in model_names()]
+    for cls in models:
+        has_variants = any(each is not cls and issubclass(each, cls) for each in models)
+        assert (library.only_class(cls) is None) == has_variants, cls
+
+
+def test_a_muscle_is_loaded_without_the_modules_of_control_laws():
+    program = "import sys, airmuscle; airmuscle.load('dmsp-20-300'); print(*sys.modules)"
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert not [name for name in done.stdout.split() if re.match(r"airmuscle\.control\.\w+\.", name)]

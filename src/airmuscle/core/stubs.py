@@ -1,6 +1,5 @@
 """Names of a face that are imported on use, from the stub of its package, which type checkers read, too."""
 
-import functools
 import importlib
 import os
 import sys
@@ -45,7 +44,7 @@ def _text(path: str) -> str:
 def _naming_arguments(function, room):  # type: ignore[no-untyped-def]
     """The function under the name of its room, by which it is pickled."""
 
-    @functools.wraps(function)
+    @importlib.import_module("functools").wraps(function)
     def call(*given, **named):  # type: ignore[no-untyped-def]
         try:
             return function(*given, **named)

@@ -15,7 +15,7 @@ from typing import Any
 from ...core import ParameterError, abridged, check_field, parameters
 from ...core.annotation import conforms, type_hints
 from . import fields
-from .fields import allows, model_class, model_names
+from .fields import allows, has_variants, model_class, model_names
 from .files import Location, check_keys, located_errors
 
 Named = Callable[[Any, Location, "TableReader"], Any]
@@ -131,6 +131,6 @@ def _keys(cls: type[Any]) -> list[str]:
 def only_class(kind: Any) -> type[Any] | None:
     """The class of a place where only one is possible."""
     classes = [each for each in fields.options(kind) if dataclasses.is_dataclass(each) and inspect.isclass(each)]
-    if len(classes) != 1 or inspect.isabstract(classes[0]) or set(model_names(kind)) - {classes[0].__name__}:
+    if len(classes) != 1 or inspect.isabstract(classes[0]) or has_variants(classes[0]):
         return None
     return classes[0]

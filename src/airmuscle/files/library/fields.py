@@ -15,6 +15,7 @@ import types
 import typing
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 from ...bench.readers import read_csv
@@ -30,9 +31,9 @@ PACKAGES = (characteristic, estimation, friction, geometry, laws, loop, mechanis
 
 
 @functools.cache
-def _registry() -> dict[str, type[Any]]:
-    """All model classes by name."""
-    exported = {name: getattr(package, name) for package in PACKAGES for name in package.__all__}
+def _models(*packages: ModuleType) -> dict[str, type[Any]]:
+    """The model classes of packages by name; their modules are imported."""
+    exported = {name: getattr(package, name) for package in packages for name in package.__all__}
     return {name: thing for name, thing in exported.items() if _is_file_model(thing)}
 
 
@@ -43,7 +44,13 @@ def _is_file_model(cls: Any) -> bool:
 @functools.cache
 def model_names(kind: Any = Any) -> tuple[str, ...]:
     """Names of all classes that a file may name, sorted; with an annotation `kind`, of those that it allows."""
-    return tuple(sorted(name for name, cls in _registry().items() if allows(kind, cls)))
+    return tuple(sorted(name for name, cls in _models(*PACKAGES).items() if allows(kind, cls)))
+
+
+def has_variants(cls: type[Any]) -> bool:
+    """Whether a file may name a subclass of a class; such stand in the package of the class."""
+    packages = [package for package in PACKAGES if cls.__name__ in package.__all__]
+    return any(each is not cls and issubclass(each, cls) for each in _models(*packages).values())
 
 
 def allows(kind: Any, cls: type[Any]) -> bool:
@@ -66,8 +73,10 @@ def model_class(name: str, where: str, classes: Mapping[str, type[Any]] | None =
         raise UnknownNameError(f'{where} is {abridged(name)}; it must be a name in quotes, such as "Braid".')
     if ":" in name and classes is None:
         return _class_of_code(name, where)
-    known = _registry() if classes is None else classes
+    package = next((each for each in PACKAGES if name in each.__all__), None)  # the only one that is imported
+    known = classes if classes is not None else _models(package) if package else {}
     if name not in known:
+        known = _models(*PACKAGES) if classes is None else classes
         names = tuple(classes) if classes is not None else model_names(kind)
         there = f"; there are {', '.join(names)}." if 0 < len(names) <= MOST_NAMES else "."
         here = "" if names else " A table is due here, not the name of a model."
