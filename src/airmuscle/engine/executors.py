@@ -3,7 +3,6 @@
 An executor has the interface of `concurrent.futures`; local processes are those of `engine.processes`.
 """
 
-import asyncio
 import contextlib
 import contextvars
 import hashlib
@@ -55,7 +54,7 @@ def dask_cluster(address: str) -> Iterator[Executor]:
     # a running loop.
     try:
         with ThreadPoolExecutor(1) as thread:
-            thread.submit(asyncio.run, connect()).result()
+            thread.submit(importlib.import_module("asyncio").run, connect()).result()
     except (OSError, ValueError, TypeError, ImportError) as error:
         raise InputError(
             f"no response from a Dask scheduler at '{address}' ({type(error).__name__}: {error}). Start one with "
