@@ -77,10 +77,11 @@ class RecursiveFit(ShortRepr):
         """The fit with one more sample [Pa, 1, N]. A sample outside the limits is counted and left out."""
         if not self.limits.validity_range.contains(pressure, contraction):
             return dataclasses.replace(self, outside=self.outside + 1)
-        terms, kept, squared = self._terms(np.array([pressure]), np.array([contraction]))[0], 1.0, self.squared_factor
+        row, factor, squared = np.empty(len(self.factor)), self.factor, self.squared_factor
+        row[:-1], row[-1] = self._terms(np.array([pressure]), np.array([contraction]))[0], force
         if self.forgetting < 1.0:
-            kept, squared = np.sqrt(self.forgetting), _with_row(self.forgetting * squared, terms)
-        factor = _with_row(kept * self.factor, np.append(terms, force))
+            factor, squared = np.sqrt(self.forgetting) * factor, _with_row(self.forgetting * squared, row[:-1])
+        factor = _with_row(factor, row)
         return dataclasses.replace(self, factor=factor, squared_factor=squared, samples=self.samples + 1)
 
     @functools.cached_property
@@ -181,7 +182,9 @@ def _lapack() -> Any:
 
 def _with_row(factor: Array, row: Array) -> Array:
     """Triangular factor of R^T R + r r^T for a triangular factor R, shape (P, P), and a row r, shape (P,)."""
-    return np.asarray(np.triu(_lapack().dgeqrf(np.vstack([factor, row]), overwrite_a=True)[0][: len(factor)]))
+    rows = np.empty((len(factor) + 1, len(factor)))
+    rows[:-1], rows[-1] = factor, row
+    return np.asarray(np.triu(_lapack().dgeqrf(rows, overwrite_a=True)[0][:-1]))
 
 
 def _terms(pressure: Array, contraction: Array, span: ValidityRange, degree: int) -> Array:
