@@ -77,12 +77,11 @@ class RecursiveFit(ShortRepr):
         """The fit with one more sample [Pa, 1, N]. A sample outside the limits is counted and left out."""
         if not self.limits.validity_range.contains(pressure, contraction):
             return dataclasses.replace(self, outside=self.outside + 1)
-        row, factor, squared = np.empty(len(self.factor)), self.factor, self.squared_factor
+        row, factor, square = np.empty(len(self.factor)), self.factor, self.squared_factor
         row[:-1], row[-1] = self._terms(np.array([pressure]), np.array([contraction]))[0], force
         if self.forgetting < 1.0:
-            factor, squared = np.sqrt(self.forgetting) * factor, _with_row(self.forgetting * squared, row[:-1])
-        factor = _with_row(factor, row)
-        return dataclasses.replace(self, factor=factor, squared_factor=squared, samples=self.samples + 1)
+            factor, square = np.sqrt(self.forgetting) * factor, _with_row(self.forgetting * square, row[:-1])
+        return dataclasses.replace(self, factor=_with_row(factor, row), squared_factor=square, samples=self.samples + 1)
 
     @functools.cached_property
     def coefficients(self) -> Array:

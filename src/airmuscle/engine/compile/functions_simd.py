@@ -132,13 +132,13 @@ class _Step:
             self.block.store("y", i * self.groups, self._moved(i, b, slopes))
         copies = [f"c{stage}" for stage in range(len(slopes))]
         names = ["x", "u", *copies, "w", "h", "y"]
-        stages = emit.function("stages", names, self.block, "nounwind noinline").replace("define", "define internal", 1)
+        stages = emit.function("stages", names, self.block, f"{emit.ALIGNED} noinline")
         outer = FunctionBody((), self.number)
         for group in range(self.groups):
             arrays = {n: outer.put(f"getelementptr inbounds i8, ptr %{n}, i64 {group * AT_ONCE}") for n in "xucwhy"}
             given = ", ".join(f"ptr {arrays['c' if name in copies else name]}" for name in names)
             outer.lines.append(f"  call void @stages({given})")
-        return stages + emit.function("step", list("xucwhy"), outer)
+        return stages.replace("define", "define internal", 1) + emit.function("step", list("xucwhy"), outer)
 
     def _rates(self, stage: int, row: Sequence[float], slopes: Sequence[Sequence[str]]) -> list[str]:
         """The rates of one stage."""

@@ -33,8 +33,7 @@ PACKAGES = (characteristic, estimation, friction, geometry, laws, loop, mechanis
 @functools.cache
 def _models(*packages: ModuleType) -> dict[str, type[Any]]:
     """The model classes of packages by name; their modules are imported."""
-    exported = {name: getattr(package, name) for package in packages for name in package.__all__}
-    return {name: thing for name, thing in exported.items() if _is_file_model(thing)}
+    return {n: cls for each in packages for n in each.__all__ if _is_file_model(cls := getattr(each, n))}
 
 
 def _is_file_model(cls: Any) -> bool:

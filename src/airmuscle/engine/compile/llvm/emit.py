@@ -228,11 +228,14 @@ class LlvmLanguage(TargetLanguage):
         return FunctionBody(scalars, self.number)
 
     def function(self, name: str, inputs: Sequence[str], outputs: Sequence[str], body: FunctionBlock) -> str:
-        return function(name, [*inputs, *outputs], body)
+        return function(name, [*inputs, *outputs], body, "nounwind" if self.number.lanes == 1 else ALIGNED)
 
     def preparation(self, name: str, inputs: Sequence[str], outputs: Sequence[str], body: FunctionBlock) -> str:
         """`prepare` runs once for a set of parameters, so it is not worth the time that optimising it would take."""
         return function(name, [*inputs, *outputs], body, "nounwind noinline optnone")
+
+
+ALIGNED = "nounwind alignstack(64)"  # else the time of spilled vectors depends on the depth of the stack at the call
 
 
 def function(name: str, arguments: Sequence[str], block: FunctionBlock, attributes: str = "nounwind") -> str:
